@@ -82,7 +82,8 @@ _TASKS = {
 }
 
 
-if not TYPE_CHECKING:  # else a type checker would believe in any name
+# a type checker that saw this function would accept any name
+if not TYPE_CHECKING:
 
     def __getattr__(name: str) -> Any:
         if name not in _PUBLIC:
@@ -92,6 +93,7 @@ if not TYPE_CHECKING:  # else a type checker would believe in any name
         try:
             return getattr(import_module(_PUBLIC[name]), name)
         except ModuleNotFoundError as error:
+            # Stable-Baselines3 comes with an extra; all names of `__all__` must exist without it, too
             if name != "Sb3VecEnv":
                 raise
             globals()[name] = _stand_in(name, "train", error)
@@ -99,8 +101,8 @@ if not TYPE_CHECKING:  # else a type checker would believe in any name
 
 
 def _stand_in(name: str, extra: str, error: ModuleNotFoundError) -> type:
-    """A class in the place of one whose library is missing: it can be listed and asked for, and its use says
-    what to install."""
+    """Return a class in the place of one that needs a missing library: it can be listed and looked up, and
+    its use raises an error that says what to install."""
     from hoof_env.errors import MissingExtraError
 
     message = f'hoof_env.{name} needs pip install "hoof-env[{extra}]" ({error})'

@@ -1,4 +1,4 @@
-"""Writing results so that a failure or an interrupt never leaves half a file behind; tables in Markdown."""
+"""Output that a failure or an interrupt never leaves half written; tables in Markdown."""
 
 from __future__ import annotations
 
@@ -16,9 +16,12 @@ from hoof_env.errors import OutputError
 
 @contextmanager
 def staged(folder: Path) -> Iterator[Path]:
-    """A temporary folder inside `folder`, which is made if need be; if the block succeeds, its files replace
-    those of `folder`. Folders that were made and have stayed empty go again. `OutputError` if it cannot
-    be."""
+    """Yield a temporary folder inside `folder`, which is made if need be. If the block succeeds, its files
+    replace those of `folder`. Folders that were made and are still empty are removed.
+
+    Raises:
+        OutputError: the folder cannot be made or written to.
+    """
     stage = None
     made = []
     try:
@@ -36,8 +39,9 @@ def staged(folder: Path) -> Iterator[Path]:
     finally:
         if stage is not None:
             shutil.rmtree(stage, ignore_errors=True)
+        # only empty folders can be removed: those with results stay
         for path in made:
-            with suppress(OSError):  # one that holds something
+            with suppress(OSError):
                 path.rmdir()
 
 
@@ -48,8 +52,11 @@ def check_folder(folder: Path) -> None:
 
 
 def check_new(path: Path, overwrite: bool) -> str:
-    """What to add to a report of a new file: the folder that is made for it, or nothing. `OutputError` where
-    there is a file already and `overwrite` is False, or there cannot be one."""
+    """Return an addition to the report of a new file: the folder that is made for it, or nothing.
+
+    Raises:
+        OutputError: there is a file already and `overwrite` is False, or there cannot be one.
+    """
     try:
         is_there = path.is_file()
         has_folder = path.parent.exists()
@@ -61,28 +68,30 @@ def check_new(path: Path, overwrite: bool) -> str:
 
 
 def free_memory() -> float:
-    """How much memory this process may still take [bytes]; infinite where the system does not say."""
-    found = [float("inf")]
+    """Return the memory that this process may still take [bytes]; infinite if the system does not say."""
+    bounds = [float("inf")]
     with suppress(OSError, ValueError, IndexError):
         lines = Path("/proc/meminfo").read_text().splitlines()
-        found += [1024.0 * float(line.split()[1]) for line in lines if line.startswith("MemAvailable:")]
-    with suppress(OSError, ValueError):  # of a container
+        bounds += [1024.0 * float(line.split()[1]) for line in lines if line.startswith("MemAvailable:")]
+    # a container may have less than its machine; `max` holds the word max if it is not limited
+    with suppress(OSError, ValueError):
         group = Path("/sys/fs/cgroup")
         most, used = ((group / f"memory.{name}").read_text() for name in ("max", "current"))
-        found.append(float(most) - float(used))
-    if len(found) == 1:
+        bounds.append(float(most) - float(used))
+    # systems without /proc
+    if len(bounds) == 1:
         with suppress(OSError, ValueError, AttributeError):
-            found.append(float(os.sysconf("SC_PHYS_PAGES")) * os.sysconf("SC_PAGE_SIZE"))
-    return max(min(found), 0.0)
+            bounds.append(float(os.sysconf("SC_PHYS_PAGES")) * os.sysconf("SC_PAGE_SIZE"))
+    return max(min(bounds), 0.0)
 
 
 LEAST_COLUMNS = 40
-"""Width of help at least: in a narrower terminal the tables of tyro and rich never end."""
+"""Least width of help: in a narrower terminal the tables of tyro and rich never end."""
 
 
 def bear_any_output() -> None:
-    """Have a command replace what the encoding of its output lacks, and lay out help for a terminal of some
-    width at least."""
+    """Make a command replace characters that the encoding of its output lacks, and lay out help for a
+    terminal of at least `LEAST_COLUMNS`."""
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, io.TextIOWrapper):
             stream.reconfigure(errors="replace")
@@ -91,8 +100,8 @@ def bear_any_output() -> None:
 
 
 def flush_or_drop() -> None:
-    """Write what a command has printed; where that cannot be, as on a full disk, it is dropped, so that
-    Python does not try again at its end."""
+    """Write what a command has printed; drop it if that fails, as on a full disk, so that Python does not try
+    again at its end."""
     try:
         sys.stdout.flush()
     except (OSError, ValueError):
@@ -101,8 +110,8 @@ def flush_or_drop() -> None:
 
 
 def markdown_table(head: Iterable[str], rows: Iterable[Iterable[str]]) -> str:
-    """A table in Markdown from the cells of its head and of its rows; a row that is shorter than the head
-    ends in empty cells."""
+    """Return a table in Markdown from the cells of its head and of its rows; a row that is shorter than the
+    head ends in empty cells."""
     titles = list(head)
     lines = [[*row, *[""] * (len(titles) - len(row))] for row in map(list, rows)]
     first, *rest = (f"| {' | '.join(line)} |" for line in (titles, *lines))

@@ -1,4 +1,4 @@
-"""How pictures with matplotlib look: colours and type, for pages."""
+"""Style of pictures with matplotlib, for pages: colours and type."""
 
 from __future__ import annotations
 
@@ -6,10 +6,16 @@ from typing import Any
 
 from hoof_env.errors import HoofEnvError
 
-BLUE, ORANGE, GREEN, PURPLE, SKY, AMBER, GREY, SOIL = (
-    "#0072B2", "#D55E00", "#009E73", "#CC79A7", "#56B4E9", "#E69F00", "#666666", "#EFE6D8",
-)  # fmt: skip
-"""Okabe and Ito's colours, told apart by colour-blind readers, a grey and the ground."""
+# Okabe and Ito's colours, which colour-blind readers can distinguish
+BLUE = "#0072B2"
+ORANGE = "#D55E00"
+GREEN = "#009E73"
+PURPLE = "#CC79A7"
+SKY = "#56B4E9"
+AMBER = "#E69F00"
+GREY = "#666666"
+SOIL = "#EFE6D8"
+"""Colour of the ground; the colours above are Okabe and Ito's, and a grey."""
 
 STYLE: dict[Any, Any] = {
     "font.size": 9,
@@ -21,11 +27,11 @@ STYLE: dict[Any, Any] = {
     "svg.hashsalt": "hoof-env",
     "savefig.dpi": 200,
 }
-"""For pictures on a page."""
+"""Settings of matplotlib for pictures on a page."""
 
 
 def check_matplotlib() -> None:
-    """Raise `HoofEnvError` with the way out unless matplotlib can be imported."""
+    """Raise `HoofEnvError`, which says what to do, unless matplotlib can be imported."""
     try:
         import matplotlib  # noqa: F401
     except ImportError:

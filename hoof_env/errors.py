@@ -1,6 +1,6 @@
 """Errors raised at the border of the package, and checks that raise them.
 
-Each names what was given and what was expected.
+Each message names the value that was given and what was expected.
 """
 
 from __future__ import annotations
@@ -18,46 +18,51 @@ class HoofEnvError(Exception):
 
 
 class ParameterError(HoofEnvError, ValueError):
-    """A parameter has a wrong type, is not finite or lies outside its range."""
+    """Parameter of a wrong type, not finite or outside its range."""
 
 
 class UnknownArgumentError(ParameterError, TypeError):
-    """A keyword that an environment does not take: a TypeError too, as of any Python function."""
+    """Keyword that an environment does not take: a TypeError too, as of any Python function."""
 
 
 class FixedSettingError(ParameterError, AttributeError):
-    """An attribute that cannot be assigned: an AttributeError too, as of any read-only property."""
+    """Attribute that cannot be assigned: an AttributeError too, as of any read-only property."""
 
 
 class MissingExtraError(HoofEnvError, ImportError):
-    """A library that an extra of this package installs is not there."""
+    """Missing library that an extra of this package installs."""
 
 
 class NotStartedError(HoofEnvError, RuntimeError):
-    """An engine was asked to move before anything was started in it."""
+    """Request to move an engine in which nothing was started."""
 
 
 class GeometryError(ParameterError):
-    """The linkage cannot be assembled or cannot turn through a full revolution."""
+    """Linkage that cannot be assembled or cannot turn through a full revolution."""
 
 
 class DataFileError(HoofEnvError, ValueError):
-    """A data, preset or model file is missing, unreadable or lacks what is expected of it."""
+    """Data, preset or model file that is missing, unreadable or incomplete."""
 
 
 class OutputError(HoofEnvError, OSError):
-    """An output or compile-cache folder cannot be written."""
+    """Output or compile-cache folder that cannot be written."""
 
 
 LEAST = 1e-12
-"""The smallest of positive settings, in whatever unit."""
+"""Smallest value of positive settings, in any unit."""
 
 
 def check_number(
     name: str, value: Any, *, low: float = -np.inf, high: float = np.inf, exclusive_low: bool = False
 ) -> float:
-    """Return `value` as a float, or raise `ParameterError` unless it is finite and within [low, high]; what
-    must be more than 0 must be `LEAST` or more, so that quotients are numbers."""
+    """Return `value` as a float.
+
+    Raises:
+        ParameterError: it is not a finite number within [low, high]; or, with `exclusive_low`, it is `low`
+            or, for a `low` of 0, less than `LEAST`, so that quotients stay finite.
+    """
+    # float() would accept truths and texts of digits
     try:
         number = np.nan if isinstance(value, (bool, np.bool_, str, bytes)) else float(value)
     except (TypeError, ValueError, OverflowError):
@@ -79,7 +84,7 @@ def check_choice(name: str, value: Any, choices: Iterable[str]) -> str:
 
 
 def parse_json(text: str | bytes) -> Any:
-    """`json.loads`, with a ValueError also for what is nested too deep."""
+    """Return `json.loads(text)`; raise ValueError also for text that is nested too deep."""
     try:
         return json.loads(text)
     except RecursionError:
@@ -108,6 +113,7 @@ def parse_pairs(option: str, items: Sequence[str]) -> dict[str, Any]:
         elif equals and key.isidentifier():
             try:
                 pairs[key] = json.loads(text)
+            # not JSON: plain text, as in trunk=rail
             except ValueError:
                 pairs[key] = text
                 continue
@@ -123,10 +129,11 @@ def parse_pairs(option: str, items: Sequence[str]) -> dict[str, Any]:
 Floats = NDArray[np.float64]
 Kind = TypeVar("Kind")
 LARGEST = float(np.finfo(np.float64).max)
+"""Largest finite number."""
 
 
 def count(name: str, value: Any, low: int = 1, most: float = np.inf) -> int:
-    """`value` as a whole number from `low` to `most`."""
+    """Return `value` as an int; raise `ParameterError` unless it is a whole number from `low` to `most`."""
     if isinstance(value, (bool, np.bool_)) or not isinstance(value, (int, np.integer)) or value < low:
         raise ParameterError(f"{name}: expected a whole number, {low} or more, got {value!r}")
     if value > most:
@@ -135,42 +142,47 @@ def count(name: str, value: Any, low: int = 1, most: float = np.inf) -> int:
 
 
 def spread(name: str, value: ArrayLike, shape: tuple[int, ...], most: float = np.inf) -> Floats:
-    """`value` as `finite` does, broadcast to `shape`; one number a leg serves all environments."""
-    given = finite(name, value, most)
-    if given.shape == shape:
-        return given
-    if not given.ndim:  # broadcast_to would take four times as long
-        return np.full(shape, given)
-    if given.ndim == 1 and len(shape) == 2:
-        given = given[:, None]
+    """Return `value` as `finite` does, broadcast to `shape`. Values of shape (legs,) apply to all
+    environments."""
+    numbers = finite(name, value, most)
+    if numbers.shape == shape:
+        return numbers
+    # broadcast_to would take four times as long
+    if not numbers.ndim:
+        return np.full(shape, numbers)
+    if numbers.ndim == 1 and len(shape) == 2:
+        numbers = numbers[:, None]
     try:
-        return np.broadcast_to(given, shape)
+        return np.broadcast_to(numbers, shape)
     except ValueError:
         raise ParameterError(f"{name}: expected numbers that fit shape {shape}, got {value!r}") from None
 
 
 def finite(name: str, value: Any, most: float = np.inf) -> Floats:
-    """`value` as finite numbers, from -`most` to `most`."""
+    """Return `value` as an array of doubles; raise `ParameterError` unless all are finite and within
+    +-`most`."""
     try:
-        given = np.asarray(value, dtype=np.float64)
+        numbers = np.asarray(value, dtype=np.float64)
     except (TypeError, ValueError):
-        given = np.array(np.nan)
-    if (np.abs(given) <= min(most, LARGEST)).all():  # in one pass: every reset of an episode comes here
-        return given
-    if not np.isfinite(given).all():
+        numbers = np.array(np.nan)
+    # one pass for both checks, NaN included: every reset of an episode calls this function
+    if (np.abs(numbers) <= min(most, LARGEST)).all():
+        return numbers
+    if not np.isfinite(numbers).all():
         raise ParameterError(f"{name}: expected finite numbers, got {value!r}")
     raise ParameterError(f"{name}: expected numbers within +-{most:g}, got {value!r}")
 
 
 def one_of(name: str, value: Any, kind: type[Kind]) -> Kind:
-    """`value`, if it is a `kind`."""
+    """Return `value`; raise `ParameterError` unless it is a `kind`."""
     if not isinstance(value, kind):
         raise ParameterError(f"{name}: expected {kind.__name__}, got {value!r}")
     return value
 
 
 def all_of(name: str, values: Any, kind: type[Kind]) -> tuple[Kind, ...]:
-    """One `kind` or several of them as a tuple."""
+    """Return one `kind` or several as a tuple; raise `ParameterError` unless there is one and all are
+    `kind`s."""
     try:
         several = (values,) if isinstance(values, kind) else tuple(values)
     except TypeError:
@@ -181,7 +193,7 @@ def all_of(name: str, values: Any, kind: type[Kind]) -> tuple[Kind, ...]:
 
 
 def flag(name: str, value: Any) -> bool:
-    """`value`, if it is True or False."""
+    """Return `value` as a bool; raise `ParameterError` unless it is True or False."""
     if not isinstance(value, (bool, np.bool_)):
         raise ParameterError(f"{name}: expected True or False, got {value!r}")
     return bool(value)

@@ -1,5 +1,5 @@
-"""The gait: parameters that a policy commands, with units, limits and the paper's presets; the filters that
-they pass; and the motion of crank and swing that follows."""
+"""Gaits: parameters that a policy commands, with units, limits and the paper's presets; the filters that they
+pass; and the motion of crank and swing that follows."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ has those of others. Both gaits of the paper lie inside, and so do the best gait
 docs/evidence/actions.md has the sweep."""
 
 FASTEST_CRANK = 1000.0
-"""Of any leg [rad/s]: that of a leg of a quarter of a millimetre may turn so fast."""
+"""Largest crank speed of any leg [rad/s], which a leg of a quarter of a millimetre reaches."""
 
 
 @cache
@@ -50,13 +50,13 @@ def _published_hip_height() -> float:
 
 
 def speed_scale_of(geometry: Geometry) -> float:
-    """Speed of a leg over that of the published leg at the same Froude number [-]: the root of the ratio of
-    their hip heights. A similar motion takes so many times as long."""
+    """Return the speed of a leg over that of the published leg at the same Froude number [-]: the root of the
+    ratio of their hip heights. A similar motion takes this many times as long."""
     return math.sqrt(geometry.hip_height / _published_hip_height())
 
 
 def limits_of(geometry: Geometry) -> dict[str, tuple[float, float]]:
-    """The `LIMITS` of a leg: angles are those of the published leg, and at one Froude number the crank turns
+    """Return the `LIMITS` of a leg: angles are those of the published leg, and at one Froude number the crank turns
     faster by the root of how much smaller the leg is."""
     low, high = LIMITS["crank_speed"]
     speed_scale = speed_scale_of(geometry)
@@ -95,15 +95,20 @@ class GaitParameters:
     def _check(self, limits: Mapping[str, tuple[float, float]]) -> None:
         for name in PARAMETERS:
             low, high = limits[name] if name != "crank_speed" else (0.0, FASTEST_CRANK)
+            # the dataclass is frozen: `__post_init__` cannot assign
             object.__setattr__(self, name, check_number(name, getattr(self, name), low=low, high=high))
 
     def to_array(self) -> NDArray[np.float64]:
-        """The four values in the order of the fields, shape (4,)."""
+        """Return the four values in the order of the fields, shape (4,)."""
         return np.array([getattr(self, name) for name in PARAMETERS])
 
     @classmethod
     def from_array(cls, values: Any) -> GaitParameters:
-        """Inverse of `to_array`."""
+        """Return the gait of four values, the inverse of `to_array`.
+
+        Raises:
+            ParameterError: there are not four values, or one is outside its limits.
+        """
         array = np.asarray(values, dtype=np.float64)
         if array.shape != (4,):
             raise ParameterError(f"gait parameters: expected 4 values {PARAMETERS}, got shape {array.shape}")
@@ -114,12 +119,15 @@ PARAMETERS = tuple(item.name for item in fields(GaitParameters))
 """Names of the gait parameters, in the order used by actions and filters."""
 
 MOST_HARMONICS = 3
-"""Of a swing law."""
+"""Largest number of harmonics of a swing law."""
 
 WIDEST = MappingProxyType(
     {
-        "crank_speed": (0.0, 6 * np.pi), "swing_offset": (-1.5, 2.0),
-        "swing_sin": (-1.5, 1.5), "swing_cos": (-1.5, 1.5), "higher": (-0.6, 0.6),
+        "crank_speed": (0.0, 6 * np.pi),
+        "swing_offset": (-1.5, 2.0),
+        "swing_sin": (-1.5, 1.5),
+        "swing_cos": (-1.5, 1.5),
+        "higher": (-0.6, 0.6),
     }
 )  # fmt: skip
 """The `LIMITS` of a `HarmonicGait`, of a leg of a horse's size."""
@@ -127,7 +135,7 @@ WIDEST = MappingProxyType(
 
 @dataclass(frozen=True)
 class HarmonicGait(GaitParameters):
-    """A gait whose swing has higher harmonics, so that a hoof can follow a level stance; an engine made with
+    """Gait with higher harmonics of the swing, so that a hoof can follow a level stance; an engine made with
     `harmonics` takes it, and no environment of one leg does:
 
         phi = swing_offset + sum over k of A_k sin(k theta) + B_k cos(k theta).
@@ -144,27 +152,31 @@ class HarmonicGait(GaitParameters):
 
     def __post_init__(self) -> None:
         self._check(WIDEST)
-        given: Any = self.higher
+        values: Any = self.higher
         try:
-            higher = tuple(given)
+            higher = tuple(values)
         except TypeError:
             higher = ()
         if len(higher) not in (2, 4):
             raise ParameterError(
                 "higher: expected the sine and cosine coefficients of the second harmonic, or of the second "
-                f"and the third, got {given!r}"
+                f"and the third, got {values!r}"
             )
         low, high = WIDEST["higher"]
         numbers = (check_number(f"higher[{k}]", x, low=low, high=high) for k, x in enumerate(higher))
         object.__setattr__(self, "higher", tuple(numbers))
 
     def to_array(self) -> NDArray[np.float64]:
-        """The values in the order of `parameter_names`, shape (6,) or (8,)."""
+        """Return the values in the order of `parameter_names`, shape (6,) or (8,)."""
         return np.append(super().to_array(), self.higher)
 
     @classmethod
     def from_array(cls, values: Any) -> HarmonicGait:
-        """Inverse of `to_array`."""
+        """Return the gait of six or eight values, the inverse of `to_array`.
+
+        Raises:
+            ParameterError: there are not six or eight values, or one is outside its limits.
+        """
         array = np.asarray(values, dtype=np.float64)
         if array.shape not in ((6,), (8,)):
             raise ParameterError(f"gait parameters: expected 6 or 8 values, got shape {array.shape}")
@@ -173,8 +185,8 @@ class HarmonicGait(GaitParameters):
 
 
 def gait_array(gait: GaitParameters, harmonics: int) -> NDArray[np.float64]:
-    """The values of a gait for an engine with so many harmonics, shape (2 + 2 harmonics,); those that the
-    gait has not are 0.
+    """Return the values of a gait for an engine with `harmonics` harmonics, shape (2 + 2 harmonics,); those
+    that the gait does not have are 0.
 
     Raises:
         ParameterError: it has more.
@@ -188,13 +200,16 @@ def gait_array(gait: GaitParameters, harmonics: int) -> NDArray[np.float64]:
 
 
 def parameter_names(harmonics: int = 1) -> tuple[str, ...]:
-    """Names of the gait parameters of a swing with so many harmonics, in their order."""
-    parts = ((f"swing_sin_{k}", f"swing_cos_{k}") for k in range(2, harmonics + 1))
-    return (*PARAMETERS, *(name for pair in parts for name in pair))
+    """Return the names of the gait parameters of a swing with `harmonics` harmonics, in their order."""
+    higher: list[str] = []
+    for k in range(2, harmonics + 1):
+        higher += (f"swing_sin_{k}", f"swing_cos_{k}")
+    return (*PARAMETERS, *higher)
 
 
 def gait_names(preset: Preset = DEFAULT_PRESET) -> list[str]:
-    """Names of the gaits in a preset: the paper's walk and run, and what was found for that leg beside them.
+    """Return the names of the gaits in a preset: the paper's walk and run, and others that were found for
+    that leg.
 
     Raises:
         ParameterError: unknown preset name, or content that lacks the part.
@@ -204,7 +219,7 @@ def gait_names(preset: Preset = DEFAULT_PRESET) -> list[str]:
 
 
 def load_gait(name: str, preset: Preset = DEFAULT_PRESET) -> GaitParameters:
-    """A gait of a preset by name, of a file by path, or of such a file's content.
+    """Return a gait of a preset by name, of a file by path, or of such a file's content.
 
     Raises:
         ParameterError: unknown preset or gait name, a value outside its limits, or content that lacks a part.
@@ -214,6 +229,7 @@ def load_gait(name: str, preset: Preset = DEFAULT_PRESET) -> GaitParameters:
     check_choice("gait", name, gaits)
     try:
         return (HarmonicGait if "higher" in gaits[name] else GaitParameters)(**gaits[name])
+    # an entry is missing or unknown, or a gait is not an object
     except TypeError as error:
         raise preset_error_type(preset)(
             f"{preset_label(preset)}, gait {name!r}: expected {', '.join(PARAMETERS)}, perhaps higher:"
@@ -222,9 +238,10 @@ def load_gait(name: str, preset: Preset = DEFAULT_PRESET) -> GaitParameters:
 
 
 def paper_gaits(gaits: Mapping[str, Gait]) -> dict[str, Gait]:
-    """The paper's own gaits among those of a preset, by name and in alphabetic order; all, if it has neither.
+    """Return the paper's own gaits among those of a preset, by name and in alphabetic order; all, if it has
+    neither.
 
-    What an environment draws or derives from the gaits of a preset must not change when one is added.
+    Environments draw or derive from these: their behaviour must not change when a gait is added to a preset.
     """
     names = sorted(set(gaits) & {"walk", "run"} or gaits)
     return {name: gaits[name] for name in names}
@@ -244,10 +261,10 @@ def _read_gaits(preset: Preset) -> dict[str, Any]:
 
 
 FILTER = np.dtype([("value", "f8"), ("rate", "f8"), ("acc", "f8")])
-"""State of one filter: a parameter, its rate and its acceleration (per s, per s^2)."""
+"""Record type of the state of one filter: a parameter, its rate and its acceleration (per s, per s^2)."""
 
 INNER = 5.0
-"""How many times faster a filter's rate follows than its value; above 4 the approach does not oscillate."""
+"""Ratio of the gain of a filter's rate to that of its value; above 4 the approach does not oscillate."""
 
 SPEED, OFFSET, SIN, COS = range(4)
 """Order of the four filters, as in `PARAMETERS`."""
@@ -255,7 +272,8 @@ SPEED, OFFSET, SIN, COS = range(4)
 MOTION = np.dtype(
     [(name, "f8") for name in ("theta", "theta_rate", "theta_acc", "phi", "phi_rate", "phi_acc")]
 )
-"""Crank angle (clockwise positive, not wrapped) and swing angle, with two derivatives each [rad, s]."""
+"""Record type of the motion: crank angle (clockwise positive, not wrapped) and swing angle, with two
+derivatives each [rad, s]."""
 
 
 @dataclass(frozen=True)
@@ -263,14 +281,16 @@ class FilterSettings:
     """Bounds of the command filters.
 
     Attributes:
-        gain: how fast a parameter approaches its command [1/s]; the rate follows `INNER` times as fast.
+        gain: rate per difference between a parameter and its command [1/s]; the rate follows `INNER` times as
+            fast.
         crank_rate, crank_acc: bounds on the crank speed's rate [rad/s^2] and its acceleration [rad/s^3].
         swing_rate, swing_acc: the same for the three swing parameters [rad/s, rad/s^2].
 
-    A horse asks for more within a stride than the paper's leg: `QUICK`.
+    A horse needs faster changes within a stride than the paper's leg: `QUICK`.
 
-    The acceleration bound must allow the approach: gain * rate <= acc, else a parameter could overshoot its
-    command.
+    Raises:
+        ParameterError: a value is not positive and finite, or the acceleration bound does not allow the
+            approach: unless gain * rate <= acc, a parameter could overshoot its command.
     """
 
     gain: float = 20.0
@@ -285,6 +305,7 @@ class FilterSettings:
         for part in ("crank", "swing"):
             rate = getattr(self, f"{part}_rate")
             acc = getattr(self, f"{part}_acc")
+            # 1e-12: `sped_up` rounds each of the three by itself
             if self.gain * rate > acc * (1 + 1e-12):
                 raise ParameterError(
                     f"filters: expected gain * {part}_rate <= {part}_acc so that a command is not overshot, "
@@ -292,11 +313,14 @@ class FilterSettings:
                 )
 
     def sped_up(self, speed_scale: float) -> FilterSettings:
-        """The filters of a motion that takes its course so many times as fast [-]."""
+        """Return the filters of a motion that is `speed_scale` times as fast [-]."""
         return FilterSettings(
-            self.gain * speed_scale, self.crank_rate * speed_scale**2, self.crank_acc * speed_scale**3,
-            self.swing_rate * speed_scale, self.swing_acc * speed_scale**2,
-        )  # fmt: skip
+            gain=self.gain * speed_scale,
+            crank_rate=self.crank_rate * speed_scale**2,
+            crank_acc=self.crank_acc * speed_scale**3,
+            swing_rate=self.swing_rate * speed_scale,
+            swing_acc=self.swing_acc * speed_scale**2,
+        )
 
     @property
     def longest_step(self) -> float:
@@ -304,7 +328,7 @@ class FilterSettings:
         return 1.0 / (INNER * self.gain)
 
     def to_array(self) -> NDArray[np.float64]:
-        """Rows (gain, rate bound, acceleration bound) for the four filters, shape (4, 3)."""
+        """Return rows (gain, rate bound, acceleration bound) for the four filters, shape (4, 3)."""
         crank = (self.gain, self.crank_rate, self.crank_acc)
         swing = (self.gain, self.swing_rate, self.swing_acc)
         return np.array([crank, swing, swing, swing])
@@ -318,10 +342,11 @@ QUICK = FilterSettings(gain=100.0, crank_rate=100.0, crank_acc=1e4, swing_rate=1
 def command_filters(filters, command, settings):  # type: ignore[no-untyped-def]
     """Set each filter's acceleration: bounded, towards a bounded rate, towards the command."""
     for k in range(filters.shape[0]):
-        row = min(k, 3)  # higher harmonics swing like the first
+        row = min(k, 3)  # higher harmonics have the filters of the first
         gain = settings[row, 0]
         rate_bound = settings[row, 1]
         acc_bound = settings[row, 2]
+        # a cascade: the outer loop asks for a rate, the inner one, `INNER` times as fast, follows it
         wanted_rate = clip(gain * (command[k] - filters[k].value), rate_bound)
         filters[k].acc = clip(INNER * gain * (wanted_rate - filters[k].rate), acc_bound)
 
@@ -329,6 +354,7 @@ def command_filters(filters, command, settings):  # type: ignore[no-untyped-def]
 @kernel
 def advance_motion(motion, filters, h):  # type: ignore[no-untyped-def]
     """Advance filters and crank angle by `h` [s], exactly for constant filter accelerations."""
+    # before the filters: the angle is the integral of the speed from the step's start
     speed = filters[SPEED]
     motion.theta += h * (speed.value + h * (speed.rate / 2.0 + h * speed.acc / 6.0))
     for k in range(4):
@@ -351,6 +377,7 @@ def evaluate_motion(motion, filters):  # type: ignore[no-untyped-def]
     w_rate = filters[SPEED].rate
     motion.theta_rate = w
     motion.theta_acc = w_rate
+    # (E1), as in `mechanics.place_frame`, but with the crank's acceleration
     motion.phi = offset.value + a.value * s + b.value * c
     slope = a.value * c - b.value * s
     motion.phi_rate = offset.rate + a.rate * s + b.rate * c + slope * w
@@ -365,7 +392,7 @@ def evaluate_motion(motion, filters):  # type: ignore[no-untyped-def]
 
 
 def steady_filters(parameters: NDArray[np.float64]) -> NDArray[np.void]:
-    """Filters at rest at the given four parameters, shape (4,) of dtype `FILTER`."""
+    """Return filters at rest at four parameters, shape (4,) of dtype `FILTER`."""
     filters = np.zeros(4, dtype=FILTER)
     filters["value"] = parameters
     return filters

@@ -1,9 +1,9 @@
-"""The engine's kernels: environments come from the engine's memory, go step after step, and go back.
+"""Kernels of the engine: load environments from its memory, advance them step after step, store them.
 
 `advance_leg`, `advance_four` and `advance_batch` are one function, `run`, compiled for one leg alone, for
 four lanes that are the legs of one trunk, and for `LANES` environments side by side with any number of legs;
-`react_leg` and so on are the same with joint reactions, a fifth more to compile. What they work on lives on
-the stack, where the compiler keeps what it can in registers.
+`react_leg`, `react_four` and `react_batch` also compute joint reactions, and take a fifth longer to compile.
+Kernels work on copies on the stack, which the compiler keeps in registers where it can.
 
 An engine's memory is one matrix `data`, a column for each environment: the rows of the trunk, then those of
 each leg, fields as in `layout.TrunkMemory` and `LegMemory`. Each kind of engine (`layout.Features`) has
@@ -34,7 +34,7 @@ from hoof_env.simd.memory import address, doubles, offset
 from hoof_env.simd.reach import fingerprint, refresh
 
 LANES = 8
-"""Environments side by side in a batch: one vector of 512 bits."""
+"""Number of environments side by side in a batch: one vector of 512 bits."""
 
 OK = float(Result.OK)
 NOT_FINITE = float(Result.NOT_FINITE)
@@ -43,28 +43,38 @@ FALLEN = float(Result.FALLEN)
 FIRST_LIMIT = float(Result.PITCH)
 
 RESET_REQUESTED = -1.0
-"""Stands in the place of a result where an environment is to start."""
+"""Mark in the place of a result: the environment is to be started."""
 
 CONSTANTS_SIZE = LegConstants.size
 REACTIONS_SIZE = Reactions.size
 
 MODEL = np.dtype(
     [
-        ("legs", "i8"), ("cells", "f8"),  # how many; cells of a leg's table
-        ("kind", "i8"), ("eighths", "i8"), ("friction_law", "i8"),  # of trunk, contact exponent, friction
-        ("interpolated", "?"), ("is_terrain", "?"), ("new_rates", "?"),  # see `Ground`, `Terrain`, `Scheme`
-        ("strides", "?"), ("motors", "?"),  # whether to count them; whether any crank has a motor
-        ("averages", "?"), ("stages", "i8"), ("fractions", "f8", (4,)), ("weights", "f8", (4,)),  # `Scheme`
+        ("legs", "i8"),  # number of legs
+        ("cells", "f8"),  # number of cells of a leg's table
+        ("kind", "i8"),  # of the trunk, position in `parts.TRUNKS`
+        ("eighths", "i8"),  # contact exponent times 8
+        ("friction_law", "i8"),  # position in `laws.FRICTION_LAWS`
+        ("interpolated", "?"),  # the approach speed, see `Ground`
+        ("is_terrain", "?"),  # false if level and the same everywhere
+        ("new_rates", "?"),  # as are averages, stages, fractions and weights: of the `Scheme`
+        ("strides", "?"),  # true if stances are counted
+        ("motors", "?"),  # true if any crank has a motor
+        ("averages", "?"),
+        ("stages", "i8"),
+        ("fractions", "f8", (4,)),
+        ("weights", "f8", (4,)),
         ("settings", "f8", (12,)),  # of the filters
-        ("ground_origin", "f8"), ("ground_per_metre", "f8"),  # of the terrain's grid
+        ("ground_origin", "f8"),  # of the terrain's grid
+        ("ground_per_metre", "f8"),
     ],
     align=True,
-)  # fmt: skip
-"""What does not change while the engine runs, but for large arrays."""
+)
+"""Record type of all settings that stay constant while the engine runs, except large arrays."""
 
 
 class Model(NamedTuple):
-    """`MODEL` inside the kernels, with the large arrays."""
+    """Constant settings inside the kernels: the fields of `MODEL` and the large arrays."""
 
     kind: int
     eighths: int
@@ -78,7 +88,7 @@ class Model(NamedTuple):
     form: EngineLayout
     cells: float
     tables: Any  # pointer to the tables of all legs, one after the other
-    settings: Any  # pointer to memory on the stack, as are fractions and weights
+    settings: Any  # of the filters; pointer to memory on the stack, as are fractions and weights
     averages: bool
     stages: int
     fractions: Any
@@ -91,27 +101,46 @@ class Model(NamedTuple):
 
 @inline_llvm
 def unpack_model(model, tables, ground, small, lanes_are_legs, law, form):  # type: ignore[no-untyped-def]
-    """The model from its record and arrays; `small` points to room for 8 + 3 form.gait doubles."""
-    given = model[0]
+    """Return the `Model` of a record and its arrays; `small` points to room for 8 + 3 form.gait doubles."""
+    record = model[0]
+    # copied to the stack: the compiler could not rule out that a store to `data` changes the record
     for k in range(4):
-        small[k] = given.fractions[k]
-        small[4 + k] = given.weights[k]
+        small[k] = record.fractions[k]
+        small[4 + k] = record.weights[k]
     settings = offset(small, 8)
     for k in range(12):
-        settings[k] = given.settings[k]
-    for k in range(12, 3 * form.gait):  # higher harmonics swing like the first
-        settings[k] = given.settings[k % 3 + 9]
+        settings[k] = record.settings[k]
+    # higher harmonics have the filters of the first
+    for k in range(12, 3 * form.gait):
+        settings[k] = record.settings[k % 3 + 9]
     return Model(
-        given.kind, given.eighths, given.friction_law, given.interpolated, given.is_terrain, given.new_rates,
-        given.strides, given.motors, lanes_are_legs, form, given.cells, address(tables),
-        settings, given.averages, given.stages, small, offset(small, 4),
-        carray(address(ground), ground.shape), given.ground_origin, given.ground_per_metre, law,
-    )  # fmt: skip
+        record.kind,
+        record.eighths,
+        record.friction_law,
+        record.interpolated,
+        record.is_terrain,
+        record.new_rates,
+        record.strides,
+        record.motors,
+        lanes_are_legs,
+        form,
+        record.cells,
+        address(tables),
+        settings,
+        record.averages,
+        record.stages,
+        small,
+        offset(small, 4),
+        carray(address(ground), ground.shape),
+        record.ground_origin,
+        record.ground_per_metre,
+        law,
+    )
 
 
 @inline_llvm
 def read_trunk(trunk, memory):  # type: ignore[no-untyped-def]
-    """State and settings from a `TrunkMemory`."""
+    """Load state and settings from a `TrunkMemory`."""
     load_rows(trunk.state, memory.state)
     load_rows(trunk.settings, memory.settings)
     keep_still(trunk)
@@ -119,7 +148,7 @@ def read_trunk(trunk, memory):  # type: ignore[no-untyped-def]
 
 @inline_llvm
 def read_leg(leg, memory, form):  # type: ignore[no-untyped-def]
-    """State, command and settings from a `LegMemory`; sums begin anew."""
+    """Load state, command and settings from a `LegMemory`; set the sums to 0."""
     load_rows(leg.state, memory.state)
     load_rows(leg.strides, memory.strides)
     for k in range(form.sums):
@@ -135,30 +164,33 @@ def read_leg(leg, memory, form):  # type: ignore[no-untyped-def]
 
 @inline_llvm
 def find_result(trunk, legs, leg_count, lanes_are_legs, form):  # type: ignore[no-untyped-def]
-    """How the environments ended, numbers of `parts.Result`. A number whose square is none counts as none."""
+    """Return how the environments ended, numbers of `parts.Result`. A number too large to be squared counts
+    as not finite."""
     total = full_like(trunk, 0.0)
     stuck = trunk.at_dead_point
     for k in range(form.trunk_state):
         total = total + trunk.state[k] * trunk.state[k]
     for i in range(leg_count):
         leg = block_at(legs, i)
-        own = leg.theta_acceleration * leg.theta_acceleration  # a sum for each leg: long chains of sums wait
+        # a sum for each leg: in one long sum each addition would wait for the one before
+        leg_total = leg.theta_acceleration * leg.theta_acceleration
         for k in range(form.leg_state):
-            own = own + leg.state[k] * leg.state[k]
-        total = total + own
+            leg_total = leg_total + leg.state[k] * leg.state[k]
+        total = total + leg_total
     if lanes_are_legs:
         total = lane_sum(full_like(trunk, 0.0), total)
         stuck = lane_sum(full_like(trunk, 0.0), stuck)
-    lost = where(stuck > 0.0, DEAD_POINT, NOT_FINITE)
-    fell = where(trunk.fallen > 0.0, FALLEN, OK)
+    failure = where(stuck > 0.0, DEAD_POINT, NOT_FINITE)
+    ending = where(trunk.fallen > 0.0, FALLEN, OK)
     if form.has_limits:
-        fell = where(trunk.fallen > 0.0, FALLEN, trunk.violated_limit[0])
-    return where((total - total != 0.0) | (stuck > 0.0), lost, fell)
+        ending = where(trunk.fallen > 0.0, FALLEN, trunk.violated_limit[0])
+    # total - total is 0 if total is finite, else NaN
+    return where((total - total != 0.0) | (stuck > 0.0), failure, ending)
 
 
 @inline_llvm
 def store(memory, rows, count, good):  # type: ignore[no-untyped-def]
-    """Put `count` rows into memory where they are good."""
+    """Store `count` rows in the lanes of memory where `good` holds."""
     for k in range(count):
         memory[k] = where(good, rows[k], memory[k])
 
@@ -167,13 +199,15 @@ def store(memory, rows, count, good):  # type: ignore[no-untyped-def]
 def run_steps(  # type: ignore[no-untyped-def]
     trunk, legs, leg_count, model, account, constants, reactions, h, steps, keeps_account, reacts
 ):
-    """Advance by `steps` of `h` [s] and evaluate there."""
+    """Advance by `steps` of `h` [s] and evaluate forces and accelerations at the end."""
     stage = 0
     elapsed = 0.0
     begin_step(trunk, legs, leg_count, model)
+    # one loop over all stages of all steps, not two: `evaluate`, which is large, then has a single call
     for turn in range(steps * model.stages + 1):
         evaluate(trunk, legs, leg_count, model, elapsed)
         if stage == 0:
+            # counted from the end, so that limits are always checked at the last step
             left = steps * model.stages - turn
             looks = turn > 0 and left % (CHECK_EVERY * model.stages) == 0
             for i in range(leg_count):
@@ -205,21 +239,43 @@ def run_steps(  # type: ignore[no-untyped-def]
 
 @inline_source
 def run(  # type: ignore[no-untyped-def]
-    data, model, tables, ground, constants, reactions, h, steps, keeps_account, begin, end,
-    leg_count, lanes, lanes_are_legs, reacts, law, form,
-):  # fmt: skip
-    """Advance environments `begin` to `end`: `lanes` at a time, or one whose legs the lanes are. With `steps`
-    below 0 those start whose result is `RESET_REQUESTED`. Unless `reacts`, a constant, there is no code for
-    reactions."""
+    data,
+    model,
+    tables,
+    ground,
+    constants,
+    reactions,
+    h,
+    steps,
+    keeps_account,
+    begin,
+    end,
+    leg_count,
+    lanes,
+    lanes_are_legs,
+    reacts,
+    law,
+    form,
+):
+    """Advance environments `begin` to `end`, `lanes` at a time, or one at a time if its legs are the lanes.
+
+    Args:
+        data, model, tables, ground, constants, reactions: `TrunkEngine.arrays`.
+        h: length of a substep [s].
+        steps: number of substeps; if negative, environments with the result `RESET_REQUESTED` are started.
+        keeps_account: true if energies and impulses are integrated.
+        reacts: a constant; if false, no code for joint reactions is compiled.
+        law, form: law of contact (`hoof.law_of`) and `form.EngineLayout`, constants.
+    """
     trunk = rows(doubles(form.trunk_size * lanes), lanes, form.trunk)
     legs = rows(doubles(leg_count * form.leg_size * lanes), lanes, form.leg)
     account = rows(doubles(form.account_size * lanes), lanes, form.account)
     shapes = rows(doubles(leg_count * CONSTANTS_SIZE * lanes), lanes, LegConstants)
     forces = rows(doubles(leg_count * REACTIONS_SIZE * lanes), lanes, Reactions)
-    inside = unpack_model(model, tables, ground, doubles(8 + 3 * form.gait), lanes_are_legs, law, form)
+    unpacked = unpack_model(model, tables, ground, doubles(8 + 3 * form.gait), lanes_are_legs, law, form)
     at = address(data)
     row = data.shape[1]
-    # lanes are neighbours, but where they are legs, as far apart as legs are
+    # lanes are neighbouring columns; lanes that are legs are as far apart as the legs' rows in one column
     envs = lanes
     near = 1
     far = 1
@@ -228,9 +284,10 @@ def run(  # type: ignore[no-untyped-def]
         near = 0
         far = form.leg_rows * row
     if reacts or form.has_limits:
-        own = columns(address(constants), lanes, None, 0, 1, CONSTANTS_SIZE if lanes_are_legs else 0)
+        constants_stride = CONSTANTS_SIZE if lanes_are_legs else 0
+        shared = columns(address(constants), lanes, None, 0, 1, constants_stride)
         for k in range(leg_count * CONSTANTS_SIZE):
-            shapes[k] = own[k]
+            shapes[k] = shared[k]
     for n in range(begin, end, envs):
         memory = columns(at, lanes, form.trunk_memory, n, row, near)
         before = memory.result
@@ -246,18 +303,19 @@ def run(  # type: ignore[no-untyped-def]
             first = (form.trunk_rows + i * form.leg_rows) * row + n
             read_leg(block_at(legs, i), columns(at, lanes, form.leg_memory, first, row, far), form)
         if steps < 0:
-            begin_step(trunk, legs, leg_count, inside)
-            if inside.kind != FIXED:
-                velocities_to_momenta(trunk, legs, leg_count, inside, starts)
+            begin_step(trunk, legs, leg_count, unpacked)
+            if unpacked.kind != FIXED:
+                velocities_to_momenta(trunk, legs, leg_count, unpacked, starts)
         run_steps(
-            trunk, legs, leg_count, inside, account, shapes, forces, h, max(steps, 0), keeps_account, reacts
+            trunk, legs, leg_count, unpacked, account, shapes, forces, h, max(steps, 0), keeps_account, reacts
         )
         report_trunk(trunk, memory.report)
         result = find_result(trunk, legs, leg_count, lanes_are_legs, form)
         good = result == OK
         if form.has_limits:
             good = good | (result >= FIRST_LIMIT)  # a motion beyond a limit is a motion
-        if steps < 0:  # the others are as they were; a start that cannot be is kept as it is
+        if steps < 0:
+            # a reset writes the started lanes only, even where the start is infeasible
             result = where(starts, result, before)
             good = starts
         memory.result = result
@@ -269,23 +327,23 @@ def run(  # type: ignore[no-untyped-def]
         for i in range(leg_count):
             leg = block_at(legs, i)
             first = (form.trunk_rows + i * form.leg_rows) * row + n
-            own = columns(at, lanes, form.leg_memory, first, row, far)
-            report_leg(trunk, leg, own.report)
-            store(own.state, leg.state, form.leg_state, good)
-            store(own.strides, leg.strides, form.strides, good)
-            store(own.sums, leg.sums, form.sums, good)
+            leg_memory = columns(at, lanes, form.leg_memory, first, row, far)
+            report_leg(trunk, leg, leg_memory.report)
+            store(leg_memory.state, leg.state, form.leg_state, good)
+            store(leg_memory.strides, leg.strides, form.strides, good)
+            store(leg_memory.sums, leg.sums, form.sums, good)
             if reacts:
-                kept = block_at(forces, i)
+                leg_forces = block_at(forces, i)
                 first = i * REACTIONS_SIZE * row + n
                 stride = REACTIONS_SIZE * row if lanes_are_legs else 1
                 out = columns(address(reactions), lanes, Reactions, first, row, stride)
                 for k in range(REACTIONS_SIZE):
-                    out[k] = kept[k]
+                    out[k] = leg_forces[k]
 
 
 KERNELS = {"leg": (1, 1, False), "four": (1, 4, True), "batch": (0, LANES, False)}
-"""One leg alone, four legs of one trunk side by side, or `LANES` environments: how many legs, 0 for any
-number; lanes; whether these are the legs of one trunk."""
+"""Number of legs (0 for any), number of lanes, and true if the lanes are the legs of one trunk: for one leg
+alone, for four legs of one trunk side by side, and for `LANES` environments."""
 
 
 BY_LEGS = {1: "leg", 4: "four"}
@@ -295,37 +353,59 @@ _KEPT = Kept()
 
 
 def advance_kernels(contact_law: Callable[..., Any] | None = None, features: Features = PLAIN) -> Any:
-    """`advance_leg`, `advance_four` and `advance_batch`; `react_leg` and so on compute joint reactions too.
+    """Return the kernels `advance_leg`, `advance_four`, `advance_batch`, and `react_leg` and so on, which
+    also compute joint reactions.
 
-    The law of contact is as in `hoof.law_of`; None is that of `ground.laws`. `ParameterError` where it
-    reaches what cannot be read.
+    Args:
+        contact_law: law of contact as in `hoof.law_of`; None is that of `ground.laws`.
+        features: features of the engine; each combination has kernels of its own.
+
+    Raises:
+        ParameterError: the law of contact reaches something that cannot be read.
     """
     identity = fingerprint(contact_law)
     key = (contact_law, features, identity)
-    return _KEPT.get(key, lambda: _made(contact_law, features, identity), contact_law is not None)
+    return _KEPT.get(key, lambda: _new_kernels(contact_law, features, identity), contact_law is not None)
 
 
-def _made(contact_law: Callable[..., Any] | None, features: Features, identity: str) -> Kernels:
+def _new_kernels(contact_law: Callable[..., Any] | None, features: Features, identity: str) -> Kernels:
     refresh(contact_law)
     law = law_of(contact_law)
     form = engine_layout(features)
     if features != PLAIN:
         identity += f" {tuple(features)}"
 
-    def made(name: str, legs: int, lanes: int, lanes_are_legs: bool, reacts: bool) -> Any:
+    def new_kernel(name: str, legs: int, lanes: int, lanes_are_legs: bool, reacts: bool) -> Any:
         def advance(  # type: ignore[no-untyped-def]
             data, model, tables, ground, constants, reactions, h, steps, keeps_account, begin, end
         ):
             count = legs if legs else model[0].legs
             run(
-                data, model, tables, ground, constants, reactions, h, steps, keeps_account, begin, end,
-                count, lanes, lanes_are_legs, reacts, law, form,
-            )  # fmt: skip
+                data,
+                model,
+                tables,
+                ground,
+                constants,
+                reactions,
+                h,
+                steps,
+                keeps_account,
+                begin,
+                end,
+                count,
+                lanes,
+                lanes_are_legs,
+                reacts,
+                law,
+                form,
+            )
 
         advance.__name__ = name
         return kernel(advance, f"{name} {identity}", threads=not lanes_are_legs and lanes > 1)
 
-    names = {f"{does}_{which}": which for does in ("advance", "react") for which in KERNELS}
-    return Kernels(**{
-        name: made(name, *KERNELS[which], name.startswith("react")) for name, which in names.items()
-    })  # fmt: skip
+    kernels = {}
+    for does in ("advance", "react"):
+        for which, (legs, lanes, lanes_are_legs) in KERNELS.items():
+            name = f"{does}_{which}"
+            kernels[name] = new_kernel(name, legs, lanes, lanes_are_legs, reacts=does == "react")
+    return Kernels(**kernels)

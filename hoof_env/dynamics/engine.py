@@ -1,9 +1,10 @@
 """N legs on one trunk in minimal coordinates, for any number of environments at once: the fast, exact engine.
 
-What can move is integrated: the trunk, as momentum and centre of mass of all bodies together, and the crank
-of every leg whose drive is a motor. Everything inside a leg follows from its crank angle in closed form, so
-loops are closed to round-off at every step of any run. `mechanics` has the equations, `advance` runs them;
-this module checks arguments and keeps the state. A number has the same bits alone and in a batch of any size.
+Only what can move freely is integrated: the trunk, as momentum and centre of mass of all bodies together,
+and the crank of every leg that has a motor. Everything inside a leg follows from its crank angle in closed
+form, so the loops of the linkage are closed to round-off at every step. `mechanics` has the equations,
+`advance` runs them; this module checks arguments and keeps the state. Results have the same bits alone and in
+a batch of any size.
 """
 
 from __future__ import annotations
@@ -62,52 +63,56 @@ HEIGHT = layout.TrunkSettings.fields["height"].start
 """Row of a trunk's height at rest among its settings."""
 
 MAX_SCALAR_ENVS = 6
-"""Up to so many environments of one leg or four are run one by one: eight lanes would be mostly empty."""
+"""Largest number of environments of one leg or of four that are run one by one: eight lanes would be mostly
+empty."""
 
 MOST_LEGS = 32
-"""Legs of an engine; its kernels work on the stack, where eight lanes take 15 kB a leg."""
+"""Largest number of legs: kernels work on the stack, where a leg takes 15 kB with eight lanes."""
 
 MOST_STEPS = 10**12
-"""Substeps of a call, which are counted in 64 bits."""
+"""Largest number of substeps of a call: they are counted in 64 bits."""
 
 PART = 2_000_000
+"""Number of substeps, those of all legs added up, that a long call runs in machine code at a time: at most
+about a second. Ctrl-C takes effect between two parts. Sums have other last digits than in one part."""
+
 LEAST_PART = 1000
-"""Substeps of all legs in machine code at a time, a second at most, and of each environment at least: between
-two such parts of a long call Ctrl-C is heard. What is added up has other last digits than in one part."""
+"""Least number of substeps of each environment in such a part."""
 
 
 class TrunkEngine(Mechanics):
     """Legs on a trunk over the ground; see the module docstring.
 
     Args:
-        limbs: the legs in their places, at most `MOST_LEGS`; in their order every array has them.
-        trunk: what they hang from. Its height is that of its centre of mass.
+        limbs: the legs in their places, at most `MOST_LEGS`; arrays have them in this order.
+        trunk: trunk that holds the legs. Its height is that of its centre of mass.
         ground: laws of contact. Its exponent must be a multiple of 1/8, so that square roots are enough.
         terrain: heights, and where the ground is softer or more slippery; level if None.
-        sim_dt: the step [s] after which results can be read.
+        sim_dt: length of a step [s], after which results can be read.
         integrator: one of `stepping.SCHEMES`.
-        substeps: parts of `sim_dt` that are integrated, contacts remembered after each; None chooses as many
-            as ground, motors and support ask, up to `step_length.MOST_SUBSTEPS`.
-        step_error: of the state after a contact [-], for which that choice is made.
-        num_envs: environments side by side, which share all of the above.
-        num_threads: threads that share the environments; they change no bit.
-        harmonics: of the swing law, 1 to `gait.MOST_HARMONICS`: gaits and commands have 2 + 2 harmonics
+        substeps: number of substeps of `sim_dt`; contacts are remembered after each. None chooses as many as
+            ground, motors and support need, up to `step_length.MOST_SUBSTEPS`.
+        step_error: error of the state after a contact [-] for which that choice is made.
+        num_envs: number of environments side by side, which share all of the above.
+        num_threads: number of threads that share the environments; it changes no bit.
+        harmonics: order of the swing law, 1 to `gait.MOST_HARMONICS`: gaits and commands have 2 + 2 harmonics
             numbers.
         filters: bounds of the command filters; `gait.QUICK` where the crank's speed changes within a stride.
-        reactions: compute the joint reactions of every step; `reactions()` has those of the last.
-        strides: count stances, peak forces and work; `strides` has them.
+        reactions: true to compute the joint reactions of every step; `reactions()` has those of the last.
+        strides: true to count stances, peak forces and work; `strides` has them.
         limits: where the motion should end, see `parts.Result`. An engine with limits, if only `Limits()`,
             takes legs of other sizes in `vary`, and its `strides` have horizontal impulses.
-        contact_law: instead of the ground's normal law, see `hoof.law_of`.
+        contact_law: law of the normal force instead of the ground's, see `hoof.law_of`.
 
     Attributes:
-        runs_scalar: environments are run one by one, not side by side, and by one thread.
+        runs_scalar: true if environments are run one by one in one thread, not side by side.
         blocks: columns of the memory that each thread works on.
-        step_limits: longest step [s] for each cause, see `step_length`. Friction is not heeded, for nothing
-            blows up: on the ground of `HorseLeg-v0` it asks a horse of 349 kg for 0.14 ms. There forces at
-            1 ms agree with those at 16 us to 1 % under hoofs that slide; under hoofs that stand friction is
-            off by 2.7 times its size and the normal force by half, at 0.5 ms by 0.4 % and 0.1 %. For clean
-            forces at rest use `substeps` of sim_dt / step_limits["friction"], or more `friction_fast`.
+        step_limits: longest step [s] for each cause, see `step_length`. The limit of friction is reported and
+            not used, because nothing diverges beyond it: on the ground of `HorseLeg-v0` it is 0.14 ms for a
+            horse of 349 kg. There forces at 1 ms agree with those at 16 us to 1 % under hooves that slide;
+            under hooves that stand friction is off by 2.7 times its size and the normal force by half, at 0.5
+            ms by 0.4 % and 0.1 %. For clean forces at rest use `substeps` of sim_dt /
+            step_limits["friction"], or a larger `friction_fast`.
 
     Raises:
         ParameterError: a value is out of range or of the wrong type; or, at the first reset, the contact law
@@ -115,7 +120,7 @@ class TrunkEngine(Mechanics):
         GeometryError: a leg has no place for its links at any crank angle.
 
     Warns:
-        StepWarning: `substeps` is given and too few, or more would be needed than are chosen.
+        StepWarning: `substeps` is given and too small, or more would be needed than are chosen.
     """
 
     def __init__(
@@ -165,9 +170,14 @@ class TrunkEngine(Mechanics):
         self.profiles = [leg_profile(limb.geometry) for limb in self.limbs]
         self.step_error = check_number("step_error", step_error, low=0, high=1, exclusive_low=True)
         length = StepLength(
-            self.limbs, self.profiles, self.trunk, self.ground, self.terrain, self.integrator,
+            self.limbs,
+            self.profiles,
+            self.trunk,
+            self.ground,
+            self.terrain,
+            self.integrator,
             step_error=self.step_error,
-        )  # fmt: skip
+        )
         self.step_limits = length.limits
         asked = None if substeps is None else count("substeps", substeps, most=MOST_STEPS)
         self.substeps = length.choose(self.sim_dt, asked)
@@ -186,8 +196,9 @@ class TrunkEngine(Mechanics):
         self._run = getattr(advance_kernels(self.contact_law, self.features), f"{does}_{which}")
 
     def __getstate__(self) -> dict[str, Any]:
-        """A copy has memory of its own, also a shallow one."""
+        """Return the attributes of a copy, which has memory of its own even if it is shallow."""
         m = self._memory
+        # the kernel is left out: the copy looks it up, perhaps in another process
         parts = {name: part for name, part in vars(self).items() if name != "_run"}
         return {
             **parts,
@@ -197,14 +208,15 @@ class TrunkEngine(Mechanics):
     def __setstate__(self, state: dict[str, Any]) -> None:
         data, *others = state["_memory"]
         vars(self).update(state, _memory=memory.memory_of(memory.copy_of(data), *others))
+        # a pickle may have come from a machine with more processors
         self.num_threads = limit_threads(self.num_threads)
         self._choose_kernel()
 
     def __deepcopy__(self, memo: Any) -> TrunkEngine:
-        """What never changes, such as the legs' tables, is shared."""
+        """Return a copy that shares what never changes, such as the legs' tables."""
         return copy.copy(self)
 
-    # What it is like
+    # Properties
 
     @property
     def total_mass(self) -> float:
@@ -216,35 +228,36 @@ class TrunkEngine(Mechanics):
         """Weight of trunk and legs [N]."""
         return self.total_mass * GRAVITY
 
-    # What the kernels take, for those that call them from kernels of their own
+    # Arguments of the kernels, for callers with kernels of their own
 
     @property
     def arrays(self) -> tuple[NDArray[Any], ...]:
-        """The first arguments of the kernels of `advance`; they stay where they are, but not in a copy."""
+        """First arguments of the kernels of `advance`; their memory stays in place, but a copy has its
+        own."""
         m = self._memory
         return (m.data, *self._model, m.constants, m.reactions)
 
     @property
     def columns(self) -> int:
-        """Of the memory: environments, idle ones included."""
+        """Number of columns of the memory: environments, idle ones included."""
         return int(self._memory.data.shape[1])
 
     @property
     def substep(self) -> float:
-        """What is integrated at once [s]."""
+        """Length of a substep [s]."""
         return self.sim_dt / self.substeps
 
     @property
     def results(self) -> NDArray[np.int64]:
-        """How the last call ended in each environment, values of `parts.Result`, shape (num_envs,)."""
+        """Results of the last call, values of `parts.Result`, shape (num_envs,)."""
         return self._memory.result.astype(np.int64)
 
     def column(self, env: int) -> Floats:
-        """All memory of one environment: state, settings, command, report; shape (rows,)."""
+        """Return a copy of all memory of one environment: state, settings, command, report; shape (rows,)."""
         return self._memory.data[:, self._env(env)].copy()
 
     def set_column(self, env: int, column: Floats) -> None:
-        """Put back what `column` gave, of an engine like this one; where its legs' tables are stays its own.
+        """Restore what `column` returned, of an engine like this one.
 
         Raises:
             ParameterError: another shape, or numbers that are not finite or beyond `layout.MAX_STATE` in an
@@ -253,32 +266,42 @@ class TrunkEngine(Mechanics):
         m = self._memory
         env = self._env(env)
         try:
-            given = np.array(column, dtype=np.float64)
+            values = np.array(column, dtype=np.float64)
         except (TypeError, ValueError):
             raise ParameterError(f"column: expected numbers, got {column!r}") from None
-        if given.shape != m.data.shape[:1]:
-            raise ParameterError(f"column: expected shape {m.data.shape[:1]}, got {given.shape}")
-        parts = memory.memory_of(given[:, None], 1, m.constants, m.reactions[..., :1], m.features)
+        if values.shape != m.data.shape[:1]:
+            raise ParameterError(f"column: expected shape {m.data.shape[:1]}, got {values.shape}")
+        parts = memory.memory_of(values[:, None], 1, m.constants, m.reactions[..., :1], m.features)
         memory.check_column(parts, m.limb_settings[..., env : env + 1])
-        m.data[:, env] = given
+        m.data[:, env] = values
 
     def _env(self, env: Any) -> int:
         return count("env", env, low=0, most=self.num_envs - 1)
 
     def command_in(self, column: Floats) -> Floats:
-        """The command in such a column, shape (legs, 2 + 2 harmonics)."""
+        """Return the command in such a column, shape (legs, 2 + 2 harmonics)."""
         form = engine_layout(self.features)
         legs = column[form.trunk_rows :].reshape(len(self.limbs), form.leg_rows)
         return legs[:, form.leg_memory.rows("command")].copy()
 
     def alone(self) -> TrunkEngine:
-        """An engine like this one, for one environment."""
+        """Return a new engine like this one for one environment."""
         return TrunkEngine(
-            self.limbs, self.trunk, self.ground, self.terrain, sim_dt=self.sim_dt, integrator=self.integrator,
-            substeps=self.substeps, step_error=self.step_error, harmonics=self.features.harmonics,
-            filters=self.filters, reactions=self.reacts, strides=self.counts_strides,
-            limits=self.motion_limits, contact_law=self.contact_law,
-        )  # fmt: skip
+            self.limbs,
+            self.trunk,
+            self.ground,
+            self.terrain,
+            sim_dt=self.sim_dt,
+            integrator=self.integrator,
+            substeps=self.substeps,
+            step_error=self.step_error,
+            harmonics=self.features.harmonics,
+            filters=self.filters,
+            reactions=self.reacts,
+            strides=self.counts_strides,
+            limits=self.motion_limits,
+            contact_law=self.contact_law,
+        )
 
     # State
 
@@ -296,18 +319,19 @@ class TrunkEngine(Mechanics):
         theta_rate: ArrayLike | None = None,
         envs: ArrayLike | None = None,
     ) -> None:
-        """Start with the filters at rest at a gait, the same for all legs or one each.
+        """Start environments with their filters at rest at a gait.
 
-        A hoof point that starts inside the ground has entered it at its present rate.
+        A hoof point that starts inside the ground is taken to have entered it at its present rate.
 
         Args:
-            gaits: gait parameters, one for all legs or one each; or as numbers, shape (legs, 2 + 2 harmonics,
-                n).
-            theta: crank angles [rad], of shape (), (legs,) or (legs, n) with n the environments that start.
-            x, y, pitch, vx, vy, pitch_rate: of the trunk's centre of mass [m, rad, s], shape () or (n,); a
-                `y` of None is the trunk's height.
-            theta_rate: of motor-driven cranks [rad/s], as theta; None is the commanded speed.
-            envs: which environments start, as indices or as a mask of shape (num_envs,); None is all.
+            gaits: gait parameters, one set for all legs or one for each; or an array of shape (legs, 2 + 2
+                harmonics, n).
+            theta: crank angles [rad], of shape (), (legs,) or (legs, n), where n is the number of
+                environments that start.
+            x, y, pitch, vx, vy, pitch_rate: place, pitch, velocity and pitch rate of the trunk's centre of
+                mass [m, rad, s], shape () or (n,); a `y` of None is the trunk's height.
+            theta_rate: speeds of motor-driven cranks [rad/s], as theta; None is the commanded speed.
+            envs: environments that start, as indices or as a mask of shape (num_envs,); None is all.
 
         Raises:
             ParameterError: a value is not finite, of the wrong shape or forbidden by the trunk's kind, an
@@ -340,41 +364,41 @@ class TrunkEngine(Mechanics):
         """Give one environment its own masses, springs, ground, motors or legs; it must be reset afterwards.
 
         Args:
-            env: which.
-            trunk, ground, drive: instead of the engine's, whose kinds, exponent and laws they share; None is
-                the engine's own. `total_mass`, `weight`, `tally` and `step_limits` stay those of the
-                engine.
-            limbs: legs in other places, with other springs of the hoofs or, in an engine with `limits`, of
-                other sizes, similar to its own (`Geometry.scaled`), whose trunk needs another height, too;
-                None is the engine's own. Joint reactions are not computed of legs of another size. Steps
-                are those that the engine's own legs and springs ask for.
+            env: index of the environment.
+            trunk, ground, drive: those of this environment, with the kinds, exponent and laws of the
+                engine's; None is the engine's own. `total_mass`, `weight`, `tally` and `step_limits` stay
+                those of the engine.
+            limbs: legs of this environment, in other places, with other springs of the hooves or, in an
+                engine with `limits`, of other sizes, similar to the engine's (`Geometry.scaled`); their trunk
+                needs another height, too. None is the engine's own. Joint reactions are not computed for legs
+                of another size. The step stays the one that the engine's own legs and springs need.
 
         Raises:
-            ParameterError: what environments share differs, or there is no such environment.
+            ParameterError: a setting that environments share differs, or there is no such environment.
         """
         env = self._env(env)
         trunk = self.trunk if trunk is None else one_of("trunk", trunk, Trunk)
         ground = self.ground if ground is None else one_of("ground", ground, Ground)
-        own = self.limbs if limbs is None else all_of("limbs", limbs, Limb)
-        own = [limb if drive is None else replace(limb, drive=drive) for limb in own]
-        memory.check_shared(self, trunk, ground, own)
+        varied = self.limbs if limbs is None else all_of("limbs", limbs, Limb)
+        varied = [limb if drive is None else replace(limb, drive=drive) for limb in varied]
+        memory.check_shared(self, trunk, ground, varied)
         if self.reacts and any(
-            limb.geometry != mine.geometry for limb, mine in zip(own, self.limbs, strict=True)
+            limb.geometry != mine.geometry for limb, mine in zip(varied, self.limbs, strict=True)
         ):
             raise ParameterError("limbs: expected the engine's own geometries where it computes reactions")
         m = self._memory
-        m.trunk_settings[:, env], m.limb_settings[:, :, env] = memory.settings_of(self, trunk, ground, own)
+        m.trunk_settings[:, env], m.limb_settings[:, :, env] = memory.settings_of(self, trunk, ground, varied)
 
     def get_state(self) -> dict[str, Any]:
-        """Everything that changes, as arrays of their own: continuing from it is bit-identical."""
+        """Return copies of all arrays that change; a run that continues from them has the same bits."""
         return self._copy(memory.STATE) | {"layout": dict(self._layout)}
 
     def set_state(self, state: Mapping[str, Any]) -> None:
-        """Put back what `get_state` gave, and evaluate forces and accelerations there.
+        """Restore what `get_state` returned, and evaluate forces and accelerations there.
 
         Raises:
-            ParameterError: the state belongs to an engine that would go on differently, lacks a part, or has
-                numbers that are not finite or beyond `layout.MAX_STATE`, in environments that were reset
+            ParameterError: the state belongs to an engine that would continue differently, lacks a part, or
+                has numbers that are not finite or beyond `layout.MAX_STATE` in environments that were reset
                 once.
         """
         arrays, reset = memory.read_state(self._layout, self._memory, state)
@@ -382,13 +406,15 @@ class TrunkEngine(Mechanics):
         self._put(arrays)
         self._memory.result[:] = result
         self._go(0)
+        # again, because the evaluation also stores contacts and counts stances
         self._put(arrays)
         self._memory.result[:] = result
         self._memory.stride_sums[:] = 0.0
 
     @cached_property
     def _layout(self) -> dict[str, Any]:
-        """What a state must share; its digests take as long as ten steps."""
+        """Settings that a state must share with the engine. Cached, because its digests take as long as ten
+        steps."""
         return memory.identity_of(
             self, self.filters, num_envs=self.num_envs, sim_dt=self.sim_dt, substeps=self.substeps
         )
@@ -402,17 +428,18 @@ class TrunkEngine(Mechanics):
 
         Args:
             command: gait parameters as `command` takes them, for all environments; None keeps the last.
-            steps: how many; 0 evaluates forces and accelerations where the state is.
-            account: whether to keep `account`.
+            steps: number of steps; 0 evaluates forces and accelerations at the present state.
+            account: true to update `account`.
 
         Returns:
-            How each environment ended, shape (num_envs,), values of `parts.Result`. One that could not be
-            simulated is left in its last good state, from which this call began; the report is of there.
+            Results of the environments, values of `parts.Result`, shape (num_envs,). An environment that
+                could not be
+            simulated has its state and its report from before this call.
 
         Raises:
             ParameterError: the command has a wrong shape or is not finite.
             NotStartedError: no environment was ever reset.
-            KeyboardInterrupt: of a long call, which then ends after a part of the steps.
+            KeyboardInterrupt: Ctrl-C during a long call, which then ends after a part of the steps.
         """
         steps = count("steps", steps, 0, MOST_STEPS // self.substeps)
         if command is not None:
@@ -436,14 +463,16 @@ class TrunkEngine(Mechanics):
         """Advance and record `state` and `report` at the start and after each `every` steps, for plots.
 
         Args:
-            command, steps: as of `advance`.
-            every: steps from one instant of the record to the next.
-            continue_past_limits: whether to go on beyond a limit, as `advance` does.
+            command, steps: as in `advance`.
+            every: number of steps from one instant of the record to the next.
+            continue_past_limits: true to continue beyond a limit, as `advance` does.
 
         Returns:
-            Arrays by name, time on the first axis, and "result", how each environment ended, shape
-            (num_envs,). Once one does not end OK all stop, and the record is that up to there: with the
-            instant where a limit was passed, without one that could not be simulated.
+            Arrays by name, time on the first axis, and "result", values of `parts.Result`, shape (num_envs,).
+                Once an
+            environment does not end OK all stop, and the record ends there: with the instant where a limit
+                was passed,
+            without one that could not be simulated.
 
         Raises:
             ParameterError, NotStartedError: as `advance`.
@@ -472,27 +501,27 @@ class TrunkEngine(Mechanics):
 
         Args:
             command: gait parameters, P = 2 + 2 harmonics of them, of shape (P,), (legs, P) or (legs, P, n),
-                n the environments that are commanded.
-            envs: which, as indices or as a mask of shape (num_envs,); None is all.
+                where n is the number of environments that are commanded.
+            envs: environments that are commanded, as indices or as a mask of shape (num_envs,); None is all.
 
         Raises:
             ParameterError: the command has a wrong shape or is not finite, or there are no such environments.
         """
-        given = finite("command", command)
+        gaits = finite("command", command)
         where = memory.which(envs, self.num_envs)
         legs = len(self.limbs)
         size = self.features.gait_size
-        if given.shape == (size,) or given.shape == (legs, size):
-            given = given[..., None]
-        elif given.shape != (legs, size, where.size):
+        if gaits.shape == (size,) or gaits.shape == (legs, size):
+            gaits = gaits[..., None]
+        elif gaits.shape != (legs, size, where.size):
             raise ParameterError(
                 f"command: expected shape ({size},), ({legs}, {size}) or {(legs, size, where.size)}, "
-                f"got {given.shape}"
+                f"got {gaits.shape}"
             )
-        self._memory.command[:, :, where] = given
+        self._memory.command[:, :, where] = gaits
 
     def _go_on(self, steps: int, account: bool) -> None:
-        """As `_go`, with a long call in parts."""
+        """Advance as `_go`, a long call in parts, so that Ctrl-C takes effect."""
         left = steps * self.substeps
         part = max(PART // (self.columns * len(self.limbs)), LEAST_PART) // CHECK_EVERY * CHECK_EVERY
         if left <= part:
@@ -504,16 +533,19 @@ class TrunkEngine(Mechanics):
         sums = np.zeros_like(m.stride_sums)
         highest = layout.stride_sums(self.features).index("highest_grf")
         while left and not broken(first).all():
-            now = left % part or part  # the short one first: limits are looked at from the end
-            self._go_substeps(now, account)
-            left -= now
+            # the short part first: limits are checked at steps counted from the end
+            length = left % part or part
+            self._go_substeps(length, account)
+            left -= length
+            # a failure stays, and so does a limit unless a failure follows
             first = np.where(broken(first) | ((first != 0) & ~broken(m.result)), first, m.result)
             peak = np.maximum(sums[:, highest], m.stride_sums[:, highest])
             sums += m.stride_sums
             sums[:, highest] = peak
         lost = broken(first)
         m.stride_sums[:] = sums
-        for name, values in kept.items():  # as before the call
+        # an environment that fails has its state from before the call, not from before the part
+        for name, values in kept.items():
             getattr(m, name)[..., lost] = values[..., lost]
         m.result[:] = first
 
@@ -531,8 +563,7 @@ class TrunkEngine(Mechanics):
             raise ParameterError(f"contact_law: {what_cannot_be_compiled(error)}") from error
 
     def observe(self) -> None:
-        """Evaluate forces and accelerations where the state is, and change nothing but `report` and
-        `reactions`."""
+        """Evaluate forces and accelerations at the present state; change only `report` and `reactions`."""
         kept = self._copy((*memory.STATE, "stride_sums", "result"))
         self._go(0)
         self._put(kept)
@@ -544,17 +575,18 @@ class TrunkEngine(Mechanics):
         for name, values in arrays.items():
             getattr(self._memory, name)[:] = values
 
-    # What it reports
+    # Reports
 
     @property
     def state(self) -> dict[str, Floats]:
-        """The state by name: rows of `layout.TRUNK_STATE`, shape (num_envs,), and of `leg_state`, shape
-        (legs, num_envs)."""
+        """State by name: rows of `layout.TRUNK_STATE`, shape (num_envs,), and of `leg_state`, shape (legs,
+        num_envs)."""
         return self._named(layout.TRUNK_STATE + layout.leg_state(self.features))
 
     @property
     def report(self) -> dict[str, Floats]:
-        """What acts at the present instant: `layout.TRUNK_REPORT` and `LEG_REPORT` by name."""
+        """Forces, torques and motion at the present instant by name: `layout.TRUNK_REPORT`, shape
+        (num_envs,), and `LEG_REPORT`, shape (legs, num_envs)."""
         return self._named(layout.TRUNK_REPORT + layout.LEG_REPORT)
 
     def _named(self, names: Sequence[str]) -> dict[str, Floats]:
@@ -568,8 +600,8 @@ class TrunkEngine(Mechanics):
 
     @property
     def strides(self) -> dict[str, Floats]:
-        """The open stance and the sums of the last call by name, `layout.STRIDES` and `stride_sums`, shape
-        (legs, num_envs); see `observables`. Zeros unless the engine was made with `strides=True`."""
+        """Open stance and sums of the last call by name, `layout.STRIDES` and `stride_sums`, shape (legs,
+        num_envs); see `observables`. Zeros unless the engine was made with `strides=True`."""
         m = self._memory
         whole = np.concatenate([m.strides, m.stride_sums], axis=1)
         return {
@@ -577,8 +609,8 @@ class TrunkEngine(Mechanics):
         }
 
     def reactions(self) -> Reactions:
-        """Joint reactions at the present instant: of joints, shape (legs, 20, 2, num_envs), and the moments,
-        shape (legs, num_envs).
+        """Return the joint reactions at the present instant: of joints, shape (legs, 20, 2, num_envs), and
+        the moments, shape (legs, num_envs).
 
         Raises:
             ParameterError: the engine was not made with `reactions=True`.
@@ -592,11 +624,12 @@ class TrunkEngine(Mechanics):
         return Reactions(joints, **{name: part[:, 0] for name, part in parts.items()})
 
     def tally(self) -> Tally:
-        """Momentum, spin and energy of all bodies at the present instant, added up anew from their motion."""
+        """Return momentum, spin and energy at the present instant, added up anew from the motion of all
+        bodies."""
         return tally_of(self)
 
     def messages(self) -> list[str]:
-        """How each environment ended, for people."""
+        """Return a sentence for each environment: how it ended."""
         never = np.isnan(self._memory.trunk).all(0)
         return [
             "this environment was never reset" if new else Result(int(code)).message

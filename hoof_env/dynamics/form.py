@@ -1,4 +1,4 @@
-"""What the compiler must know of an engine: which layouts its memory has, and how long its loops are."""
+"""Layouts of an engine's memory and lengths of its loops: constants when its kernels are compiled."""
 
 from __future__ import annotations
 
@@ -43,21 +43,24 @@ class _EngineLayout(NamedTuple):
 
 
 class EngineLayout(Constants, _EngineLayout):
-    """The layouts of engines with the same `Features`, and what else the compiler must know of these.
+    """Layouts of engines with the same `Features`, and the numbers that the compiler must know of them.
 
     Attributes:
-        trunk, leg, account: rows on the stack.
-        trunk_memory, leg_memory: rows in the engine's array, the trunk's first.
-        of the others: how many rows each has.
-        gait: how many gait parameters a leg has.
-        harmonics, springs, animal: as in `Features`; rows of a hoof point's spring, 0 or 2.
+        trunk, leg, account: layouts of rows on the stack.
+        trunk_memory, leg_memory: layouts of rows in the engine's array, the trunk's first.
+        trunk_size, leg_size, account_size, trunk_rows, leg_rows: number of rows of these five.
+        trunk_state, leg_state, strides, sums: number of rows of these parts.
+        gait: number of gait parameters of a leg.
+        harmonics, has_limits: as in `Features`.
+        springs: number of rows of a hoof point's spring, 0 or 2.
     """
 
 
 @cache
 def engine_layout(features: Features = PLAIN) -> EngineLayout:
-    """The `EngineLayout` of engines with these features."""
+    """Return the `EngineLayout` of engines with these features."""
     rows = [features.of(layout) for layout in (TrunkRows, LegRows, Account, TrunkMemory, LegMemory)]
     inner = [features.of(layout).size for layout in (TrunkState, LegState, Strides, StrideSums)]
+    # in the order of the fields of `_EngineLayout`
     sizes = [*(layout.size for layout in rows), *inner, features.gait_size]
     return EngineLayout._make([*rows, *sizes, features.harmonics, 2 * features.springs, features.has_limits])

@@ -1,4 +1,4 @@
-"""What the ground does to the hoofs (Eqs. 10 to 15); see `mechanics`."""
+"""Forces of the ground on the hooves (Eqs. 10 to 15); see `mechanics`."""
 
 from __future__ import annotations
 
@@ -15,7 +15,8 @@ from hoof_env.simd.user_functions import function_name, number_of
 
 @inline_llvm
 def level_ground(leg):  # type: ignore[no-untyped-def]
-    """What never changes where the ground is the same everywhere."""
+    """Set what is constant on ground that is level and the same everywhere: normal and scales of the
+    terrain."""
     upward = vector(full_like(leg, 0.0), 1.0)
     leg.toe.ground_normal = upward
     leg.toe.stiffness_scale = 1.0
@@ -27,7 +28,7 @@ def level_ground(leg):  # type: ignore[no-untyped-def]
 
 @inline_llvm
 def meet_ground(trunk, leg, model):  # type: ignore[no-untyped-def]
-    """Forces of the ground on toe and heel, and their generalised forces on crank and frame."""
+    """Compute the forces of the ground on toe and heel, and their generalised forces on crank and frame."""
     hip = leg.hip
     pitch_rate = trunk.rates.pitch_rate
     w = leg.theta_rate
@@ -47,15 +48,15 @@ def meet_ground(trunk, leg, model):  # type: ignore[no-untyped-def]
 
 @inline_llvm
 def meet_point(trunk, leg, point, memory, arm, arm_by_theta, hip, hip_velocity, model):  # type: ignore[no-untyped-def]
-    """The motion of a hoof point, the force of the ground on it and that force's part along theta and beta;
-    `arm` goes to it from O in the leg's frame, `hip` is O's place [m]."""
+    """Compute the motion of a hoof point; return the force of the ground on it and that force's parts along
+    theta and beta. `arm` is the vector from O to the point in the leg's frame, `hip` is O's place [m]."""
     arm = leg.turn * arm
     by_theta = leg.turn * arm_by_theta
     place = hip + arm
     velocity = hip_velocity + (leg.theta_rate * by_theta + leg.beta_rate * perpendicular(arm))
-    penetration = -place.imag  # Eqs. 10
-    rate = -velocity.imag  # 12
-    sliding_speed = velocity.real  # 13
+    penetration = -place.imag  # Eq. 10
+    rate = -velocity.imag  # Eq. 12
+    sliding_speed = velocity.real  # Eq. 13
     if model.is_terrain:
         height, normal_x, normal_y, stiffness_scale, friction_scale = surface(
             place.real, model.ground_cells, model.ground_origin, model.ground_per_metre
@@ -83,7 +84,7 @@ def meet_point(trunk, leg, point, memory, arm, arm_by_theta, hip, hip_velocity, 
 
 @inline_llvm
 def force_of(point):  # type: ignore[no-untyped-def]
-    """Of the ground on a hoof point, in the world [N]."""
+    """Return the force of the ground on a hoof point, in the world [N]."""
     return point.normal_force * point.ground_normal - point.friction_force * perpendicular(
         point.ground_normal
     )
@@ -91,13 +92,14 @@ def force_of(point):  # type: ignore[no-untyped-def]
 
 @inline_llvm
 def press_rigidly(trunk, point, memory, penetration, rate, sliding_speed, model):  # type: ignore[no-untyped-def]
-    """Forces on a point that is the sole itself."""
-    nothing = 0.0 * absolute(penetration)  # what is not a number stays so
+    """Compute the forces on a point of a rigid hoof, which is the sole itself."""
+    nothing = 0.0 * absolute(penetration)  # 0, but NaN where the penetration is NaN
     force = nothing
     spring = nothing
     friction = nothing
     inverse_speed = memory.inverse_approach_speed
     inside = penetration > 0.0
+    # branches on all lanes together, to save time in the air; `where` chooses in each lane
     if any_lane(inside):
         if any_lane(inside & (inverse_speed == 0.0)):
             entering = inverse_entry_speed(trunk, memory, penetration, rate, model)
@@ -121,11 +123,12 @@ def press_rigidly(trunk, point, memory, penetration, rate, sliding_speed, model)
 
 @inline_llvm
 def press_through_spring(trunk, leg, point, memory, model):  # type: ignore[no-untyped-def]
-    """Forces on a point whose sole has no mass: what spring and damper carry is what the ground gives.
+    """Compute the forces on a point of a compliant hoof. Its sole has no mass: spring and damper carry the
+    force of the ground.
 
     The leg's point is `depth` in the ground, the sole s less. With b = chi S / v0 + c of the ground, S + b
-    (depth' - s') = k s + d s' gives s'. Where that asks the ground to pull, the spring goes back by itself.
-    Along the ground u is how far the leg is ahead of the sole: k u + d u' is friction, and u' is the leg's
+    (depth' - s') = k s + d s' gives s'. Where that asks the ground to pull, the spring returns freely. Along
+    the ground u is the displacement of the leg ahead of the sole: k u + d u' is friction, and u' is the leg's
     speed while the sole stands.
     """
     laws = trunk.settings
@@ -150,10 +153,12 @@ def press_through_spring(trunk, leg, point, memory, model):  # type: ignore[no-u
         pushed = ground_spring(laws, point.stiffness_scale, maximum(penetration, 0.0), model.eighths)
         spring = where(inside, pushed, nothing)
         resistance = where(inside, laws.chi * spring * inverse_speed + laws.dashpot, nothing)
+    # the balance of the docstring, with Eq. 14 for the ground, solved for s'
     rate = (spring + resistance * depth_rate - elastic) / (damping[0] + resistance)
     pushes = inside & (rate > free_return_rate)
     rate = maximum(rate, free_return_rate)
     force = where(pushes, maximum(elastic + damping[0] * rate, 0.0), nothing)
+    # Coulomb's law instead of Eq. 15: the sole slides only where it would need more than the grip to stand
     sticking = stiffness[1] * along + damping[1] * speed
     grip = laws.friction * point.friction_scale * force
     held = clip(sticking, grip)
@@ -171,8 +176,8 @@ def press_through_spring(trunk, leg, point, memory, model):  # type: ignore[no-u
 
 @inline_llvm
 def inverse_entry_speed(trunk, memory, penetration, rate, model):  # type: ignore[no-untyped-def]
-    """1 / v0 with v0 the approach speed at the crossing of the surface, interpolated between the last whole
-    step and now."""
+    """Return 1 / v0 [s/m] with v0 the approach speed at the crossing of the surface, interpolated between the
+    last whole step and now."""
     before = memory.penetration
     rate_before = memory.penetration_rate
     floor = trunk.settings.approach_floor
@@ -182,13 +187,15 @@ def inverse_entry_speed(trunk, memory, penetration, rate, model):  # type: ignor
         crossed = before < 0.0
         span = where(crossed, penetration - before, span)
         entry = where(crossed, rate_before * span - before * (rate - rate_before), rate)
+    # `entry` is v0 times `span`, so that one division is enough
     return span / maximum(entry, floor * span)
 
 
 @inline_llvm
 def ground_spring(ground, stiffness_scale, penetration, eighths):  # type: ignore[no-untyped-def]
-    """K d^n of Eq. 14 [N]."""
-    if eighths == 12:  # the usual exponent, 3/2
+    """Return the elastic force K d^n of Eq. 14 [N]."""
+    # the usual exponent, 3/2, as a constant: `root_power` then has no branches
+    if eighths == 12:
         power = root_power(penetration, 12)
     else:
         power = root_power(penetration, eighths)
@@ -197,13 +204,13 @@ def ground_spring(ground, stiffness_scale, penetration, eighths):  # type: ignor
 
 @inline_llvm
 def contact_force(ground, stiffness_scale, penetration, rate, inverse_speed, eighths):  # type: ignore[no-untyped-def]
-    """Normal force on a point inside the ground (Eq. 14), and its spring's part [N]."""
+    """Return the normal force on a point inside the ground (Eq. 14), and its elastic part [N]."""
     spring = ground_spring(ground, stiffness_scale, penetration, eighths)
-    return normal_force(spring, ground.chi, ground.dashpot, rate, inverse_speed), spring
+    return normal_force(spring, ground.chi, ground.dashpot, rate, inverse_speed), spring  # Eq. 14
 
 
 class GroundHere(NamedTuple):
-    """The ground under a hoof point, for a law of contact."""
+    """Parameters of the ground under a hoof point, for a law of contact."""
 
     stiffness: Any  # K of Eq. 14, with the terrain's factor there [N/m^n]
     eighths: Any  # the exponent n in eighths, for `root_power`
@@ -212,12 +219,12 @@ class GroundHere(NamedTuple):
 
 
 def law_of(contact_law: Callable[..., Any] | None) -> Any:
-    """What the kernels take for the normal force: `contact_force`, or somebody's own law in the same place.
+    """Return the kernel of the normal force: `contact_force`, or the user's law in its place.
 
     Args:
         contact_law: function of penetration [m], its rate [m/s], the inverse of the approach speed [s/m] and
-            `GroundHere`; returns the normal force [N], of which what pulls is cut off. None of it counts as
-            stored in the ground.
+            `GroundHere`; returns the normal force [N]. Negative (adhesive) values are set to 0. No part of
+            this force counts as stored in the ground.
     """
     if contact_law is None:
         return contact_force
@@ -235,26 +242,27 @@ def law_of(contact_law: Callable[..., Any] | None) -> Any:
 
 @inline_llvm
 def remember_contacts(leg):  # type: ignore[no-untyped-def]
-    """At a whole step: keep penetration and rate, and the inverse approach speed of a point in the ground."""
+    """Store penetration, rate and inverse approach speed of toe and heel at a whole step; the speed is 0
+    outside the ground."""
     remember_point(leg.toe, leg.state.toe)
     remember_point(leg.heel, leg.state.heel)
 
 
 @inline_llvm
 def remember_point(point, memory):  # type: ignore[no-untyped-def]
-    """`remember_contacts` for one point."""
+    """Store them for one point, see `remember_contacts`."""
     memory.penetration = point.penetration
     memory.penetration_rate = point.penetration_rate
     kept = where(point.penetration > 0.0, point.inverse_approach_speed, 0.0)
     memory.inverse_approach_speed = kept
 
 
-# The springs' states, step by step as `stepping` has it; `count` rows a point, 0 of rigid hoofs
+# States of the hooves' springs, for the functions of `stepping`; `count` rows a point, 0 of rigid hooves
 
 
 @inline_llvm
 def begin_springs(leg, count):  # type: ignore[no-untyped-def]
-    """The first stage is at the state itself."""
+    """Set the springs of the first stage to the state itself."""
     for k in range(count):
         leg.toe.deflection[k] = leg.state.toe.deflection[k]
         leg.heel.deflection[k] = leg.state.heel.deflection[k]
@@ -262,7 +270,7 @@ def begin_springs(leg, count):  # type: ignore[no-untyped-def]
 
 @inline_llvm
 def clear_springs(leg, count):  # type: ignore[no-untyped-def]
-    """Before the first stage is weighed."""
+    """Set the means of the springs' rates to 0."""
     for k in range(count):
         leg.toe.mean_deflection_rate[k] = 0.0
         leg.heel.mean_deflection_rate[k] = 0.0
@@ -280,7 +288,7 @@ def weigh_springs(leg, count, weight):  # type: ignore[no-untyped-def]
 
 @inline_llvm
 def move_springs(leg, count, elapsed):  # type: ignore[no-untyped-def]
-    """Go `elapsed` [s] from the step's start with the rates of the present stage."""
+    """Move the springs `elapsed` [s] from the step's start with the rates of the present stage."""
     for k in range(count):
         leg.toe.deflection[k] = leg.state.toe.deflection[k] + elapsed * leg.toe.deflection_rate[k]
         leg.heel.deflection[k] = leg.state.heel.deflection[k] + elapsed * leg.heel.deflection_rate[k]
@@ -288,7 +296,7 @@ def move_springs(leg, count, elapsed):  # type: ignore[no-untyped-def]
 
 @inline_llvm
 def end_springs(leg, count, averages, h):  # type: ignore[no-untyped-def]
-    """The state a step of `h` [s] later."""
+    """Advance the springs' states by a step of `h` [s]."""
     for k in range(count):
         toe = leg.toe.deflection_rate[k]
         heel = leg.heel.deflection_rate[k]

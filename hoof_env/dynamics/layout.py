@@ -1,11 +1,10 @@
-"""Every row of memory by name: what the kernels keep of trunk and legs, on the stack and in the engine's
-array.
+"""Names of all rows of memory: those of trunk and legs on the kernels' stack and in the engine's array.
 
 SI units and radians. beta = pitch + side phi is the world angle of a leg's frame. 'All' means trunk and legs
-together; 'fixed' frame means one that does not swing while the crank turns.
+together; a 'fixed' frame does not swing while the crank turns.
 
-What only some engines have (`Features`) are blocks whose size is 0 in the others, which keep their memory,
-their speed and their bits.
+Blocks that only some engines have (`Features`) are of size 0 in the others. They do not change the memory,
+the speed and the bits of these.
 """
 
 from __future__ import annotations
@@ -17,9 +16,10 @@ from hoof_env.leg.profile import Functions, Slopes
 from hoof_env.simd.layout import Block, Layout, Row, Size, Vector
 
 MAX_STATE = 1e9
-"""Largest angles [rad] and places [m] of a state, which are as good as numbers are fine there: to 6e-10 at
-1e6, to 6e-7 at 1e9; also the largest rates of a start, whose squares are then numbers still."""
+"""Largest angle [rad] and place [m] of a state, where rounding is 6e-7 (6e-10 at 1e6); also the largest rate
+of a start, because its square must stay finite."""
 
+# sizes of the blocks that depend on `Features`, with those of `PLAIN` as defaults
 GAIT = Size("gait", 4)
 SPRING = Size("spring", 0)
 LIMITED = Size("limited", 0)
@@ -27,13 +27,14 @@ LIMITS = Size("limits", 0)
 
 
 class Features(NamedTuple):
-    """What an engine has beyond the paper's rigid leg. It is chosen when kernels are compiled: what is not
-    chosen is neither computed nor kept.
+    """Options of an engine beyond the paper's rigid leg. They are constants when its kernels are compiled: an
+    option that is off costs neither time nor memory.
 
     Attributes:
-        harmonics: of the swing law, 1 to `gait.MOST_HARMONICS`.
-        springs: in series with the ground at each hoof point, see `parts.HoofSpring`.
-        animal: legs of other sizes in some environments, limits of the motion, horizontal impulses.
+        harmonics: order of the swing law, 1 to `gait.MOST_HARMONICS`.
+        springs: true for springs in series with the ground at each hoof point, see `parts.HoofSpring`.
+        has_limits: true for limits of the motion, legs of other sizes in some environments, and horizontal
+            impulses.
     """
 
     harmonics: int = 1
@@ -42,11 +43,12 @@ class Features(NamedTuple):
 
     @property
     def gait_size(self) -> int:
-        """How many gait parameters a leg has."""
+        """Number of gait parameters of a leg."""
         return 2 + 2 * self.harmonics
 
     def of(self, layout: Any) -> Any:
-        """A layout of this module as engines of this kind have it."""
+        """Return a layout of this module in the sizes of engines with these features."""
+        # springs: normal and tangential; limits: lowest and highest pitch and height, and the clearance
         return layout.sized(
             gait=self.gait_size,
             spring=2 * self.springs,
@@ -56,16 +58,17 @@ class Features(NamedTuple):
 
 
 PLAIN = Features()
-"""The paper's leg."""
+"""Features of the paper's leg: none."""
 
 
 # The trunk
 
 
 class Moving(Layout):
-    """What is integrated of the trunk. Where it cannot move, `centre` is its place and a momentum is 0."""
+    """Integrated quantities of the trunk. Where it cannot move, `centre` is its place and the momentum is
+    0."""
 
-    centre: Vector  # of mass of all [m]
+    centre: Vector  # centre of mass of all [m]
     momentum: Vector  # of all [kg m/s]
     pitch: Row  # of the trunk [rad]
     spin: Row  # angular momentum of all about `centre` [kg m^2/s]
@@ -75,28 +78,28 @@ class Rates(Layout):
     """Time derivatives of `Moving`."""
 
     velocity: Vector  # of the centre of mass of all [m/s]
-    force: Vector  # outer, weight included [N]
+    force: Vector  # sum of the outer forces, weight included [N]
     pitch_rate: Row  # [rad/s]
     moment: Row  # of the outer forces about the centre [N m]
 
 
 class TrunkState(Layout):
-    """What changes from step to step."""
+    """State of the trunk: all that changes from step to step."""
 
     time: Row  # [s]
     moving: Moving
 
 
 class TrunkSettings(Layout):
-    """Settings of one environment."""
+    """Settings of one environment: trunk and ground."""
 
     total_mass: Row  # of all [kg]
     inverse_mass: Row  # [1/kg]
     pitch_inertia: Row  # of the trunk about its own centre of mass [kg m^2]
-    support: Row  # what the rest of the animal bears [N]
+    support: Row  # part of the weight that the rest of the animal bears [N]
     spring: Row  # [N/m]
     damper: Row  # [N s/m]
-    height: Row  # where the spring is at rest [m]
+    height: Row  # height at which the spring is at rest [m]
     drag: Row  # [N s/m]
     gravity: Row  # [m/s^2]
     stiffness: Row  # K of Eq. 14 [N/m^n]; this and what follows is the ground's, see `ground.contact.Ground`
@@ -107,16 +110,16 @@ class TrunkSettings(Layout):
     friction_slow: Row  # [m/s]
     friction_fast: Row  # [m/s]
     bottom: Row  # height below which the trunk has fallen through the ground [m]
-    limits: Annotated[Block, LIMITS]  # see `parts.Limits`: of pitch [rad] and height [m], clearance [m]
+    limits: Annotated[Block, LIMITS]  # `parts.Limits`: pitch [rad], height [m], two each; clearance [m]
 
 
 class TrunkRows(Layout):
-    """A trunk in the kernels."""
+    """Rows of a trunk in the kernels."""
 
     state: TrunkState
     stage: Moving  # at the present stage of a step
-    rates: Rates  # there
-    mean_rates: Rates  # weighted mean over the stages so far; means are of schemes that average alone
+    rates: Rates  # at that stage
+    mean_rates: Rates  # weighted mean over the stages so far; used only by schemes that average
     place: Vector  # of the trunk's own centre of mass [m]
     velocity: Vector  # [m/s]
     acceleration: Vector  # [m/s^2]
@@ -126,9 +129,9 @@ class TrunkRows(Layout):
     relative_momentum: Vector  # of the legs against a trunk that does not pitch [kg m/s]
     composite_inertia: Row  # of all about the trunk's centre of mass [kg m^2]
     relative_angular_momentum: Row  # of the legs against a trunk that does not pitch [kg m^2/s]
-    load: Vector  # of the legs on the trunk's equations [N]
+    load: Vector  # the legs' inertia forces on the right of (E8) [N]
     load_moment: Row  # [N m]
-    mass_xx: Row  # the matrix of the trunk's equations, with the cranks of the motors eliminated
+    mass_xx: Row  # matrix of (E8), with the cranks of the motors eliminated
     mass_xy: Row
     mass_yy: Row
     mass_xp: Row
@@ -136,26 +139,26 @@ class TrunkRows(Layout):
     mass_pp: Row
     at_dead_point: Row  # 1 once a crank was where its linkage does not close
     fallen: Row  # 1 once the trunk was below `bottom`
-    violated_limit: Annotated[Block, LIMITED]  # the one passed first, a number of `parts.Result`
+    violated_limit: Annotated[Block, LIMITED]  # the first limit that was passed, a number of `parts.Result`
     settings: TrunkSettings
 
 
 class Account(Layout):
-    """Where the energy went: integrals over time, with the stages and weights of the scheme."""
+    """Energy account: integrals over time, with the stages and weights of the scheme."""
 
     crank_work: Row  # by the drives [J]
     swing_work: Row
     ground_stored: Row  # in the ground's springs; it comes back [J]
-    ground_loss: Row  # never negative, as those below [J]
+    ground_loss: Row  # never negative, like the losses below [J]
     friction_loss: Row
     drag_loss: Row
     damper_loss: Row
-    impulse: Vector  # of the ground on all hoofs [N s]
-    hoof: Annotated[Block, SPRING]  # stored in the hoofs' springs, lost in their dampers [J]
+    impulse: Vector  # of the ground on all hooves [N s]
+    hoof: Annotated[Block, SPRING]  # stored in the hooves' springs, lost in their dampers [J]
 
 
 class TrunkReport(Layout):
-    """Motion of the trunk's centre of mass, and its pitch."""
+    """Motion of the trunk's centre of mass, and pitch."""
 
     place: Vector  # [m]
     velocity: Vector  # [m/s]
@@ -178,7 +181,7 @@ class TrunkMemory(Layout):
 
 
 class ContactMemory(Layout):
-    """What a hoof point remembers of the last whole step."""
+    """Memory of a hoof point: its contact at the last whole step."""
 
     penetration: Row  # [m]
     penetration_rate: Row  # [m/s]
@@ -187,7 +190,7 @@ class ContactMemory(Layout):
 
 
 class LegState(Layout):
-    """What changes from step to step."""
+    """State of a leg: all that changes from step to step."""
 
     theta: Row  # crank angle [rad]
     theta_rate: Row  # [rad/s]
@@ -198,7 +201,7 @@ class LegState(Layout):
 
 
 class Strides(Layout):
-    """The stance that is going on, see `observables`."""
+    """Open stance of a leg, see `observables`."""
 
     stance_open: Row  # 1 in a stance, else 0
     stance_began: Row  # crank angle there [rad]
@@ -255,11 +258,11 @@ class LegSettings(Layout):
     hip_on_trunk: Vector  # O from the trunk's centre of mass [m]
     mass: Row  # [kg]
     side: Row  # 1, or -1 of a geometry that travels towards -x
-    first_row: Row  # where the leg's table begins
+    first_row: Row  # row of the tables at which the leg's own begins
     is_motor: Row  # 1, or 0 of a prescribed crank
     speed_gain: Row  # [N m s/rad]
     torque_limit: Row  # [N m]
-    rotor_crank: Row  # what the rotor adds to the inertias a, b, c [kg m^2]
+    rotor_crank: Row  # additions of the rotor to the inertias a, b, c [kg m^2]
     rotor_coupling: Row
     rotor_frame: Row
     lift_off: Row  # normal force that tells stance from swing [N]
@@ -270,7 +273,7 @@ class LegSettings(Layout):
 
 
 class Contact(Layout):
-    """A hoof point on the ground."""
+    """A hoof point on the ground, at the present stage."""
 
     penetration: Row  # of the ground; with a spring less than that of the leg's point [m]
     penetration_rate: Row  # [m/s]
@@ -288,7 +291,7 @@ class Contact(Layout):
 
 
 class LegRows(Layout):
-    """A leg in the kernels."""
+    """Rows of a leg in the kernels."""
 
     state: LegState
     strides: Strides
@@ -300,7 +303,7 @@ class LegRows(Layout):
     sine: Row  # of the crank angle [-]
     cosine: Row
     command: Annotated[Block, GAIT]
-    gait_acceleration: Annotated[Block, GAIT]  # of the command filters
+    gait_acceleration: Annotated[Block, GAIT]  # second derivatives of the command filters
     theta: Row  # crank angle, rate and acceleration at the present stage
     theta_rate: Row
     theta_acceleration: Row
@@ -313,19 +316,19 @@ class LegRows(Layout):
     beta_rate: Row  # [rad/s]
     turn: Vector  # e^(i beta)
     hip: Vector  # O from the trunk's centre of mass [m]
-    first_moment: Vector  # about O [kg m]
-    moment_by_theta: Vector  # its derivative with the frame fixed [kg m]
-    moment_by_crank: Vector  # and with the frame swinging along
+    first_moment: Vector  # S of (E3), about O [kg m]
+    moment_by_theta: Vector  # D of (E2), derivative of S with the frame fixed [kg m]
+    moment_by_crank: Vector  # U of (E5), the same with the frame swinging along
     frame_inertia: Row  # c [kg m^2]
     crank_coupling: Row  # b + beta' c
-    crank_inertia: Row  # a + 2 beta' b + beta'^2 c
-    crank_pitch_coupling: Row  # b + beta' c + hip x moment_by_crank
+    crank_inertia: Row  # I of (E5): a + 2 beta' b + beta'^2 c
+    crank_pitch_coupling: Row  # L of (E5): b + beta' c + hip x moment_by_crank
     ground_moment_theta: Row  # generalised forces of the ground [N m]
     ground_moment_beta: Row
     ground_force: Vector  # [N]
     rest_moment_theta: Row  # generalised inertia forces at rest of the accelerations, weight included [N m]
     rest_moment_beta: Row
-    free_theta_acceleration: Row  # of the crank if the trunk kept still [rad/s^2]
+    free_theta_acceleration: Row  # w_t0 of (E8): of the crank if the trunk did not accelerate [rad/s^2]
     crank_mobility: Row  # 1 / crank_inertia, 0 if prescribed
     crank_torque: Row  # drives [N m, W]
     frame_torque: Row  # along beta
@@ -338,7 +341,7 @@ class LegRows(Layout):
 
 
 class PointReport(Layout):
-    """Of a hoof point, along the ground's tangent and normal."""
+    """Report of a hoof point, along the ground's tangent and normal."""
 
     x: Row  # [m]
     y: Row
@@ -348,8 +351,9 @@ class PointReport(Layout):
 
 
 class LegReport(Layout):
-    """Of each leg. A motor turns crank and swing: its torque is the crank's, the hip's is what the gear
-    between them carries, and the hip's power is that of the actuator which changes the swing's parameters."""
+    """Report of a leg. A motor turns crank and swing: its torque is `crank_torque`, `hip_torque` is
+    transmitted by the gear between them, and `hip_power` is that of the actuator that changes the swing's
+    parameters."""
 
     theta_acc: Row  # crank and swing [rad, s]
     phi: Row
@@ -364,7 +368,7 @@ class LegReport(Layout):
 
 
 class LegMemory(Layout):
-    """A leg in the engine's array; the legs follow the trunk."""
+    """Rows of a leg in the engine's array; the legs follow the trunk."""
 
     state: LegState
     strides: Strides
@@ -374,7 +378,7 @@ class LegMemory(Layout):
     settings: LegSettings
 
 
-# The names that people see, in records, states and infos
+# Names in records, states and infos
 
 TRUNK_STATE = ("time", "centre_x", "centre_y", "momentum_x", "momentum_y", "pitch", "spin")
 TRUNK_REPORT = ("x", "y", "vx", "vy", "ax", "ay", "pitch_rate", "pitch_acc")
@@ -383,7 +387,7 @@ STRIDES = Strides.names
 
 
 def leg_state(features: Features = PLAIN) -> tuple[str, ...]:
-    """Names of the rows of a `LegState`."""
+    """Return the names of the rows of a `LegState`."""
     gait = parameter_names(features.harmonics)
     contact = (
         "penetration",
@@ -405,7 +409,7 @@ PEAKS = sum(StrideSums.notes[name].is_peak << k for k, name in enumerate(StrideS
 
 
 def account(features: Features = PLAIN) -> tuple[str, ...]:
-    """Names of the rows of an `Account`."""
+    """Return the names of the rows of an `Account`."""
     return (*Account.names, *("hoof_stored", "hoof_loss")[: 2 * features.springs])
 
 

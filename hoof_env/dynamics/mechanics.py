@@ -1,10 +1,10 @@
-"""The equations of motion of N legs on one trunk, for one environment or several side by side.
+"""Equations of motion of N legs on one trunk, for one environment or several side by side.
 
-Every function is one stage of the mechanics on rows of memory, whose names and units `layout` has. A row
-holds `Lanes`, one for each environment, which do not know of each other; compiled for one lane or eight, a
-number has the same bits: only + - * /, fused operations and sqrt, no fast-math, no branch on a lane that
-changes a bit. Where
-the lanes are the legs of one trunk (`together`) each has a copy of the trunk, and sums go over all.
+Every function is one stage of the mechanics on rows of memory; `layout` has their names and units. A row
+holds `Lanes`, one value per environment; lanes are independent. A result has the same bits in one lane and
+in eight: kernels use only + - * /, fused operations and sqrt, no fast-math, and no branch on a lane that
+changes a bit. Where the lanes are the legs of one trunk (`lanes_are_legs`), each lane has a copy of the
+trunk, and sums run over all lanes.
 
 A leg enters as functions of its crank angle theta (`leg.profile`): toe and heel, the first moment s and the
 inertias a, b, c; ' is d/dtheta, _t and _tt are time derivatives. With the world angle beta = pitch +
@@ -12,8 +12,8 @@ side phi(theta, t) of its frame, the velocity v of O and w = theta_t, its kineti
 
     T = m |v|^2 / 2 + v . e^(i beta) (s' w + i s beta_t) + (a w^2 + 2 b w beta_t + c beta_t^2) / 2,
 
-and Lagrange's equations follow: (E1) to (E9) in docs/engine.md. The trunk's state is the momentum, linear
-and angular, of all bodies together: in flight it is kept to round-off, whatever the scheme.
+and Lagrange's equations follow: (E1) to (E9) in docs/engine.md. The trunk's state is the linear and angular
+momentum of all bodies together: in flight it is constant to round-off, with any scheme.
 """
 
 from __future__ import annotations
@@ -32,8 +32,8 @@ MOVING = Moving.size
 
 @inline_llvm
 def add(total, x, lanes_are_legs):  # type: ignore[no-untyped-def]
-    """total + x, lane by lane; or, where the lanes are the legs of one trunk, all of them one after the
-    other, as in a loop over legs."""
+    """Return total + x, lane by lane; where the lanes are the legs of one trunk, return total plus the x of
+    all lanes, one after the other as in a loop over legs."""
     if lanes_are_legs:
         return lane_sum(total, x)
     return total + x
@@ -41,9 +41,10 @@ def add(total, x, lanes_are_legs):  # type: ignore[no-untyped-def]
 
 @inline_source
 def evaluate(trunk, legs, leg_count, model, elapsed):  # type: ignore[no-untyped-def]
-    """All forces and accelerations at the present stage, `elapsed` [s] after the step's start."""
+    """Compute all forces and accelerations at the present stage, `elapsed` [s] after the step's start."""
     if model.kind != FIXED:
         clear_trunk(trunk, model.kind)
+    # a loop of its own: the addresses of all look-ups are known before the first waits for memory
     for i in range(leg_count):
         find_crank(block_at(legs, i), model)
     for i in range(leg_count):
@@ -68,18 +69,19 @@ def evaluate(trunk, legs, leg_count, model, elapsed):  # type: ignore[no-untyped
 
 @inline_llvm
 def find_crank(leg, model):  # type: ignore[no-untyped-def]
-    """What the crank angle itself tells, of all legs before their look-ups, which wait for it."""
+    """Compute cell, cosine and sine of the crank angle, for all legs before their look-ups need them."""
     locate(leg, model.cells)
     leg.cosine, leg.sine = cos_sin(leg.theta)
 
 
 @inline_llvm
 def look_up_functions(trunk, leg, model):  # type: ignore[no-untyped-def]
-    """The functions of the crank angle and their derivatives."""
+    """Look up the functions of the crank angle and their derivatives."""
     look_up(leg, model.tables)
     if model.form.has_limits:
         scale_functions(leg.functions, leg.slopes, leg.settings.length_scale[0], leg.settings.mass_scale[0])
     value = leg.functions[0]
+    # tables have NaN where the linkage does not close; the NaN of an angle out of range is another failure
     trunk.at_dead_point = where(
         (absolute(leg.theta) <= MAX_STATE) & (value != value), 1.0, trunk.at_dead_point
     )
@@ -87,7 +89,7 @@ def look_up_functions(trunk, leg, model):  # type: ignore[no-untyped-def]
 
 @inline_llvm
 def scale_functions(value, slope, length, mass):  # type: ignore[no-untyped-def]
-    """Functions of a similar leg, `length` times as large with `mass` times the mass."""
+    """Scale the functions to those of a similar leg, `length` times as large with `mass` times the mass."""
     moment = mass * length
     inertia = mass * length * length
     value.toe = length * value.toe
@@ -107,70 +109,72 @@ def scale_functions(value, slope, length, mass):  # type: ignore[no-untyped-def]
 
 @inline_llvm
 def place_frame(trunk, leg, harmonics, elapsed):  # type: ignore[no-untyped-def]
-    """The leg's frame (E1), its first moment and inertia in the world. The swing is phi = offset +
-    A sin(theta) + B cos(theta), perhaps with higher harmonics, each parameter moving as its filter does."""
+    """Compute the leg's frame (E1), and its first moment and inertia in the world. The swing is phi = offset
+    + A sin(theta) + B cos(theta) and higher harmonics, if any; each parameter moves as its filter does."""
     sine = leg.sine
     cosine = leg.cosine
     w = leg.theta_rate
-    offset, rate, bend = gait_parameter_at(leg, OFFSET, elapsed)
-    part_a, rate_a, bend_a = gait_parameter_at(leg, SIN, elapsed)
-    part_b, rate_b, bend_b = gait_parameter_at(leg, COS, elapsed)
+    offset, rate, acceleration = gait_parameter_at(leg, OFFSET, elapsed)
+    part_a, rate_a, acc_a = gait_parameter_at(leg, SIN, elapsed)
+    part_b, rate_b, acc_b = gait_parameter_at(leg, COS, elapsed)
     side = leg.settings.side
     swing = part_a * sine + part_b * cosine
     slope = part_a * cosine - part_b * sine
-    bent = bend + bend_a * sine + bend_b * cosine + (2.0 * (rate_a * cosine - rate_b * sine) - swing * w) * w
-    drift = rate + rate_a * sine + rate_b * cosine
+    swing_acceleration = acceleration + acc_a * sine + acc_b * cosine
+    swing_acceleration = swing_acceleration + (2.0 * (rate_a * cosine - rate_b * sine) - swing * w) * w
+    swing_rate = rate + rate_a * sine + rate_b * cosine
     sine_n = sine
     cosine_n = cosine
     for n in range(2, harmonics + 1):
         sine_n, cosine_n = sine_n * cosine + cosine_n * sine, cosine_n * cosine - sine_n * sine
-        part_a, rate_a, bend_a = gait_parameter_at(leg, 2 * n, elapsed)
-        part_b, rate_b, bend_b = gait_parameter_at(leg, 2 * n + 1, elapsed)
+        part_a, rate_a, acc_a = gait_parameter_at(leg, 2 * n, elapsed)
+        part_b, rate_b, acc_b = gait_parameter_at(leg, 2 * n + 1, elapsed)
         part = part_a * sine_n + part_b * cosine_n
-        turned = n * w
+        n_w = n * w
         swing = swing + part
         slope = slope + n * (part_a * cosine_n - part_b * sine_n)
-        drift = drift + rate_a * sine_n + rate_b * cosine_n
-        twist = 2.0 * (rate_a * cosine_n - rate_b * sine_n) - part * turned
-        bent = bent + bend_a * sine_n + bend_b * cosine_n + twist * turned
+        swing_rate = swing_rate + rate_a * sine_n + rate_b * cosine_n
+        harmonic_acceleration = 2.0 * (rate_a * cosine_n - rate_b * sine_n) - part * n_w
+        swing_acceleration = swing_acceleration + acc_a * sine_n + acc_b * cosine_n
+        swing_acceleration = swing_acceleration + harmonic_acceleration * n_w
     k = side * slope
     leg.phi = offset + swing
-    leg.beta_by_theta = k
-    leg.swing_rate = side * drift
-    leg.swing_acceleration = side * bent
+    leg.beta_by_theta = k  # (E1)
+    leg.swing_rate = side * swing_rate  # sway of (E1)
+    leg.swing_acceleration = side * swing_acceleration  # sway_t of (E1)
 
     cos_beta, sin_beta = cos_sin(trunk.stage.pitch + side * (offset + swing))
     turn = vector(cos_beta, sin_beta)
     s = turn * leg.functions.first_moment
     ds = turn * leg.functions.moment_slope
     leg.turn = turn
-    leg.first_moment = s
-    leg.moment_by_theta = ds
-    leg.moment_by_crank = ds + k * perpendicular(s)
+    leg.first_moment = s  # S of (E3)
+    leg.moment_by_theta = ds  # D of (E2)
+    leg.moment_by_crank = ds + k * perpendicular(s)  # U of (E5)
     frame = leg.functions.frame_inertia + leg.settings.rotor_frame
     coupling = leg.functions.coupling + leg.settings.rotor_coupling
     leg.frame_inertia = frame
     leg.crank_coupling = coupling + k * frame
-    leg.crank_inertia = (
+    leg.crank_inertia = (  # I of (E5)
         leg.functions.crank_inertia + leg.settings.rotor_crank + k * (2.0 * coupling + k * frame)
     )
 
 
 @inline_llvm
 def gait_parameter_at(leg, k, elapsed):  # type: ignore[no-untyped-def]
-    """Parameter k of the gait, its rate and acceleration, `elapsed` [s] after the step's start."""
+    """Return parameter k of the gait, its rate and acceleration, `elapsed` [s] after the step's start."""
     value = leg.state.gait[k]
     rate = leg.state.gait_rate[k]
-    bend = leg.gait_acceleration[k]
+    acceleration = leg.gait_acceleration[k]
     if elapsed != 0.0:
-        value = value + elapsed * (rate + 0.5 * elapsed * bend)
-        rate = rate + elapsed * bend
-    return value, rate, bend
+        value = value + elapsed * (rate + 0.5 * elapsed * acceleration)
+        rate = rate + elapsed * acceleration
+    return value, rate, acceleration
 
 
 @inline_llvm
 def keep_still(trunk):  # type: ignore[no-untyped-def]
-    """What never changes in a trunk that cannot move, or not pitch."""
+    """Set the trunk's constant quantities (those of a fixed trunk, or of one that does not pitch)."""
     for k in range(MOVING):
         trunk.stage[k] = trunk.state.moving[k]
         trunk.rates[k] = 0.0
@@ -186,7 +190,7 @@ def keep_still(trunk):  # type: ignore[no-untyped-def]
 
 @inline_llvm
 def clear_trunk(trunk, kind):  # type: ignore[no-untyped-def]
-    """Before the legs are gathered."""
+    """Reset the trunk's sums before the legs are gathered."""
     if kind == FREE:
         cosine, sine = cos_sin(trunk.stage.pitch)
         trunk.turn = vector(cosine, sine)
@@ -203,41 +207,42 @@ def gather_leg(trunk, leg, kind, lanes_are_legs):  # type: ignore[no-untyped-def
     s = leg.first_moment
     w = leg.theta_rate
     sway = leg.swing_rate
-    drift = w * leg.moment_by_crank + sway * perpendicular(s)
+    drift = w * leg.moment_by_crank + sway * perpendicular(s)  # d of (E6)
     if kind == FREE:
         leg.hip = trunk.turn * leg.settings.hip_on_trunk
         hip = leg.hip
         frame = leg.frame_inertia
-        trunk.composite_inertia = add(
+        trunk.composite_inertia = add(  # J of (E6)
             trunk.composite_inertia, dot(hip, leg.settings.mass * hip + 2.0 * s) + frame, lanes_are_legs
         )
-        trunk.relative_angular_momentum = add(
+        trunk.relative_angular_momentum = add(  # G of (E6)
             trunk.relative_angular_momentum,
             cross(hip, drift) + leg.crank_coupling * w + frame * sway,
             lanes_are_legs,
         )
+    # B and P of (E6)
     trunk.first_moment = add(trunk.first_moment, leg.settings.mass * leg.hip + s, lanes_are_legs)
     trunk.relative_momentum = add(trunk.relative_momentum, drift, lanes_are_legs)
 
 
 @inline_llvm
 def move_trunk(trunk, kind):  # type: ignore[no-untyped-def]
-    """Place and velocity of the trunk from centre of mass and momentum of all (E7), on a rail along x only;
-    what acts on it besides its legs."""
+    """Compute place and velocity of the trunk from centre of mass and momentum of all (E7), on a rail along x
+    only, and the forces on it other than its legs'."""
     centre = trunk.stage.centre
     moment = trunk.first_moment
     momentum = trunk.stage.momentum
     drift = trunk.relative_momentum
     per_mass = trunk.settings.inverse_mass
-    place = centre - per_mass * moment
-    velocity = per_mass * (momentum - drift)
+    place = centre - per_mass * moment  # (E7)
+    velocity = per_mass * (momentum - drift)  # (E7), psi_t to follow
     rate = full_like(trunk, 0.0)
     if kind == RAIL:
         place = vector(place.real, centre.imag)
         velocity = vector(velocity.real, 0.0)
     if kind == FREE:
         spin = trunk.stage.spin - trunk.relative_angular_momentum + cross(moment, drift) * per_mass
-        rate = spin / (trunk.composite_inertia - dot(moment, moment) * per_mass)
+        rate = spin / (trunk.composite_inertia - dot(moment, moment) * per_mass)  # psi_t of (E7)
         velocity = velocity - rate * per_mass * perpendicular(moment)
     trunk.place = place
     trunk.velocity = velocity
@@ -255,6 +260,7 @@ def move_trunk(trunk, kind):  # type: ignore[no-untyped-def]
     trunk.rates.moment = -drag * (place.imag - centre.imag)  # the drag acts on the trunk
     trunk.load = vector(full_like(trunk, 0.0), 0.0)
     trunk.load_moment = 0.0
+    # K of (E8); `load_trunk` takes off each motor's crank
     trunk.mass_xx = total
     trunk.mass_xy = 0.0
     trunk.mass_yy = total
@@ -266,8 +272,10 @@ def move_trunk(trunk, kind):  # type: ignore[no-untyped-def]
 
 @inline_source
 def velocities_to_momenta(trunk, legs, leg_count, model, starts):  # type: ignore[no-untyped-def]
-    """Centre of mass, momentum and spin of all where an environment starts, from what stands in their place
-    then: place and velocity of the trunk and rate of its pitch. The inverse of `move_trunk`."""
+    """Compute centre of mass, momentum and spin of all at a start; the inverse of `move_trunk` (E7).
+
+    Their rows hold the trunk's place, velocity and pitch rate before, and keep them in lanes not in `starts`.
+    """
     clear_trunk(trunk, model.kind)
     for i in range(leg_count):
         leg = block_at(legs, i)
@@ -298,11 +306,11 @@ def velocities_to_momenta(trunk, legs, leg_count, model, starts):  # type: ignor
 
 @inline_llvm
 def set_up_crank(trunk, leg, motors, elapsed):  # type: ignore[no-untyped-def]
-    """A crank's equation of motion (E5), with the trunk's acceleration a,
+    """Set up a crank's equation of motion (E5), with the trunk's acceleration a,
 
         crank_inertia theta_tt + moment_by_crank . a + crank_pitch_coupling pitch_tt = torque + ground - rest.
 
-    Here a motor's crank is solved for theta_tt as if the trunk kept still; a prescribed one's is given.
+    A motor's crank is solved for theta_tt as if the trunk did not accelerate; a prescribed one's is given.
     """
     w = leg.theta_rate
     frame_rate = leg.beta_rate
@@ -315,29 +323,28 @@ def set_up_crank(trunk, leg, motors, elapsed):  # type: ignore[no-untyped-def]
     da = leg.slopes.crank_inertia
     db = leg.slopes.coupling
     dc = leg.functions.frame_inertia_slope
-    weight = (
-        vector(full_like(trunk, 0.0), trunk.settings.gravity) - pitch_rate * pitch_rate * hip
-    )  # a + g of O
-    rest_theta = (
+    # a_h + i g of (E2) and (E3), without the trunk's acceleration
+    weight = vector(full_like(trunk, 0.0), trunk.settings.gravity) - pitch_rate * pitch_rate * hip
+    rest_theta = (  # (E2), where coupling - k frame is b
         (coupling - k * frame) * swing_acceleration
         + 0.5 * (da * (w * w) - dc * (frame_rate * frame_rate))
         + dot(weight, leg.moment_by_theta)
     )
-    rest_beta = (
+    rest_beta = (  # (E3)
         frame * swing_acceleration
         + (db * w + dc * frame_rate) * w
         + dot(weight, perpendicular(leg.first_moment))
     )
     leg.rest_moment_theta = rest_theta
     leg.rest_moment_beta = rest_beta
-    leg.crank_pitch_coupling = coupling + cross(hip, leg.moment_by_crank)
+    leg.crank_pitch_coupling = coupling + cross(hip, leg.moment_by_crank)  # L of (E5)
     wanted, wanted_rate, _ = gait_parameter_at(leg, SPEED, elapsed)
     leg.free_theta_acceleration = wanted_rate
     if motors:
         torque = clip(leg.settings.speed_gain * (wanted - w), leg.settings.torque_limit)
         mobility = 1.0 / leg.crank_inertia
         is_motor = leg.settings.is_motor > 0.0
-        free = mobility * (
+        free = mobility * (  # (E5) with a_T = 0 and psi_tt = 0: w_t0 of (E8)
             torque + leg.ground_moment_theta - rest_theta + k * (leg.ground_moment_beta - rest_beta)
         )
         leg.crank_torque = torque
@@ -347,7 +354,7 @@ def set_up_crank(trunk, leg, motors, elapsed):  # type: ignore[no-untyped-def]
 
 @inline_llvm
 def load_trunk(trunk, leg, kind, motors, lanes_are_legs):  # type: ignore[no-untyped-def]
-    """A leg's part in the trunk's equations, its crank eliminated (E8), and in outer force and moment."""
+    """Add a leg to the trunk's equations, its crank eliminated (E8), and to outer force and moment."""
     w = leg.theta_rate
     frame_rate = leg.beta_rate
     pitch_rate = trunk.rates.pitch_rate
@@ -365,7 +372,9 @@ def load_trunk(trunk, leg, kind, motors, lanes_are_legs):  # type: ignore[no-unt
         + frame_rate * (2.0 * w * perpendicular(leg.moment_by_theta) - frame_rate * s)
     )
     centripetal = pitch_rate * pitch_rate * hip  # minus O's acceleration there
+    # loads of (E8)
     trunk.load = add(trunk.load, mass * centripetal - moment_acceleration - free * u, lanes_are_legs)
+    # K - sum (U, L) (U, L)^T / I of (E8); prescribed cranks have 1 / I = 0
     if motors:
         mobile_u = leg.crank_mobility * u
         trunk.mass_xx = add(trunk.mass_xx, -mobile_u.real * u.real, lanes_are_legs)
@@ -409,6 +418,7 @@ def accelerate_trunk(trunk, kind):  # type: ignore[no-untyped-def]
         yp = trunk.mass_yp
         pp = trunk.mass_pp
         turning = trunk.load_moment
+        # cofactors of the symmetric 3 x 3 matrix
         c_xx = yy * pp - yp * yp
         c_xy = xp * yp - xy * pp
         c_xp = xy * yp - yy * xp
@@ -429,10 +439,10 @@ def accelerate_trunk(trunk, kind):  # type: ignore[no-untyped-def]
 
 @inline_llvm
 def accelerate_crank(trunk, leg, motors):  # type: ignore[no-untyped-def]
-    """The crank's acceleration: a motor's gives way to the trunk's (E9)."""
+    """Set the crank's acceleration; a motor's crank yields to the trunk's acceleration (E9)."""
     leg.theta_acceleration = leg.free_theta_acceleration
     if motors:
         u = leg.moment_by_crank
         coupling = leg.crank_pitch_coupling
         pull = dot(u, trunk.acceleration) + coupling * trunk.pitch_acceleration
-        leg.theta_acceleration = leg.free_theta_acceleration - leg.crank_mobility * pull
+        leg.theta_acceleration = leg.free_theta_acceleration - leg.crank_mobility * pull  # (E9)

@@ -1,5 +1,5 @@
-"""What the kernels of `TrunkEngine` work on: its memory, its settings as arrays, where it starts, and
-whether a state that was kept fits it."""
+"""Memory and settings of `TrunkEngine` as its kernels take them, starts of environments, and checks of stored
+states."""
 
 from __future__ import annotations
 
@@ -48,13 +48,13 @@ from hoof_env.simd.math import EXPONENT_UNIT
 from hoof_env.simd.memory import aligned
 
 LIFT_OFF = 0.05
-"""Normal force that tells stance from swing, in a leg's part of the weight. A hoof that merely grazes the
-ground between two pushes has lifted off: were any contact stance, a policy could hold one peak for ever and
-push under it."""
+"""Normal force that separates stance from swing, as a fraction of a leg's part of the weight. A hoof that
+grazes the ground between two pushes has lifted off: if any contact were stance, a policy could hold one peak
+for ever and push under it."""
 
 
 NOWHERE = 1e30
-"""A bound that nothing reaches, in the place of an infinite one."""
+"""Finite bound that nothing reaches, used for an infinite one."""
 
 
 class Memory(NamedTuple):
@@ -69,8 +69,8 @@ class Memory(NamedTuple):
     strides: Floats  # (legs, 6, n)
     stride_sums: Floats  # (legs, 9, n)
     command: Floats  # (legs, 4, n)
-    account: Floats  # (9, n), added to
-    trunk_report: Floats  # at the end, (8, n)
+    account: Floats  # (9, n), added up over calls
+    trunk_report: Floats  # at the end of the last call, (8, n)
     limb_report: Floats  # (legs, 18, n)
     result: Floats  # values of `parts.Result`, (n,); where it is not OK the state is left as it was
     constants: Floats  # `reactions.LegConstants`, (legs, size)
@@ -81,42 +81,62 @@ class Memory(NamedTuple):
 def memory_of(
     data: Floats, num_envs: int, constants: Floats, reactions: Floats, features: Features
 ) -> Memory:
-    """`Memory` with the parts of `data`, whose last columns may be idle; more axes may follow."""
+    """Return a `Memory` with views of `data`. Its last columns may be idle; more axes may follow."""
     form = engine_layout(features)
     trunk = data[: form.trunk_rows, :num_envs]
     limbs = data[form.trunk_rows :].reshape(len(constants), form.leg_rows, *data.shape[1:])[:, :, :num_envs]
-    t_parts = {name: trunk[form.trunk_memory.rows(name)] for name in form.trunk_memory.fields}
-    l_parts = {name: limbs[:, form.leg_memory.rows(name)] for name in form.leg_memory.fields}
+    trunk_parts = {name: trunk[form.trunk_memory.rows(name)] for name in form.trunk_memory.fields}
+    limb_parts = {name: limbs[:, form.leg_memory.rows(name)] for name in form.leg_memory.fields}
     return Memory(
-        data, t_parts["state"], l_parts["state"], t_parts["settings"], l_parts["settings"],
-        l_parts["strides"], l_parts["sums"], l_parts["command"], t_parts["account"],
-        t_parts["report"], l_parts["report"], t_parts["result"][0], constants, reactions, features,
-    )  # fmt: skip
+        data=data,
+        trunk=trunk_parts["state"],
+        limbs=limb_parts["state"],
+        trunk_settings=trunk_parts["settings"],
+        limb_settings=limb_parts["settings"],
+        strides=limb_parts["strides"],
+        stride_sums=limb_parts["sums"],
+        command=limb_parts["command"],
+        account=trunk_parts["account"],
+        trunk_report=trunk_parts["report"],
+        limb_report=limb_parts["report"],
+        result=trunk_parts["result"][0],
+        constants=constants,
+        reactions=reactions,
+        features=features,
+    )
 
 
 def named_rows(memory: Memory) -> dict[str, Floats]:
-    """State and report by name, as views."""
-    parts = ((layout.TRUNK_STATE, memory.trunk), (layout.TRUNK_REPORT, memory.trunk_report))
-    columns = {name: values[k] for names, values in parts for k, name in enumerate(names)}
-    limbs = ((layout.leg_state(memory.features), memory.limbs), (layout.LEG_REPORT, memory.limb_report))
-    return columns | {name: values[:, k] for names, values in limbs for k, name in enumerate(names)}
+    """Return state and report by name, as views."""
+    views = {}
+    parts: list[tuple[tuple[str, ...], Floats]]
+    parts = [(layout.TRUNK_STATE, memory.trunk), (layout.TRUNK_REPORT, memory.trunk_report)]
+    for names, values in parts:
+        for k, name in enumerate(names):
+            views[name] = values[k]
+    parts = [(layout.leg_state(memory.features), memory.limbs), (layout.LEG_REPORT, memory.limb_report)]
+    for names, values in parts:
+        for k, name in enumerate(names):
+            views[name] = values[:, k]
+    return views
 
 
 def columns_for(num_envs: int) -> int:
-    """Whole groups of lanes; one more where rows of memory would begin in the same few sets of the cache."""
+    """Return the number of columns for some environments: whole groups of lanes."""
     columns = -(-num_envs // LANES) * LANES
+    # one group more where all rows would begin in the same few sets of the cache
     return columns + LANES if columns % 128 == 0 else columns
 
 
 def copy_of(data: Floats) -> Floats:
-    """A copy where the kernels like it best."""
+    """Copy into cache-aligned memory."""
     copy = aligned(*data.shape)
     copy[:] = data
     return copy
 
 
 def new_memory(scene: Mechanics, num_envs: int, columns: int, reacts: bool) -> Memory:
-    """Memory of an engine whose environments are nowhere, that is not a number, until they are reset."""
+    """Allocate the memory of an engine; states are NaN until reset."""
     legs = len(scene.limbs)
     constants = np.array([leg_constants(limb.geometry) for limb in scene.limbs])
     reactions = np.zeros((legs, Reactions.size, columns if reacts else 0))
@@ -134,11 +154,13 @@ def new_memory(scene: Mechanics, num_envs: int, columns: int, reacts: bool) -> M
 def new_model(
     scene: Mechanics, filters: FilterSettings, strides: bool
 ) -> tuple[NDArray[Any], Floats, Floats]:
-    """What does not change while it runs: a record `MODEL`, the legs' tables, the terrain's cells."""
+    """Return the kernels' constant arrays: a record `MODEL`, the legs' tables, the terrain's cells."""
     ground = scene.ground
     terrain = scene.terrain
     cells = max(profile.cells for profile in scene.profiles)
+    # legs of the same shape share a table
     tables = [profile.with_cells(cells).table for profile in dict.fromkeys(scene.profiles)]
+    # cell 0 begins before the turn does: its row again at the end, see `profile.locate`
     tables = [np.concatenate([table, table[:1]]) for table in tables]
     scheme = SCHEMES[scene.integrator]
     grid = terrain.to_grid()
@@ -166,14 +188,16 @@ def new_model(
 
 
 def check_shared(scene: Mechanics, trunk: Trunk, ground: Ground, limbs: Sequence[Limb]) -> None:
-    """Raise where one environment's trunk, ground or legs differ in what the kernels take once for all."""
-    for name, given, own in (
-        ("trunk.kind", trunk.kind, scene.trunk.kind),
-        *((name, getattr(ground, name), getattr(scene.ground, name))
-          for name in ("exponent", "friction_law", "approach")),
-    ):  # fmt: skip
-        if given != own:
-            raise ParameterError(f"{name}: expected {own!r}, which all environments share, got {given!r}")
+    """Raise `ParameterError` if one environment's trunk, ground or legs differ in what all environments
+    share."""
+    shared = [("trunk.kind", trunk.kind, scene.trunk.kind)]
+    laws = ("exponent", "friction_law", "approach")
+    shared += [(name, getattr(ground, name), getattr(scene.ground, name)) for name in laws]
+    for name, value, engine_value in shared:
+        if value != engine_value:
+            raise ParameterError(
+                f"{name}: expected {engine_value!r}, which all environments share, got {value!r}"
+            )
     if len(limbs) != len(scene.limbs):
         raise ParameterError(f"limbs: expected {len(scene.limbs)}, got {len(limbs)}")
     check_limbs(trunk, limbs, scene.features.springs)
@@ -188,7 +212,8 @@ def check_shared(scene: Mechanics, trunk: Trunk, ground: Ground, limbs: Sequence
 
 
 def check_limbs(trunk: Trunk, limbs: Sequence[Limb], springs: bool) -> None:
-    """Raise where a hip is beyond the trunk, or some hoofs have springs and others none."""
+    """Raise `ParameterError` if a hip is beyond the trunk, or some hooves have springs and others have
+    not."""
     for k, limb in enumerate(limbs):
         if trunk.length is not None and abs(limb.hip[0]) > trunk.length / 2:
             raise ParameterError(
@@ -203,24 +228,21 @@ def check_limbs(trunk: Trunk, limbs: Sequence[Limb], springs: bool) -> None:
 
 
 def scales_of(name: str, limb: Limb, own: Limb) -> tuple[float, float]:
-    """Length and mass of a leg over those of the engine's, to which it must be similar."""
+    """Return length and mass of a leg over those of the engine's, to which it must be similar."""
     if limb.geometry == own.geometry:
         return 1.0, 1.0
-    one = limb.geometry.to_dict()
-    other = own.geometry.to_dict()
-    length = one["hip_height"] / other["hip_height"]
+    shape = limb.geometry.to_dict()
+    own_shape = own.geometry.to_dict()
+    length = shape["hip_height"] / own_shape["hip_height"]
     mass = limb.geometry.mass / own.geometry.mass
-    pairs = [
-        (limb.geometry.body_lengths, length * own.geometry.body_lengths),
-        (one["pivot"], length * np.array(other["pivot"])),
-        (limb.geometry.body_masses, mass * own.geometry.body_masses),
-        (limb.geometry.body_inertias, mass * length**2 * own.geometry.body_inertias),
-    ]
-    unlike = [key for key in ("assembly", "toe", "heel", "travel") if one[key] != other[key]]
-    parts = ("lengths", "pivot", "masses", "inertias")
-    unlike += [
-        part for part, (a, b) in zip(parts, pairs, strict=True) if not np.allclose(a, b, rtol=1e-9, atol=0)
-    ]
+    pairs = {
+        "lengths": (limb.geometry.body_lengths, length * own.geometry.body_lengths),
+        "pivot": (shape["pivot"], length * np.array(own_shape["pivot"])),
+        "masses": (limb.geometry.body_masses, mass * own.geometry.body_masses),
+        "inertias": (limb.geometry.body_inertias, mass * length**2 * own.geometry.body_inertias),
+    }
+    unlike = [key for key in ("assembly", "toe", "heel", "travel") if shape[key] != own_shape[key]]
+    unlike += [part for part, (a, b) in pairs.items() if not np.allclose(a, b, rtol=1e-9, atol=0)]
     if unlike:
         raise ParameterError(
             f"{name}.geometry: expected one similar to the engine's {own.geometry.name!r}, of uniform rods "
@@ -232,21 +254,32 @@ def scales_of(name: str, limb: Limb, own: Limb) -> tuple[float, float]:
 def settings_of(
     scene: Mechanics, trunk: Trunk, ground: Ground, limbs: Sequence[Limb]
 ) -> tuple[Floats, Floats]:
-    """Rows of `TrunkSettings` and of `LegSettings`, (legs, rows), of an environment under a trunk of the same
-    kind, on a ground with the same laws."""
+    """Return the rows of `TrunkSettings`, and of `LegSettings`, shape (legs, rows), of an environment under a
+    trunk of the engine's kind, on a ground with its laws."""
     mass = trunk.mass + sum(limb.geometry.mass for limb in limbs)
     record = ground.to_record()
     hangs = trunk.kind == "suspended"
     limits = scene.motion_limits or Limits()
     values = {
-        "total_mass": mass, "inverse_mass": 1 / mass, "pitch_inertia": trunk.pitch_inertia,
+        "total_mass": mass,
+        "inverse_mass": 1 / mass,
+        "pitch_inertia": trunk.pitch_inertia,
         "support": (1 - trunk.share) * mass * GRAVITY if hangs else 0.0,
-        "spring": trunk.stiffness if hangs else 0.0, "damper": trunk.damping if hangs else 0.0,
-        "height": trunk.height, "drag": trunk.drag, "gravity": GRAVITY,
+        "spring": trunk.stiffness if hangs else 0.0,
+        "damper": trunk.damping if hangs else 0.0,
+        "height": trunk.height,
+        "drag": trunk.drag,
+        "gravity": GRAVITY,
         "bottom": float(np.min(scene.terrain.height)),
-    } | {name: record[name] for name in (
-        "stiffness", "chi", "dashpot", "approach_floor", "friction", "friction_slow", "friction_fast"
-    )}  # fmt: skip
+        "stiffness": record["stiffness"],
+        "chi": record["chi"],
+        "dashpot": record["dashpot"],
+        "approach_floor": record["approach_floor"],
+        "friction": record["friction"],
+        "friction_slow": record["friction_slow"],
+        "friction_fast": record["friction_fast"],
+    }
+    # settings are checked to be finite like a state (`read_state`), so infinite bounds are replaced
     bounds = np.clip((*limits.pitch, *limits.height, limits.clearance), -NOWHERE, NOWHERE)
     values |= _numbered("limits", bounds.tolist())
     lift_off = LIFT_OFF * mass * GRAVITY / len(limbs)
@@ -254,28 +287,38 @@ def settings_of(
     cells = max(profile.cells for profile in scene.profiles)
     firsts = [unique.index(profile) * (cells + 1) for profile in scene.profiles]  # where a leg's table begins
     names = scene.features.of(LegSettings).names
-    each = []
+    limb_rows = []
     for k, (limb, own, first) in enumerate(zip(limbs, scene.limbs, firsts, strict=True)):
         rows = _limb_settings(limb, first, lift_off, scales_of(f"limbs[{k}]", limb, own))
-        each.append([rows[name] for name in names])
-    return np.array([values[name] for name in scene.features.of(TrunkSettings).names]), np.array(each)
+        limb_rows.append([rows[name] for name in names])
+    trunk_rows = [values[name] for name in scene.features.of(TrunkSettings).names]
+    return np.array(trunk_rows), np.array(limb_rows)
 
 
 def _limb_settings(
     limb: Limb, first_row: int, lift_off: float, scales: tuple[float, float]
 ) -> dict[str, float]:
+    # a prescribed crank has no rotor
     motor = limb.drive if isinstance(limb.drive, Motor) else Motor(0.0, 0.0, 0.0, 0.0)
     side = float(limb.geometry.travel)
     rotor = motor.rotor_inertia
     spring = limb.spring
     values = {
-        "hip_on_trunk_x": limb.hip[0], "hip_on_trunk_y": limb.hip[1], "mass": limb.geometry.mass,
-        "side": side, "first_row": first_row, "is_motor": float(isinstance(limb.drive, Motor)),
-        "speed_gain": motor.speed_gain, "torque_limit": motor.torque_limit,
-        "rotor_crank": motor.reflected_inertia, "rotor_coupling": -side * motor.gear_ratio * rotor,
-        "rotor_frame": rotor, "lift_off": lift_off,
-        "length_scale_0": scales[0], "mass_scale_0": scales[1],
-    }  # fmt: skip
+        "hip_on_trunk_x": limb.hip[0],
+        "hip_on_trunk_y": limb.hip[1],
+        "mass": limb.geometry.mass,
+        "side": side,
+        "first_row": first_row,
+        "is_motor": float(isinstance(limb.drive, Motor)),
+        "speed_gain": motor.speed_gain,
+        "torque_limit": motor.torque_limit,
+        "rotor_crank": motor.reflected_inertia,
+        "rotor_coupling": -side * motor.gear_ratio * rotor,
+        "rotor_frame": rotor,
+        "lift_off": lift_off,
+        "length_scale_0": scales[0],
+        "mass_scale_0": scales[1],
+    }
     if spring is None:
         return values
     stiffness = _numbered("hoof_stiffness", (spring.stiffness, spring.tangential_stiffness))
@@ -284,34 +327,35 @@ def _limb_settings(
 
 
 def _numbered(name: str, values: Sequence[float | None]) -> dict[str, Any]:
-    """The rows of a block by name."""
+    """Return the rows of a block by name."""
     return {f"{name}_{k}": value for k, value in enumerate(values)}
 
 
 def which(envs: ArrayLike | None, num_envs: int) -> NDArray[np.int64]:
-    """Environments of `num_envs` as indices; they are given as such, as a mask, or as None for all."""
+    """Return the indices of environments out of `num_envs`, from indices, a mask, or None for all."""
     if envs is None:
         return np.arange(num_envs)
-    given = np.asarray(envs)
-    if given.dtype == bool and given.shape == (num_envs,):
-        return np.flatnonzero(given)
-    if given.shape == (0,):
+    chosen = np.asarray(envs)
+    if chosen.dtype == bool and chosen.shape == (num_envs,):
+        return np.flatnonzero(chosen)
+    # NumPy makes an empty list an array of floats
+    if chosen.shape == (0,):
         return np.arange(0)
-    if given.dtype.kind in "iu" and given.ndim == 1 and np.all((given >= 0) & (given < num_envs)):
-        return given.astype(np.int64)
+    if chosen.dtype.kind in "iu" and chosen.ndim == 1 and np.all((chosen >= 0) & (chosen < num_envs)):
+        return chosen.astype(np.int64)
     raise ParameterError(
         f"envs: expected indices below {num_envs} or a mask of shape ({num_envs},), got {envs!r}"
     )
 
 
 def gaits_of(gaits: Any, legs: int, n: int, harmonics: int) -> Floats:
-    """`gaits` of `TrunkEngine.reset` as numbers of shape (legs, 2 + 2 harmonics, n)."""
+    """Return `gaits` of `TrunkEngine.reset` as an array of shape (legs, 2 + 2 harmonics, n)."""
     if isinstance(gaits, np.ndarray):
-        given = finite("gaits", gaits, MAX_STATE)
+        numbers = finite("gaits", gaits, MAX_STATE)
         size = 2 + 2 * harmonics
-        if given.shape != (legs, size, n):
-            raise ParameterError(f"gaits: expected shape {(legs, size, n)}, got {given.shape}")
-        return given
+        if numbers.shape != (legs, size, n):
+            raise ParameterError(f"gaits: expected shape {(legs, size, n)}, got {numbers.shape}")
+        return numbers
     each = all_of("gaits", [gaits] * legs if isinstance(gaits, GaitParameters) else gaits, GaitParameters)
     if len(each) != legs:
         raise ParameterError(f"gaits: expected one or {legs}, got {len(each)}")
@@ -326,11 +370,11 @@ def start(
     trunk: Mapping[str, ArrayLike],
     heights: Floats,
 ) -> tuple[Floats, Floats]:
-    """State of n environments whose trunks have these heights at rest, with filters at rest and springs that
-    bear nothing: of the trunk, shape (7, n), and legs, (legs, rows of a `LegState`, n).
+    """Return the state of n environments with filters at rest and unloaded springs: of the trunk, shape (7,
+    n), and of the legs, (legs, rows of a `LegState`, n). `heights` are those of the trunks at rest.
 
-    In the place of centre of mass, momentum and spin of all are the trunk's place, velocity and rate of
-    pitch: the kernels make the one of the other (`mechanics.velocities_to_momenta`). `TrunkEngine.reset` says
+    The rows for centre of mass, momentum and spin of all hold the trunk's place, velocity and pitch rate,
+    from which the kernels compute the former (`mechanics.velocities_to_momenta`). `TrunkEngine.reset` says
     what `trunk` holds and what is refused.
     """
     legs = len(scene.limbs)
@@ -342,21 +386,25 @@ def start(
             raise ParameterError(
                 f"theta_rate: leg {i} is prescribed to turn at {gaits[i, 0]} rad/s, got {spin[i]}"
             )
-        turns = limb.geometry.full_turn  # then its links have a place everywhere
+        # a crank that turns fully has a place for its links everywhere: no look-up needed
+        turns = limb.geometry.full_turn
         if not turns and not np.isfinite(scene.profiles[i](angle[i])[0]).all():
             raise ParameterError(f"theta: the links of leg {i} have no place at some of {angle[i]} rad")
     at = {name: spread(name, value, (n,), MAX_STATE) for name, value in trunk.items()}
     kind = TRUNKS.index(scene.trunk.kind)
-    for name, kinds in (
-        ("vx", (RAIL, SUSPENDED, FREE)), ("vy", (SUSPENDED, FREE)), ("pitch", (FREE,)),
-        ("pitch_rate", (FREE,)),
-    ):  # fmt: skip
+    movable = {
+        "vx": (RAIL, SUSPENDED, FREE),
+        "vy": (SUSPENDED, FREE),
+        "pitch": (FREE,),
+        "pitch_rate": (FREE,),
+    }
+    for name, kinds in movable.items():
         if kind not in kinds and at[name].any():
             raise ParameterError(f"{name}: expected 0 of a {scene.trunk.kind} trunk, got {at[name]}")
     if kind <= RAIL and (off := at["y"] != heights).any():
         raise ParameterError(f"y: a {scene.trunk.kind} trunk is at {heights[off][0]:g} m, got {at['y']}")
     state = np.zeros((TrunkState.size, n))
-    moving = state[TrunkState.rows("moving")]  # the kernels make of these what they integrate
+    moving = state[TrunkState.rows("moving")]
     moving[Moving.rows("centre")] = (at["x"], at["y"])
     moving[Moving.rows("momentum")] = (at["vx"], at["vy"])
     moving[Moving.rows("pitch")] = at["pitch"]
@@ -370,7 +418,7 @@ def start(
 
 
 STATE = ("trunk", "limbs", "strides", "command", "account", "trunk_settings", "limb_settings")
-"""Arrays that hold what changes."""
+"""Names of the arrays that hold what changes."""
 
 _MOVING = TrunkState.rows("moving").start
 _PLACES = [
@@ -383,8 +431,8 @@ _FIRST_ROW = layout.LegSettings.rows("first_row")
 def read_state(
     expected: dict[str, Any], memory: Memory, state: Any
 ) -> tuple[dict[str, Floats], NDArray[np.bool_]]:
-    """The arrays of a state by the names of `STATE`, and which environments were ever reset in it; `expected`
-    is the layout of the engine, and `TrunkEngine.set_state` says what is refused."""
+    """Return the arrays of a state by the names of `STATE`, and a mask of the environments that were ever
+    reset in it. `expected` is the layout of the engine; `TrunkEngine.set_state` says what is refused."""
     parts = (*STATE, "layout")
     missing = sorted(set(parts) - set(state)) if isinstance(state, Mapping) else parts
     if missing or not isinstance(state["layout"], Mapping):
@@ -402,28 +450,30 @@ def read_state(
         if arrays[name].shape != shape:
             raise ParameterError(f"state[{name!r}]: expected shape {shape}, got {arrays[name].shape}")
     reset = _check_numbers("state", arrays)
-    arrays["limb_settings"] = arrays["limb_settings"].copy()  # the caller's
-    arrays["limb_settings"][:, _FIRST_ROW] = memory.limb_settings[:, _FIRST_ROW]  # an address
+    # `first_row` addresses the tables: never taken from outside; a copy, because the array is the caller's
+    arrays["limb_settings"] = arrays["limb_settings"].copy()
+    arrays["limb_settings"][:, _FIRST_ROW] = memory.limb_settings[:, _FIRST_ROW]
     return arrays, reset
 
 
 def check_column(column: Memory, settings: Floats) -> None:
-    """Refuse a column that cannot be gone on from, as `read_state` does a state, and put into it where the
-    legs' tables are, which is an address, from an engine's `settings` of legs."""
+    """Check a column as `read_state` checks a state, and set the rows that address the legs' tables from an
+    engine's `settings` of legs."""
     _check_numbers("column", {name: getattr(column, name) for name in STATE})
     column.limb_settings[:, _FIRST_ROW] = settings[:, _FIRST_ROW]
 
 
 def _check_numbers(title: str, arrays: Mapping[str, Floats]) -> NDArray[np.bool_]:
-    """Which environments were ever reset; `ParameterError` where a number of theirs is not finite, or a place
-    or an angle too far away to be looked up."""
+    """Return a mask of the environments that were ever reset. Raise `ParameterError` if a number of theirs is
+    not finite, or a place or an angle is too large for the tables."""
     trunk = arrays["trunk"]
     limbs = arrays["limbs"]
     reset: NDArray[np.bool_] = np.ones(trunk.shape[-1], bool)
     places = trunk[_PLACES], limbs[:, _ANGLES]
     squares = sum(float(np.vdot(part, part)) for part in arrays.values())
     farthest = max(float(np.vdot(part, part)) for part in places)
-    if not (math.isfinite(squares) and farthest <= MAX_STATE**2):  # else all is good, found in no time
+    # two sums of squares tell quickly that all is good; only otherwise each array is searched
+    if not (math.isfinite(squares) and farthest <= MAX_STATE**2):
         reset = np.logical_not(np.isnan(trunk).all(0) & np.isnan(limbs).all((0, 1)))
         for name in STATE:
             finite(f"{title}[{name!r}]", arrays[name][..., reset])
@@ -433,13 +483,14 @@ def _check_numbers(title: str, arrays: Mapping[str, Floats]) -> NDArray[np.bool_
 
 
 def identity_of(scene: Mechanics, filters: FilterSettings, **numbers: float) -> dict[str, Any]:
-    """Everything on which the bits of a run depend, by name, as values that JSON can hold."""
+    """Return all settings on which the bits of a run depend, by name, as values that JSON can hold."""
     identity: dict[str, Any] = {**numbers, "integrator": scene.integrator}
     for name, part in (("trunk", scene.trunk), ("ground", scene.ground), ("filters", filters)):
         identity |= {f"{name}.{key}": value for key, value in asdict(part).items()}
     identity["terrain"] = _digest(scene.terrain.to_dict())
+    # settings at their default are left out, as in states from before the setting existed
     if scene.trunk.length is None:
-        del identity["trunk.length"]  # as in states from before there was one
+        del identity["trunk.length"]
     if scene.features.harmonics > 1:
         identity["harmonics"] = scene.features.harmonics
     if scene.motion_limits:
@@ -456,7 +507,7 @@ def identity_of(scene: Mechanics, filters: FilterSettings, **numbers: float) -> 
 
 
 def _differences(expected: dict[str, Any], given: dict[str, Any]) -> str:
-    """Where two layouts differ, for people; empty if nowhere."""
+    """Return a sentence that says where two layouts differ; empty if nowhere."""
     if expected == given:
         return ""
     names = [name for name in {**expected, **given} if expected.get(name) != given.get(name)]

@@ -1,5 +1,5 @@
-"""What is measured of the motion: drive torques and powers, where the energy went, stances; see `mechanics`.
-Behind that the rule of a stance for other solvers.
+"""Measured quantities of the motion: drive torques and powers, energy account, stances; see `mechanics`. At
+the end the rule of a stance for other solvers.
 
 A stance opens when the normal force on the hoof rises above a threshold, as on a force plate. It closes when
 the force falls below it (lift-off), or after one crank revolution, whichever comes first, so that a hoof that
@@ -7,9 +7,10 @@ never lifts has a peak every revolution. While it is open its peak is the highes
 force of any step; its increases add up to that peak. Its loading rate is the steepest rise of the normal
 force from one step to the next among the steps that raise the peak.
 
-The running peak is the highest force so far, but never more than twice the present one: what rises, falls by
+The running peak is the highest force so far, but at most twice the present one: a force that rises, falls by
 more than half and rises again is charged again, whether the hoof lifts or not, and a stance with one peak is
-charged just that."""
+charged just that.
+"""
 
 from __future__ import annotations
 
@@ -26,28 +27,29 @@ from hoof_env.simd import absolute, block_at, dot, maximum, minimum, perpendicul
 from hoof_env.simd.compile import inline_llvm
 
 REVOLUTION = 2 * math.pi
+"""One revolution of the crank [rad]."""
 
 
 @inline_llvm
 def find_drives(trunk, leg):  # type: ignore[no-untyped-def]
-    """Torques and powers of crank and swing from the accelerations (E2 to E4 in docs/engine.md)."""
+    """Compute torques and powers of crank and swing from the accelerations (E2 to E4)."""
     w = leg.theta_rate
     acc = leg.theta_acceleration
     k = leg.beta_by_theta
     sway = leg.swing_rate
     frame = leg.frame_inertia
     pitch_acc = trunk.pitch_acceleration
-    coupling = leg.crank_coupling - k * frame
-    turning = pitch_acc + k * acc
+    coupling = leg.crank_coupling - k * frame  # b
+    turning = pitch_acc + k * acc  # beta_tt of (E1) without sway_t, which is in the rest moments
     lift = trunk.acceleration + pitch_acc * perpendicular(leg.hip)
-    by_frame = (
+    by_frame = (  # (E3) - Q_beta
         coupling * acc
         + frame * turning
         + leg.rest_moment_beta
         + dot(lift, perpendicular(leg.first_moment))
         - leg.ground_moment_beta
     )
-    needed = (
+    needed = (  # (E2) - Q_theta
         (leg.functions.crank_inertia + leg.settings.rotor_crank) * acc
         + coupling * turning
         + leg.rest_moment_theta
@@ -55,10 +57,12 @@ def find_drives(trunk, leg):  # type: ignore[no-untyped-def]
         - leg.ground_moment_theta
     )
     is_motor = leg.settings.is_motor > 0.0
+    # (E4) if prescribed; the servo's torque otherwise
     torque = where(is_motor, leg.crank_torque, needed)
     leg.frame_torque = by_frame
     leg.crank_torque = torque
     leg.crank_power = torque * w
+    # of a motor-driven leg the gear transmits the part k w, which is in the crank's power
     leg.swing_power = by_frame * where(is_motor, sway, k * w + sway)
 
 
@@ -88,17 +92,17 @@ def keep_account(trunk, legs, leg_count, model, account, weight):  # type: ignor
         account.friction_loss = add(account.friction_loss, -weight * rubbed, lanes_are_legs)
         account.impulse = add(account.impulse, weight * leg.ground_force, lanes_are_legs)
         if model.form.springs:
-            bent = 0.0 * stored
+            elastic = 0.0 * stored
             lost = 0.0 * stored
             for k in range(model.form.springs):
                 stiffness = leg.settings.hoof_stiffness[k]
                 damping = leg.settings.hoof_damping[k]
                 toe = leg.toe.deflection_rate[k]
                 heel = leg.heel.deflection_rate[k]
-                bent = bent + stiffness * (leg.toe.deflection[k] * toe + leg.heel.deflection[k] * heel)
+                elastic = elastic + stiffness * (leg.toe.deflection[k] * toe + leg.heel.deflection[k] * heel)
                 lost = lost + damping * (toe * toe + heel * heel)
-            # once a leg, so that legs are added in one order
-            account.hoof[0] = add(account.hoof[0], weight * bent, lanes_are_legs)
+            # one sum per leg, so that the order of additions is the same where lanes are legs
+            account.hoof[0] = add(account.hoof[0], weight * elastic, lanes_are_legs)
             account.hoof[1] = add(account.hoof[1], weight * lost, lanes_are_legs)
 
 
@@ -145,7 +149,7 @@ def report_point(point, place, report):  # type: ignore[no-untyped-def]
 
 @inline_llvm
 def count_stride(trunk, leg, form, h):  # type: ignore[no-untyped-def]
-    """Add a whole step of `h` [s] that ends here."""
+    """Update the open stance and the sums with a whole step of `h` [s] that ends here."""
     find_drives(trunk, leg)
     push = leg.ground_force
     load = leg.toe.normal_force + leg.heel.normal_force
@@ -153,6 +157,7 @@ def count_stride(trunk, leg, form, h):  # type: ignore[no-untyped-def]
     loaded = load > leg.settings.lift_off
     was_open = (leg.strides.stance_open > 0.0) & (leg.state.theta - leg.strides.stance_began < REVOLUTION)
     goes_on = loaded & was_open
+    # 1 in the first step of a stance; a stance longer than a revolution is followed by another
     begins = where(loaded, 1.0, 0.0) - where(goes_on, 1.0, 0.0)
     peak = where(goes_on, leg.strides.stance_peak, 0.0)
     higher = where(loaded, maximum(peak, force), 0.0)
@@ -176,7 +181,7 @@ def count_stride(trunk, leg, form, h):  # type: ignore[no-untyped-def]
     leg.sums.normal_impulse = leg.sums.normal_impulse + h * load
     down = load > 0.0
     leg.sums.loaded_time = leg.sums.loaded_time + where(down, h, 0.0)
-    per_load = h / where(down, load, 1.0)
+    per_load = h / where(down, load, 1.0)  # 1 avoids a division by 0; the result is not used there
     slid = leg.toe.normal_force * leg.toe.sliding_speed + leg.heel.normal_force * leg.heel.sliding_speed
     leg.sums.travel = leg.sums.travel - where(down, slid * per_load, 0.0)
     rubbed = leg.toe.normal_force * absolute(leg.toe.sliding_speed)
@@ -190,21 +195,28 @@ def count_stride(trunk, leg, form, h):  # type: ignore[no-untyped-def]
 
 @dataclass
 class StanceCounter:
-    """Stances and running peak of one leg so far."""
+    """Stances and running peak of one leg so far, by the rule of `count_stride`."""
 
     threshold: float  # normal force that tells stance from swing [N]
-    is_open: bool = False  # whether the hoof is in stance
+    is_open: bool = False  # true if the hoof is in stance
     began: float = 0.0  # crank angle where the last stance opened [rad]
     peak: float = 0.0  # highest resultant force of the open stance [N], 0 between stances
     steepest: float = 0.0  # rise of the normal force while that peak grew [N/s]
     load: float = 0.0  # normal force of the last substep [N]
-    running: float = 0.0  # peak [N]
-    count: int = 0  # how many have opened
+    running: float = 0.0  # running peak [N]
+    count: int = 0  # number of stances that have opened
 
     def add(self, theta: float, normal: float, force: float, h: float = math.inf) -> tuple[float, ...]:
-        """Take the next substep: crank angle [rad], normal and resultant force on the hoof [N], and its
-        length [s]. Returns how much the stance's peak [N], the running peak [N] and the steepest rise [N/s]
-        have grown."""
+        """Take the next substep.
+
+        Args:
+            theta: crank angle [rad].
+            normal, force: normal and resultant force on the hoof [N].
+            h: length of the substep [s].
+
+        Returns:
+            Increases of the stance's peak [N], of the running peak [N] and of the steepest rise [N/s].
+        """
         loaded = normal > self.threshold
         goes_on = loaded and self.is_open and theta - self.began < REVOLUTION
         before, steepest = (self.peak, self.steepest) if goes_on else (0.0, 0.0)
@@ -222,23 +234,25 @@ class StanceCounter:
 
 
 def stance_figures(sums: Mapping[str, Floats], seconds: ArrayLike, turns: ArrayLike) -> dict[str, Floats]:
-    """Figures of limbs from sums of `TrunkEngine.strides` over some time, each shape (legs, num_envs).
+    """Return figures of limbs from sums of `TrunkEngine.strides` over some time, each of shape (legs,
+    num_envs).
 
     Args:
-        sums: by name, added up over the calls of `advance`.
-        seconds: that they are about [s].
-        turns: of the cranks meanwhile [-], shape as of the sums.
+        sums: sums by name, added up over the calls of `advance`.
+        seconds: duration of these calls [s].
+        turns: revolutions of the cranks meanwhile [-], shape as of the sums.
 
     Returns:
         "peak", mean of the stances' highest resultant forces, and "mean", of the normal force while the hoof
         bears load [N]; "duty", part of the time that it does [-]; "stances_per_turn" [-]; "slip" of a
         stance [m]; and of an engine with limits "braking" and "propulsion", mean horizontal forces backward
-        and forward while the hoof bears load [N]. Not a number where there was no stance.
+        and forward while the hoof bears load [N]. NaN where there was no stance.
     """
     with np.errstate(divide="ignore", invalid="ignore"):
+        # NaN instead of 0: 0 / 0
         stances = sums["stances"] / (sums["stances"] > 0)
         loaded = sums["loaded_time"]
-        found = {
+        figures = {
             "peak": sums["peak_grf_increase"] / stances,
             "mean": sums["normal_impulse"] / loaded,
             "duty": loaded / np.asarray(seconds),
@@ -246,5 +260,5 @@ def stance_figures(sums: Mapping[str, Floats], seconds: ArrayLike, turns: ArrayL
             "slip": sums["slip"] / stances,
         }
         if "braking" in sums:
-            found |= {name: sums[name] / loaded for name in ("braking", "propulsion")}
-    return found
+            figures |= {name: sums[name] / loaded for name in ("braking", "propulsion")}
+    return figures

@@ -1,9 +1,9 @@
-"""What an engine is made of: a trunk, legs in their places on it, and what turns their cranks; and what it
-says of a run.
+"""Parts of an engine: a trunk, legs in their places on it, and the drives of their cranks; results of a run.
 
 A prescribed drive is the paper's: the crank angle is a function of time and of the commands, whatever torque
 that takes. A motor is a speed servo with a torque limit, a rotor and a gear, so that a ground force slows the
-crank. In both the swing is a function of the crank angle and of the gait parameters."""
+crank. In both the swing is a function of the crank angle and of the gait parameters.
+"""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ from hoof_env.leg.geometry import Geometry
 from hoof_env.leg.profile import LegProfile
 
 GRAVITY = 9.81
-"""[m/s^2], as in the paper's Table 1."""
+"""Acceleration of gravity [m/s^2], as in the paper's Table 1."""
 
 TRUNKS = ("fixed", "rail", "suspended", "free")
 """Kinds of trunk; the kernels take the position in this tuple."""
@@ -31,27 +31,27 @@ TRUNKS = ("fixed", "rail", "suspended", "free")
 FIXED, RAIL, SUSPENDED, FREE = range(4)
 
 ONE_LEG = TRUNKS[:FREE]
-"""The kinds of the environments: a free trunk on one leg is no task."""
+"""Kinds of trunk of the environments of one leg, which could not balance a free trunk."""
 
 
 @dataclass(frozen=True)
 class Trunk:
-    """The trunk over one leg, or over several; with one, O, the crank centre, is its point by default.
+    """Trunk over one leg, or over several; with one leg, O, the crank centre, is its point by default.
 
-    "fixed": O stays where it is. "rail": O slides along x at fixed height. "suspended": O moves along x and
-    y; the leg must bear `share` of the weight of trunk and leg, the rest of the animal carries the other part
+    "fixed": O stays in place. "rail": O slides along x at fixed height. "suspended": O moves along x and y;
+    the leg must bear `share` of the weight of trunk and leg, the rest of the animal carries the other part
     and adds a vertical spring and damper towards `height`. These three do not pitch. "free": the trunk moves
     along x and y and pitches, under its weight, its drag and its legs.
 
     Attributes:
         kind: one of `TRUNKS`.
-        mass: trunk mass that goes with the legs [kg], without their own.
+        mass: trunk mass without the legs [kg].
         share: part of the weight that the leg must bear, 0 to 1; "suspended" only.
         stiffness, damping: vertical spring [N/m] and damper [N s/m]; "suspended" only.
         drag: resistance to forward motion [N s/m].
         height: height of O above the ground [m] where the spring is at rest, of the rail, or at a start.
-        pitch_inertia: of the trunk about its centre of mass [kg m^2]; "free" only.
-        length: of the trunk [m], whose ends hips must not be beyond; None knows no ends.
+        pitch_inertia: moment of inertia of the trunk about its centre of mass [kg m^2]; "free" only.
+        length: length of the trunk [m]; no hip may be beyond its ends. None is unlimited.
 
     Raises:
         ParameterError: an unknown kind or a value out of range.
@@ -82,24 +82,24 @@ class Trunk:
 
 @dataclass(frozen=True)
 class Prescribed:
-    """The crank follows the filtered command exactly (the paper's driver, row 42 of Eq. 2)."""
+    """Drive of a crank that follows the filtered command exactly (the paper's driver, row 42 of Eq. 2)."""
 
 
 LARGEST = 1e9
-"""Of each number of a motor, whose squares are then numbers still."""
+"""Largest motor parameter; its square must stay finite."""
 
 
 @dataclass(frozen=True)
 class Motor:
-    """A speed servo: torque = speed_gain (commanded - actual crank speed), limited to +-torque_limit.
+    """Speed servo: torque = speed_gain (commanded - actual crank speed), limited to +-torque_limit.
 
-    The rotor sits on the leg's frame, turns `gear_ratio` times as fast as the crank and in the same sense;
-    what it adds to the crank's inertia is gear_ratio^2 rotor_inertia.
+    The rotor sits on the leg's frame, turns `gear_ratio` times as fast as the crank and in the same sense; it
+    adds gear_ratio^2 rotor_inertia to the crank's inertia.
 
     Attributes:
-        speed_gain: [N m s/rad], at the crank.
-        torque_limit: [N m], at the crank.
-        rotor_inertia: of the rotor about its axis [kg m^2].
+        speed_gain: torque per error of the speed, at the crank [N m s/rad].
+        torque_limit: largest torque, at the crank [N m].
+        rotor_inertia: moment of inertia of the rotor about its axis [kg m^2].
         gear_ratio: turns of the rotor for one of the crank [-].
 
     Raises:
@@ -117,7 +117,7 @@ class Motor:
 
     @property
     def reflected_inertia(self) -> float:
-        """What the rotor adds to the inertia of the crank [kg m^2]."""
+        """Inertia of the rotor as seen at the crank [kg m^2]."""
         return self.gear_ratio**2 * self.rotor_inertia
 
 
@@ -126,19 +126,21 @@ Drive = Prescribed | Motor
 
 @dataclass(frozen=True)
 class HoofSpring:
-    """A massless spring and damper at each hoof point, in series between the leg and the ground.
+    """Massless spring and damper at each hoof point, in series between the leg and the ground.
 
     Its axes are the normal and the tangent of the ground under the point. The sole, which touches the ground,
-    has no mass: along the normal, spring and damper carry what Eq. 14 gives at the sole's penetration, along
-    the tangent no more than Coulomb's friction coefficient times that; up to there the sole stands still, for
-    no sliding speed is needed to have friction. Thresholds of the ground's friction law have no part in it.
+    has no mass. Along the normal, spring and damper carry the force of Eq. 14 at the sole's penetration.
+    Along the tangent they carry at most Coulomb's friction coefficient times that; up to there the sole
+    stands still, because friction needs no sliding speed. The thresholds of the ground's friction law are not
+    used.
 
     Attributes:
         stiffness, damping: along the normal [N/m, N s/m].
-        tangential_stiffness, tangential_damping: along the tangent; None is the same as along the normal.
+        tangential_stiffness, tangential_damping: along the tangent; None is the value along the normal.
 
     Raises:
-        ParameterError: a value is not positive and finite: without damping a massless sole has no speed.
+        ParameterError: a value is not positive and finite: without damping the speed of a massless sole is
+            undefined.
     """
 
     stiffness: float
@@ -151,14 +153,15 @@ class HoofSpring:
             value = check_number(
                 f"hoof_spring.{name}", getattr(self, name), low=0, high=1e12, exclusive_low=True
             )
-            other = getattr(self, f"tangential_{name}")
-            other = value if other is None else other
-            check_number(f"hoof_spring.tangential_{name}", other, low=0, high=1e12, exclusive_low=True)
-            object.__setattr__(self, f"tangential_{name}", other)
+            tangential = getattr(self, f"tangential_{name}")
+            tangential = value if tangential is None else tangential
+            check_number(f"hoof_spring.tangential_{name}", tangential, low=0, high=1e12, exclusive_low=True)
+            # the dataclass is frozen: `__post_init__` cannot assign
+            object.__setattr__(self, f"tangential_{name}", tangential)
 
     @classmethod
     def with_ratio(cls, stiffness: float, mass: float, ratio: float = 0.1) -> HoofSpring:
-        """The spring whose damping has this ratio to the critical one of a mass on it [kg]."""
+        """Return the spring with this ratio of its damping to the critical damping of a mass on it [kg]."""
         for name, value in (("stiffness", stiffness), ("mass", mass), ("ratio", ratio)):
             check_number(f"hoof_spring.{name}", value, low=0, high=1e12, exclusive_low=True)
         return cls(stiffness, 2 * ratio * math.sqrt(stiffness * mass))
@@ -166,12 +169,12 @@ class HoofSpring:
 
 @dataclass(frozen=True)
 class Limits:
-    """Where a motion should end, see `Result`; infinite bounds hold nothing back.
+    """Limits of a motion, see `Result`; infinite bounds limit nothing.
 
     Attributes:
-        pitch: lowest and highest [rad].
-        height: of the trunk's centre of mass above the ground, lowest and highest [m].
-        clearance: of all joints but the hoof's corners above the ground, at least [m].
+        pitch: lowest and highest pitch [rad].
+        height: lowest and highest height of the trunk's centre of mass above the ground [m].
+        clearance: least height above the ground of all joints except the hoof's corners [m].
 
     Raises:
         ParameterError: a bound is not a number, or the lower one is not the lower one.
@@ -183,21 +186,23 @@ class Limits:
 
     def __post_init__(self) -> None:
         for name in ("pitch", "height"):
-            given = getattr(self, name)
+            bounds = getattr(self, name)
             try:
-                low, high = (float(value) for value in given)
+                low, high = (float(value) for value in bounds)
             except (TypeError, ValueError):
                 low = high = math.nan
+            # false for NaN, too
             if not low < high:
-                raise ParameterError(f"limits.{name}: expected a lower and a higher bound, got {given!r}")
+                raise ParameterError(f"limits.{name}: expected a lower and a higher bound, got {bounds!r}")
             object.__setattr__(self, name, (low, high))
+        # bool is a kind of int to Python, but True is no height
         least: Any = self.clearance
         if isinstance(least, bool) or not isinstance(least, (int, float, np.number)) or math.isnan(least):
             raise ParameterError(f"limits.clearance: expected a number, got {least!r}")
 
 
 MAX_HIP_OFFSET = 1e3
-"""Of O from the trunk's centre of mass [m]."""
+"""Largest distance of O from the trunk's centre of mass along x and along y [m]."""
 
 
 @dataclass(frozen=True)
@@ -205,10 +210,10 @@ class Limb:
     """One leg on a trunk.
 
     Attributes:
-        geometry: the leg.
-        hip: where the crank centre O sits on the trunk, from the trunk's centre of mass [m], forward and up.
-        drive: what turns its crank.
-        spring: of the hoof; None is a rigid one.
+        geometry: links and masses of the leg.
+        hip: place of the crank centre O on the trunk, from the trunk's centre of mass [m], forward and up.
+        drive: drive of its crank.
+        spring: spring of the hoof; None is a rigid hoof.
 
     Raises:
         ParameterError: a part is of the wrong type, not finite, or the hip beyond `MAX_HIP_OFFSET`.
@@ -234,6 +239,7 @@ class Limb:
             ) from None
         for k, value in enumerate((x, y)):
             check_number(f"limb.hip[{k}]", value, low=-MAX_HIP_OFFSET, high=MAX_HIP_OFFSET)
+        # a tuple of floats can be hashed and stored as JSON, unlike an array
         object.__setattr__(self, "hip", (float(x), float(y)))
 
 
@@ -253,8 +259,9 @@ class Mechanics:
 
 
 class Reactions(NamedTuple):
-    """What joints and drives do to the links, in the world (x forward, y up, counter-clockwise); a motor's
-    rotor is not among the links. Shapes are of `ConstrainedLeg`; `TrunkEngine` gives (legs, ..., num_envs).
+    """Forces and moments of joints and drives on the links, in the world (x forward, y up,
+    counter-clockwise); a motor's rotor is not among the links. Shapes are those of `ConstrainedLeg`;
+    `TrunkEngine` returns (legs, ..., num_envs).
 
     Attributes:
         joints: force on body `i` of each `Joint(point, i, j)` of `linkage.JOINTS`, shape (20, 2) [N]; body
@@ -271,7 +278,7 @@ class Reactions(NamedTuple):
 
 
 class Tally(NamedTuple):
-    """What all bodies add up to, shape (num_envs,) each."""
+    """Sums over all bodies of an engine, shape (num_envs,) each."""
 
     centre: Any  # common centre of mass, complex [m]
     momentum: Any  # complex [kg m/s]
@@ -281,7 +288,8 @@ class Tally(NamedTuple):
 
 
 class Result(IntEnum):
-    """Outcome of an advance. Those from PITCH on are of `Limits`: the motion goes on, its state is kept."""
+    """Outcome of an advance. Values from PITCH on are violated `Limits`: the motion continues, its state is
+    kept."""
 
     OK = 0
     NOT_FINITE = 1
@@ -294,12 +302,13 @@ class Result(IntEnum):
 
     @property
     def message(self) -> str:
-        """What happened, for people."""
+        """Sentence that describes the outcome."""
         return _MESSAGES[self]
 
 
 def broken(results: NDArray[Any]) -> NDArray[np.bool_]:
-    """Which outcomes, values of `Result`, are of what could not be simulated, so that nothing happened."""
+    """Return a mask of the outcomes, values of `Result`, that mean that an environment could not be simulated
+    and kept its old state."""
     return (results != Result.OK) & (results < Result.PITCH)
 
 

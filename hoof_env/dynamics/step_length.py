@@ -1,5 +1,5 @@
-"""How long a step may be under these legs on this ground: `ground.stiffness` with the masses that hoofs set
-against it, the servos of the motors, and what holds the trunk.
+"""Longest step for these legs on this ground: `ground.stiffness` with the masses that hooves set against it,
+the servos of the motors, and the support of the trunk.
 
 Slow touch-downs decide on damping: Eq. 14 divides by the approach speed, down to `Ground.approach_floor`. A
 horse of 349 kg walks with restitution 0.5, midpoint, sim_dt = 1 ms, 24 starts of 0.5 s. For floors of 1e-2,
@@ -8,7 +8,7 @@ to 2e-4 and 2e-6 of the work from 5 and 20 substeps on; with the third it misses
 1 and 2 some starts end as NOT_FINITE.
 
 A servo decays with its gain over the inertia of its crank. With gains of 1e3 to 1e4 N m s/rad a crank in the
-air follows its command in all schemes at twice the limit here; from 2.6 times on some run away.
+air follows its command in all schemes at twice the limit here; from 2.6 times on some diverge.
 """
 
 from __future__ import annotations
@@ -27,13 +27,14 @@ from hoof_env.ground.stiffness import LARGEST_ANGLE, SCHEME_LIMITS, ContactRates
 from hoof_env.leg.profile import LegProfile, by_name
 
 ANGLES = 48
-"""Crank angles at which masses and inertias are looked at."""
+"""Number of crank angles at which masses and inertias are evaluated."""
 
 FAST = 0.1
 """Speed of a fast touch-down [m/s], which goes deep."""
 
 HARD = 2.0
-"""Of a hard one, as of a trotting horse's fore hoof [m/s]: the less the ground damps a sole without mass."""
+"""Speed of a hard touch-down, as of a trotting horse's fore hoof [m/s]; there the ground damps a massless
+sole least."""
 
 Functions = dict[str, Floats]
 
@@ -44,31 +45,31 @@ CAUSES = {
     "servo": "the speed gain of a motor and the inertia of its crank",
     "support": "spring, damper or drag of the trunk",
 }
-"""Causes that the choice of substeps heeds, for people. "friction" is not one: past its limit a standing hoof
-slides to and fro, but nothing blows up."""
+"""Sentence for each cause that the choice of substeps obeys. "friction" is not one: past its limit a standing
+hoof slides to and fro, but nothing diverges."""
 
 MOST_NEEDED = 10**12
-"""Where more substeps of a step would be needed, the settings are refused."""
+"""Largest number of substeps of a step that settings may need; beyond it they are refused."""
 
 MOST_SUBSTEPS = 50
-"""So many are chosen at most; where that is not enough, a warning says so."""
+"""Largest number of substeps that is chosen; a warning says if it is not enough."""
 
 FLOORS = tuple(digit * 10.0**power for power in range(-6, 1) for digit in (1, 2, 5))
 """Approach floors that a warning may propose [m/s]."""
 
 
 class StepWarning(UserWarning):
-    """The time step is too long for the ground, the motors or what holds the trunk."""
+    """Warning that the time step is too long for the ground, the motors or the trunk's support."""
 
 
 class StepLength(Mechanics):
-    """What decides on the step."""
+    """Mechanics with the longest step that each of its parts allows."""
 
     @cached_property
     def limits(self) -> dict[str, float]:
         """Longest step [s] for each cause, infinite where there is none: "elastic", "damping" and "friction"
-        of the ground (`ground.stiffness`), "hoof" of its springs, "servo" of the motors, "support" of
-        what holds or drags the trunk."""
+        of the ground (`ground.stiffness`), "hoof" of the hooves' springs, "servo" of the motors, "support" of
+        spring, damper and drag of the trunk."""
         trunk = self.trunk
         decay = SCHEME_LIMITS[self.integrator].decay
         mass = trunk.mass + sum(limb.geometry.mass for limb in self.limbs)
@@ -83,10 +84,18 @@ class StepLength(Mechanics):
         }
 
     def choose(self, sim_dt: float, asked: int | None, stacklevel: int = 3) -> int:
-        """Into how many parts `sim_dt` [s] is cut: those asked for, or those needed, up to `MOST_SUBSTEPS`;
-        warns if these are too few."""
+        """Return the number of substeps of `sim_dt` [s]: as asked, else as many as are needed, at most
+        `MOST_SUBSTEPS`.
+
+        Raises:
+            ParameterError: more than `MOST_NEEDED` substeps would be needed.
+
+        Warns:
+            StepWarning: the number is too small.
+        """
         cause = min(CAUSES, key=self.limits.__getitem__)
         limit = self.limits[cause]
+        # true for a limit that is NaN, too
         if not sim_dt / MOST_NEEDED <= limit:
             raise ParameterError(
                 f"{CAUSES[cause]}: expected settings that steps of {sim_dt / MOST_NEEDED:g} s can follow, "
@@ -109,7 +118,7 @@ class StepLength(Mechanics):
         return chosen
 
     def _bearable_floor(self, step: float) -> float | None:
-        """The smallest of `FLOORS` with which damping bears a step [s]."""
+        """Return the smallest of `FLOORS` with which damping allows a step [s]; None if there is none."""
         for floor in FLOORS:
             if self._ground_limits(replace(self.ground, approach_floor=floor))["damping"] >= step:
                 return floor
@@ -126,7 +135,9 @@ class StepLength(Mechanics):
                     if name == "hoof" or np.isfinite(sinks):
                         limits[name] = min(limits[name], longest)
                 continue
+            # fast touch-downs go deep, slow ones are damped strongly: either may need the shorter step
             for speed in {FAST, ground.approach_floor}:
+                # `contact_rates` refuses infinite masses; the limits of a point that cannot move are dropped
                 mass = min(sinks, whole)
                 sliding_mass = min(slides, whole)
                 rates = contact_rates(ground, mass, load, speed, sliding_mass, self.terrain)
@@ -138,40 +149,42 @@ class StepLength(Mechanics):
     def _spring_limits(
         self, ground: Ground, spring: HoofSpring, masses: tuple[float, float], load: float
     ) -> dict[str, float]:
-        """The same of a hoof with a spring, on masses [kg] that it sets against forces along the ground and
-        into it."""
+        """Return the limits of a hoof with a spring, on masses [kg] that it sets against forces along the
+        ground and into it."""
         slides, sinks = masses
         k = spring.tangential_stiffness or 0.0
         c = spring.tangential_damping or 0.0
         along = ContactRates(math.sqrt(k / slides), c / slides, 0.0, 1.0)
-        found = [along]
+        all_rates = [along]
         soles = [k / c]
         for speed in {FAST, ground.approach_floor, HARD}:
             vertical = (spring.stiffness, spring.damping)
             rates, sole = spring_rates(ground, vertical, sinks, load, speed, self.terrain)
-            found.append(rates)
+            all_rates.append(rates)
             soles.append(sole)
-        steps = [rates.longest_steps(self.integrator, self.step_error) for rates in found]
+        steps = [rates.longest_steps(self.integrator, self.step_error) for rates in all_rates]
         limits = {name: min(step[name] for step in steps) for name in ("elastic", "damping")}
         return limits | {"hoof": SCHEME_LIMITS[self.integrator].decay / max(soles)}
 
     @cached_property
     def _masses(self) -> list[tuple[float, float]]:
         """Smallest masses [kg] that each leg sets against a force along the ground and against one into it,
-        toe or heel, the hoof in its lower half; infinite where it cannot be moved."""
-        found = []
+        at toe or heel, while the hoof is in its lower half; infinite where it cannot be moved."""
+        masses = []
         is_level = len(set(self.terrain.height)) == 1
         for limb, profile in zip(self.limbs, self.profiles, strict=True):
             value, slope = map(by_name, _samples(profile))
             lower = np.minimum(value["toe_y"], value["heel_y"])
             low = lower <= np.median(lower)
             x, y = (float(np.max(self._mobility(limb, value, slope, axis)[low])) for axis in "xy")
+            # on a slope the normal may point in any direction
             slides, sinks = (x, y) if is_level else (max(x, y), max(x, y))
-            found.append((_over(1.0, slides), _over(1.0, sinks)))
-        return found
+            masses.append((_over(1.0, slides), _over(1.0, sinks)))
+        return masses
 
     def _mobility(self, limb: Limb, value: Functions, slope: Functions, axis: str) -> Floats:
-        """Larger acceleration of toe and heel per force along x or y [1/kg], for each crank angle."""
+        """Return the larger acceleration of toe and heel per force along x or y [1/kg], for each crank
+        angle."""
         trunk = self.trunk
         across = "y" if axis == "x" else "x"
         mobility = np.zeros((2, len(value["toe_x"])))
@@ -187,15 +200,16 @@ class StepLength(Mechanics):
         return mobility.max(0)
 
     def _servo_rate(self) -> float:
-        """Largest rate [1/s] of a motor's servo: its gain over the crank's inertia where trunk and frame of
-        the leg give way, whatever the gait."""
+        """Return the largest rate [1/s] of a motor's servo: its gain over the crank's inertia where trunk and
+        frame of the leg yield, with any gait."""
         rates = [0.0]
         for limb, profile in zip(self.limbs, self.profiles, strict=True):
             if isinstance(limb.drive, Motor):
                 f = by_name(_samples(profile)[0])
                 motor = limb.drive
                 side = limb.geometry.travel
-                matrix = np.zeros((len(f["toe_x"]), 4, 4))  # of crank, frame, x and y
+                # mass matrix of crank, frame, x and y, in the leg's frame; only its upper triangle at first
+                matrix = np.zeros((len(f["toe_x"]), 4, 4))
                 matrix[:, 0, 0] = f["crank_inertia"] + motor.reflected_inertia
                 matrix[:, 0, 1] = f["coupling"] - side * motor.gear_ratio * motor.rotor_inertia
                 matrix[:, 1, 1] = f["frame_inertia"] + motor.rotor_inertia
@@ -214,7 +228,8 @@ def _over(a: float, b: float) -> float:
 
 
 def _samples(profile: LegProfile) -> tuple[Floats, Floats]:
-    """Functions and derivatives at `ANGLES` crank angles, without those that have none."""
+    """Return functions and derivatives at `ANGLES` crank angles, except angles at which the linkage does not
+    close."""
     value, slope = profile(np.arange(ANGLES) * 2 * np.pi / ANGLES)
     known = np.isfinite(value[:, 0])
     return value[known], slope[known]

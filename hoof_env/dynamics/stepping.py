@@ -1,4 +1,4 @@
-"""One step in time, by an explicit scheme; see `mechanics`.
+"""One step in time by an explicit scheme; see `mechanics`.
 
 In a scheme each stage takes the derivatives of the one before: stage j + 1 is taken at fraction a_j of the
 step, from the step's start with the derivatives f_j of stage j,
@@ -6,7 +6,8 @@ step, from the step's start with the derivatives f_j of stage j,
     y_(j+1) = y_0 + a_j h f_j,    y(t + h) = y_0 + h sum of w_j f_j,
 
 which needs one derivative in memory and one sum. Semi-implicit Euler has one stage and moves the coordinates
-with the new rates. Source: Hairer, Norsett & Wanner, Solving Ordinary Differential Equations I."""
+with the new rates. Source: Hairer, Norsett & Wanner, Solving Ordinary Differential Equations I.
+"""
 
 from __future__ import annotations
 
@@ -24,18 +25,20 @@ from hoof_env.simd.math import clip
 
 @inline_llvm
 def filter_accelerations(leg, count, settings):  # type: ignore[no-untyped-def]
-    """Accelerations of the command filters: bounded, towards a bounded rate, towards the command."""
+    """Set the accelerations of the command filters: bounded, towards a bounded rate, towards the command."""
     for k in range(count):
         gain = settings[3 * k]
         rate_bound = settings[3 * k + 1]
         acc_bound = settings[3 * k + 2]
+        # a cascade: the outer loop asks for a rate, the inner one, `INNER` times as fast, follows it
         wanted = clip(gain * (leg.command[k] - leg.state.gait[k]), rate_bound)
         leg.gait_acceleration[k] = clip(INNER * gain * (wanted - leg.state.gait_rate[k]), acc_bound)
 
 
 @inline_llvm
 def advance_rows(kind, to, start, factor, slope):  # type: ignore[no-untyped-def]
-    """to = start + factor slope for all rows that move; two are of the pitch."""
+    """Set to = start + factor slope for all rows that move."""
+    # the last two rows, pitch and spin, move only with a free trunk
     for k in range(MOVING - 2):
         to[k] = start[k] + factor * slope[k]
     if kind == FREE:
@@ -45,7 +48,7 @@ def advance_rows(kind, to, start, factor, slope):  # type: ignore[no-untyped-def
 
 @inline_llvm
 def begin_step(trunk, legs, leg_count, model):  # type: ignore[no-untyped-def]
-    """The first stage is at the state itself."""
+    """Set the first stage to the state itself, and the filters' accelerations for the whole step."""
     if model.kind != FIXED:
         for k in range(MOVING):
             trunk.stage[k] = trunk.state.moving[k]
@@ -66,8 +69,8 @@ def begin_step(trunk, legs, leg_count, model):  # type: ignore[no-untyped-def]
 
 @inline_llvm
 def weigh_stage(trunk, legs, leg_count, model, weight):  # type: ignore[no-untyped-def]
-    """Add the derivatives at the present stage to their means; where the last stage's are those of the step
-    there is nothing to do."""
+    """Add the derivatives at the present stage to their means, if the scheme averages: otherwise the last
+    stage's derivatives are those of the step."""
     if not model.averages or weight == 0.0:
         return
     if model.kind != FIXED:
@@ -81,22 +84,24 @@ def weigh_stage(trunk, legs, leg_count, model, weight):  # type: ignore[no-untyp
 
 @inline_llvm
 def prescribed(leg, elapsed):  # type: ignore[no-untyped-def]
-    """Angle and rate of a prescribed crank `elapsed` [s] into the step, exactly as the filter moves them."""
+    """Return angle and rate of a prescribed crank `elapsed` [s] into the step, exactly as its filter
+    moves."""
     value = leg.state.gait[SPEED]
     rate = leg.state.gait_rate[SPEED]
-    bend = leg.gait_acceleration[SPEED]
-    theta = leg.state.theta + elapsed * (value + elapsed * (0.5 * rate + elapsed * (1 / 6) * bend))
-    return theta, value + elapsed * (rate + 0.5 * elapsed * bend)
+    acceleration = leg.gait_acceleration[SPEED]
+    theta = leg.state.theta + elapsed * (value + elapsed * (0.5 * rate + elapsed * (1 / 6) * acceleration))
+    return theta, value + elapsed * (rate + 0.5 * elapsed * acceleration)
 
 
 @inline_llvm
 def next_stage(trunk, legs, leg_count, model, elapsed):  # type: ignore[no-untyped-def]
-    """Go `elapsed` [s] from the step's start with the derivatives of the present stage."""
+    """Move `elapsed` [s] from the step's start with the derivatives of the present stage."""
     if model.kind != FIXED:
         advance_rows(model.kind, trunk.stage, trunk.state.moving, elapsed, trunk.rates)
     for i in range(leg_count):
         leg = block_at(legs, i)
         is_motor = leg.settings.is_motor > 0.0
+        # a prescribed crank is where its filter says at each stage, not where the scheme would bring it
         angle, spin = prescribed(leg, elapsed)
         leg.theta = where(is_motor, leg.state.theta + elapsed * leg.theta_rate, angle)
         leg.theta_rate = where(is_motor, leg.state.theta_rate + elapsed * leg.theta_acceleration, spin)
@@ -105,7 +110,7 @@ def next_stage(trunk, legs, leg_count, model, elapsed):  # type: ignore[no-untyp
 
 @inline_llvm
 def use_new_rates(trunk, h):  # type: ignore[no-untyped-def]
-    """Semi-implicit Euler: centre and pitch go with the velocities that the step ends with."""
+    """Set the rates of centre and pitch to those at the step's end (semi-implicit Euler)."""
     rates = trunk.rates
     rates.velocity = rates.velocity + h * rates.force * trunk.settings.inverse_mass
     rates.pitch_rate = rates.pitch_rate + h * trunk.pitch_acceleration
@@ -113,7 +118,7 @@ def use_new_rates(trunk, h):  # type: ignore[no-untyped-def]
 
 @inline_llvm
 def end_step(trunk, legs, leg_count, model, h):  # type: ignore[no-untyped-def]
-    """The state a step later; the filters advance exactly."""
+    """Advance the state by a step; the filters advance exactly."""
     if model.kind != FIXED:
         if model.new_rates:
             use_new_rates(trunk, h)
@@ -130,30 +135,31 @@ def end_step(trunk, legs, leg_count, model, h):  # type: ignore[no-untyped-def]
             rate = leg.mean_theta_rate
             acceleration = leg.mean_theta_acceleration
         omega = leg.state.theta_rate + h * acceleration
-        if model.new_rates:
+        if model.new_rates:  # semi-implicit Euler
             rate = omega
         leg.state.theta = where(is_motor, leg.state.theta + h * rate, angle)
         leg.state.theta_rate = where(is_motor, omega, spin)
         end_springs(leg, model.form.springs, model.averages, h)
+        # exact with every scheme: a filter's acceleration is constant during a step
         for k in range(model.form.gait):
             rate = leg.state.gait_rate[k]
-            bend = leg.gait_acceleration[k]
-            leg.state.gait[k] = leg.state.gait[k] + h * (rate + 0.5 * h * bend)
-            leg.state.gait_rate[k] = rate + h * bend
+            gait_acceleration = leg.gait_acceleration[k]
+            leg.state.gait[k] = leg.state.gait[k] + h * (rate + 0.5 * h * gait_acceleration)
+            leg.state.gait_rate[k] = rate + h * gait_acceleration
 
 
 @dataclass(frozen=True)
 class Scheme:
-    """One scheme."""
+    """Coefficients of one explicit scheme, named as in the module's docstring."""
 
     order: int  # of convergence
-    fractions: tuple[float, ...]  # a_j, one less than stages
+    fractions: tuple[float, ...]  # a_j, one fewer than stages
     weights: tuple[float, ...]  # w_j
     new_rates: bool = False  # coordinates move with the rates of the step's end
 
     @property
     def averages(self) -> bool:
-        """Whether a step goes with the mean of several stages' rates, and not with those of the last."""
+        """True if a step uses the mean of several stages' rates, and not those of the last stage."""
         return self.weights[-1] != 1.0
 
 
@@ -165,4 +171,4 @@ SCHEMES = MappingProxyType(
         "rk4": Scheme(4, (1 / 2, 1 / 2, 1.0), (1 / 6, 1 / 3, 1 / 3, 1 / 6)),
     }
 )
-"""The schemes by name."""
+"""Schemes by name."""

@@ -1,4 +1,5 @@
-"""What all bodies of an engine add up to, from their motion and not from what is integrated: an audit."""
+"""Audit of an engine: momentum, spin and energy, added up from the motion of all bodies, not from what is
+integrated."""
 
 from __future__ import annotations
 
@@ -14,19 +15,19 @@ if TYPE_CHECKING:
 
 
 def tally_of(engine: TrunkEngine) -> Tally:
-    """See `TrunkEngine.tally`."""
+    """Return momentum, spin and energy of all bodies at present, see `TrunkEngine.tally`."""
     r = engine.report
     s = engine.state
-    own = engine.trunk
+    trunk = engine.trunk
     place = r["x"] + 1j * r["y"]
     velocity = r["vx"] + 1j * r["vy"]
     pitch_rate = r["pitch_rate"]
     turn = np.exp(1j * s["pitch"])
     # first moment about the origin
-    moment = own.mass * place
-    momentum = own.mass * velocity
-    spin = own.pitch_inertia * pitch_rate + own.mass * cross(place, velocity)  # about the origin
-    kinetic = 0.5 * own.mass * np.abs(velocity) ** 2 + 0.5 * own.pitch_inertia * pitch_rate**2
+    moment = trunk.mass * place
+    momentum = trunk.mass * velocity
+    spin = trunk.pitch_inertia * pitch_rate + trunk.mass * cross(place, velocity)  # about the origin
+    kinetic = 0.5 * trunk.mass * np.abs(velocity) ** 2 + 0.5 * trunk.pitch_inertia * pitch_rate**2
     for i, limb in enumerate(engine.limbs):
         theta_rate = s["theta_rate"][i]
         f = by_name(engine.profiles[i](s["theta"][i])[0])
@@ -59,7 +60,7 @@ def tally_of(engine: TrunkEngine) -> Tally:
     total = engine.total_mass
     centre = moment / total
     potential = GRAVITY * moment.imag
-    if own.kind == "suspended":
-        potential = potential + 0.5 * own.stiffness * (r["y"] - own.height) ** 2
-        potential = potential - (1 - own.share) * total * GRAVITY * r["y"]
+    if trunk.kind == "suspended":
+        potential = potential + 0.5 * trunk.stiffness * (r["y"] - trunk.height) ** 2
+        potential = potential - (1 - trunk.share) * total * GRAVITY * r["y"]
     return Tally(centre, momentum, spin - cross(centre, momentum), kinetic, potential)

@@ -1,5 +1,5 @@
-"""The ground and what it does to a hoof point (Eqs. 10-15): its settings, those of a preset, and for the
-paper's solver when a point touches and how fast it came in."""
+"""Settings of the ground, those of a preset, and contacts of hoof points (Eqs. 10 to 15) for the paper's
+solver."""
 
 from __future__ import annotations
 
@@ -24,8 +24,8 @@ CONTACT = np.dtype(
         ("approach", "f8"),  # [m/s], rate at touch-down, kept until the point leaves; 0 outside
         ("normal", "f8"),  # [N], upward on the hoof (Eq. 14)
         ("friction", "f8"),  # [N], along x on the hoof (Eq. 15)
-        ("x", "f8"),  # [m], where the point is
-        ("vx", "f8"),  # [m/s], how fast it slides (Eq. 13)
+        ("x", "f8"),  # [m], place of the point
+        ("vx", "f8"),  # [m/s], sliding speed (Eq. 13)
         ("inside", "b1"),
     ]
 )
@@ -38,7 +38,7 @@ _COPIED = ("stiffness", "exponent", "approach_floor", "friction", "friction_slow
 GROUND = np.dtype(
     [(name, "f8") for name in (*_COPIED, "chi", "dashpot")] + [("friction_law", "i8"), ("interpolated", "b1")]
 )
-"""Settings of a `Ground`, for the kernels."""
+"""Record type of the settings of a `Ground`, for the kernels."""
 
 
 @dataclass(frozen=True)
@@ -57,8 +57,8 @@ class Ground:
         friction_law: one of `FRICTION_LAWS`.
         friction: mu_k [-]; the paper's 0.4.
         friction_slow, friction_fast: threshold speeds of the friction law [m/s], assumed (not in the paper);
-            the first is "ambrosio"'s alone.
-        reference_mass: used by "kelvin-voigt" only [kg].
+            only "ambrosio" uses the first.
+        reference_mass: mass [kg] for which "kelvin-voigt" has this restitution; unused by the others.
 
     Raises:
         ParameterError: an unknown law or a value out of range.
@@ -97,7 +97,8 @@ class Ground:
             raise ParameterError(
                 f"friction_fast: expected more than friction_slow = {slow:g} m/s, got {fast:g}"
             )
-        _ = self.damping  # refuses a restitution that the law cannot represent
+        # computed for its check: it refuses a restitution that the law cannot represent
+        _ = self.damping
 
     @property
     def damping(self) -> tuple[float, float]:
@@ -105,7 +106,7 @@ class Ground:
         return damping(self.normal_law, self.restitution, self.stiffness, self.reference_mass)
 
     def to_record(self) -> Any:
-        """The settings as one record of dtype `GROUND` for the kernels."""
+        """Return the settings as one record of dtype `GROUND` for the kernels."""
         record = np.zeros(1, dtype=GROUND)[0]
         record["chi"], record["dashpot"] = self.damping
         for name in _COPIED:
@@ -116,7 +117,7 @@ class Ground:
 
 
 def new_contacts() -> NDArray[np.void]:
-    """Toe and heel above the ground, shape (2,) of dtype `CONTACT`."""
+    """Return contacts of toe and heel above the ground, shape (2,) of dtype `CONTACT`."""
     return np.zeros(2, dtype=CONTACT)
 
 
@@ -126,7 +127,8 @@ def latch(contact, penetration, rate, ground):  # type: ignore[no-untyped-def]
     if penetration > 0.0 and not contact.inside:
         speed = rate
         if ground.interpolated and contact.penetration < 0.0:
-            part = contact.penetration / (contact.penetration - penetration)  # of the step, to the crossing
+            # part of the step up to the crossing of the surface
+            part = contact.penetration / (contact.penetration - penetration)
             speed = contact.rate + part * (rate - contact.rate)
         contact.approach = max(speed, ground.approach_floor)
     contact.inside = penetration > 0.0
@@ -138,18 +140,20 @@ def latch(contact, penetration, rate, ground):  # type: ignore[no-untyped-def]
 
 @kernel
 def touch(contact, position, velocity, ground):  # type: ignore[no-untyped-def]
-    """Force of the ground, y = 0, on one hoof point, as the complex number friction + i normal [N]; `contact`
-    is updated, position and velocity of the point are complex [m, m/s]."""
-    latch(contact, -position.imag, -velocity.imag, ground)
+    """Return the force of the ground, y = 0, on one hoof point, as the complex number friction + i normal
+    [N]; update `contact`. Position and velocity of the point are complex [m, m/s]."""
+    latch(contact, -position.imag, -velocity.imag, ground)  # Eqs. 10 and 12
     contact.x = position.real
-    contact.vx = velocity.real
+    contact.vx = velocity.real  # Eq. 13
     contact.normal = 0.0
     contact.friction = 0.0
     if contact.inside:
+        # Eq. 14
         spring = ground.stiffness * contact.penetration**ground.exponent
         contact.normal = normal_force(spring, ground.chi, ground.dashpot, contact.rate, 1 / contact.approach)
         speed = abs(contact.vx)
         part = friction_part(speed, ground.friction_law, ground.friction_slow, ground.friction_fast)
+        # Eq. 15; at rest it has no direction, and the law no friction
         if speed > 0.0:
             contact.friction = -math.copysign(ground.friction * part * contact.normal, contact.vx)
     return complex(contact.friction, contact.normal)
@@ -159,15 +163,14 @@ HERTZ = 1.5
 """Exponent n of Hertz's contact and of Lankarani and Nikravesh's law [-]."""
 
 SETTINGS = ("stiffness", "exponent")
-"""What the section may give: K [N/m^n] and n [-] of Eq. 14. The paper prints a lower limit of one and nothing
-of the other."""
+"""Entries of a preset's section: K [N/m^n] and n [-] of Eq. 14. The paper prints only a lower limit of K."""
 
 
 def load_ground(preset: Preset = DEFAULT_PRESET, **overrides: Any) -> Ground:
-    """The ground of a preset by name, of a file by path, or of such a file's content.
+    """Return the ground of a preset by name, of a file by path, or of such a file's content.
 
     Args:
-        preset: whose ground; what its file does not say is as in `Ground`.
+        preset: name, path or content; settings that it does not have are the defaults of `Ground`.
         overrides: attributes of `Ground` that replace the preset's; None keeps them.
 
     Raises:
@@ -188,5 +191,5 @@ def load_ground(preset: Preset = DEFAULT_PRESET, **overrides: Any) -> Ground:
 
 
 def write_ground(ground: Ground) -> dict[str, float]:
-    """The section of a preset that `load_ground` reads."""
+    """Return the section of a preset that `load_ground` reads."""
     return {name: getattr(ground, name) for name in SETTINGS}

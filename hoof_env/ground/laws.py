@@ -1,5 +1,5 @@
-"""Laws of contact: how hard the ground pushes back, and how it rubs. One expression each, for the engine's
-lanes and for the paper's solver.
+"""Laws of contact: normal force and friction. One expression each, for the engine's lanes and for the paper's
+solver.
 
 Normal force (Eq. 14): F = K d^n (1 + chi v / v0) + c v with penetration d, penetration rate v and approach
 speed v0 latched at touch-down; the laws differ in the damping factor chi as a function of the coefficient of
@@ -32,7 +32,7 @@ from hoof_env.simd.math import exp_of_negative
 
 
 def exact(cr: float) -> float:
-    """Damping factor [-] for which a free impact returns exactly cr."""
+    """Return the damping factor [-] with which a free impact returns exactly cr."""
     return 0.0 if cr == 1.0 else _bisect(lambda chi: restitution_of_factor(chi) - cr, 1e-12, 1e6)
 
 
@@ -44,17 +44,17 @@ FACTORS: dict[str, Callable[[float], float]] = {
     "hu-guo": lambda cr: 3 * (1 - cr) / (2 * cr),
     "exact": exact,
 }
-"""Damping factor chi [-] of each law by the coefficient of restitution cr."""
+"""Damping factor chi [-] of each law as a function of the coefficient of restitution cr."""
 
 NORMAL_LAWS = (*FACTORS, "kelvin-voigt")
 """Names of the normal laws."""
 
 SMALLEST_RESTITUTION = 0.01
-"""Below this the damping of every law but the first two grows without bound [-]."""
+"""Smallest restitution [-] of all laws but the first two: their damping grows without bound towards 0."""
 
 
 def damping(law: str, restitution: float, stiffness: float, reference_mass: float) -> tuple[float, float]:
-    """Damping factor chi [-] and dashpot coefficient c [N s/m] of a law.
+    """Return the damping factor chi [-] and the dashpot coefficient c [N s/m] of a law.
 
     Args:
         law: one of `NORMAL_LAWS`.
@@ -62,6 +62,9 @@ def damping(law: str, restitution: float, stiffness: float, reference_mass: floa
         stiffness: K [N/m^n]; used by "kelvin-voigt" only.
         reference_mass: mass [kg] for which "kelvin-voigt" with exponent 1 returns `restitution`; a linear
             dashpot has one restitution for each mass.
+
+    Raises:
+        ParameterError: an unknown law, or a restitution that it cannot represent.
     """
     check_choice("normal_law", law, NORMAL_LAWS)
     cr = check_number("restitution", restitution, low=0, high=1)
@@ -76,7 +79,8 @@ def damping(law: str, restitution: float, stiffness: float, reference_mass: floa
 
 
 def restitution_of_factor(chi: float) -> float:
-    """Restitution e [-] of a free impact under damping factor chi; see the module docstring."""
+    """Return the restitution e [-] of a free impact under damping factor chi; see the module docstring."""
+    # the equation has lost all its digits there
     if chi <= 1e-9:
         return 1.0
     return _bisect(
@@ -85,10 +89,12 @@ def restitution_of_factor(chi: float) -> float:
 
 
 def restitution_of_damping_ratio(zeta: float) -> float:
-    """Restitution [-] of a linear spring-dashpot that may not pull, for damping ratio zeta."""
+    """Return the restitution [-] of a linear spring-dashpot that may not pull, for damping ratio zeta
+    (Schwager & Poeschel)."""
     if zeta < 1.0:
         w = math.sqrt(1 - zeta**2)
         return math.exp(-zeta / w * (math.pi - math.atan2(2 * zeta * w, 1 - 2 * zeta**2)))
+    # the limit of both other branches, which divide by 0 here
     if zeta == 1.0:
         return math.exp(-2.0)
     w = math.sqrt(zeta**2 - 1)
@@ -96,15 +102,16 @@ def restitution_of_damping_ratio(zeta: float) -> float:
 
 
 def kelvin_voigt_damping_ratio(cr: float) -> float:
-    """Damping ratio [-] for which `restitution_of_damping_ratio` is cr."""
+    """Return the damping ratio [-] for which `restitution_of_damping_ratio` is cr."""
     return 0.0 if cr == 1.0 else _bisect(lambda zeta: restitution_of_damping_ratio(zeta) - cr, 0.0, 100.0)
 
 
 def _bisect(f: Callable[[float], float], low: float, high: float) -> float:
-    """Root of a function that changes sign once on [low, high], to the last bit."""
+    """Return the root of a function that changes sign once on [low, high], to the last bit."""
     sign = f(low) > 0
     while True:
         middle = (low + high) / 2
+        # no number is left between the bounds
         if middle in (low, high):
             return middle
         if (f(middle) > 0) == sign:
@@ -115,9 +122,9 @@ def _bisect(f: Callable[[float], float], low: float, high: float) -> float:
 
 @inline_llvm
 def normal_force(spring, chi, dashpot, rate, inverse_speed):  # type: ignore[no-untyped-def]
-    """Normal force [N] on a point inside the ground (Eq. 14) from K d^n [N], chi [-], c [N s/m], v [m/s] and
-    1 / v0 [s/m]. The ground does not pull."""
-    return maximum(spring * (1.0 + chi * rate * inverse_speed) + dashpot * rate, 0.0)
+    """Return the normal force [N] on a point inside the ground (Eq. 14) from K d^n [N], chi [-], c [N s/m], v
+    [m/s] and 1 / v0 [s/m]. The ground does not pull."""
+    return maximum(spring * (1.0 + chi * rate * inverse_speed) + dashpot * rate, 0.0)  # Eq. 14
 
 
 FRICTION_LAWS = ("ambrosio", "threlfall", "tanh")
@@ -128,17 +135,18 @@ AMBROSIO, THRELFALL, TANH = range(3)
 
 @inline_llvm
 def friction_part(speed, law, slow, fast):  # type: ignore[no-untyped-def]
-    """Friction coefficient over its kinetic value, mu(|v|) / mu_k [-], 0 to 1; 0 at rest.
+    """Return the friction coefficient over its kinetic value, mu(|v|) / mu_k [-], 0 to 1; 0 at rest.
 
     Speeds are |v| and the thresholds of `Ground` [m/s]; `law`, an index into `FRICTION_LAWS`, is the same in
     all lanes. Ambrosio: c_d = 0 below `slow`, 1 above `fast`, linear between. Threlfall: 1 - exp(-3 |v| / v0)
     up to v0 = `fast`, constant above. The last: tanh(|v| / `fast`).
     """
     if law == AMBROSIO:
-        part = (speed - slow) / (fast - slow)
+        part = (speed - slow) / (fast - slow)  # c_d of Eq. 15
     elif law == THRELFALL:
         part = 1.0 - exp_of_negative(-3.0 * minimum(speed / fast, 1.0))
     else:
+        # `simd.math.tanh` without its choice of a sign: a speed has none
         e = exp_of_negative(-2.0 * (speed / fast))
         part = (1.0 - e) / (1.0 + e)
     return minimum(maximum(part, 0.0), 1.0)

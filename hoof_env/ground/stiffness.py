@@ -1,30 +1,30 @@
-"""How fast a contact is, and the longest step with which an explicit scheme still follows it.
+"""Rates of a contact, and the longest step with which an explicit scheme still follows it.
 
 A mass m on the ground has three rates. The spring's is the frequency w = sqrt(n K d^(n - 1) / m) at the
 deepest penetration. Damping is chi K d^n / (v0 m) + c / m, where v0 is the approach speed. Friction is the
-slope of its law times F / m: between the threshold speeds a few millimetres a second change it from nothing
-to all, which makes it the fastest of the three under a light hoof.
+slope of its law times F / m: between the threshold speeds, a few millimetres a second apart, it changes from
+nothing to all, which makes it the fastest of the three under a light hoof.
 
 The spring decides on accuracy. tests/ground/test_stiffness.py drops a mass on the contact of Eq. 14 and
 measures the error e of its state after it has left, that of the speed over the touch-down speed or that
 of the place over the deepest penetration, whichever is larger, against an adaptive scheme of eighth order.
 For n from 1 to 3, chi from 0 to 3, weights up to 0.3 of the peak force, steps h w of 0.025 to 0.4 and 16
-places of the touch-down within a step, all of one law:
+places of the touch-down within a step, all errors obey one law:
 
     e < C (h w)^p,   p = min(order, n + 1),
 
-for d^n has a kink at touch-down that limits the order. `SCHEME_LIMITS` holds the largest C, which n = 1 has,
-rounded up; at n = 1.5 less than 0.7 of it is enough for semi-implicit Euler and the midpoint rule, less than
-0.4 for the others.
+because d^n has a kink at touch-down that limits the order. `SCHEME_LIMITS` holds the largest C, that of n =
+1, rounded up; at n = 1.5 less than 0.7 of it is enough for semi-implicit Euler and the midpoint rule, less
+than 0.4 for the others.
 
-A hoof with a spring k and a damper c of its own has a sole without mass, whose penetration d follows the
+A hoof with a spring k and a damper c of its own has a sole without mass. Its penetration d follows the
 leg's with the rate (k + n K d^(n - 1)) / (c + chi K d^n / v0): the stiff ground against all damping. It is
 largest somewhere on the way in. The mass then has the frequency of both springs in series, the damping of c
 at most, and friction needs no sliding speed.
 
 Damping and friction decay: explicit schemes are stable up to h rate = 2 (Euler, midpoint), 2.51 (third order)
-and 2.79 (RK4), and half of that is the limit here. Past its limit friction does not blow up, for its force is
-bounded, but leaves the point sliding to and fro with a speed of up to some 1.5 mu F h / m.
+and 2.79 (RK4), and half of that is the limit here. Past its limit friction does not diverge, because its
+force is bounded, but leaves the point sliding to and fro with a speed of up to some 1.5 mu F h / m.
 """
 
 from __future__ import annotations
@@ -43,7 +43,7 @@ from hoof_env.ground.terrain import Terrain
 
 
 class SchemeLimits(NamedTuple):
-    """What a fixed-step scheme does in a contact."""
+    """Limits of a fixed-step scheme in a contact."""
 
     order: int  # of the scheme on a smooth force
     error: float  # C of the module's text [-]
@@ -61,10 +61,10 @@ SCHEME_LIMITS: Mapping[str, SchemeLimits] = MappingProxyType(
 """Schemes by name; "rk3" is Heun's of third order, "rk4" the classical one."""
 
 DEPTHS = 65
-"""Penetrations at which the rate of a sole is looked at."""
+"""Number of penetrations at which the rate of a sole is evaluated."""
 
 LARGEST_ANGLE = 0.4
-"""Largest h w [-]: up to here the errors were measured."""
+"""Largest h w [-], up to which the errors were measured."""
 
 
 @dataclass(frozen=True)
@@ -77,11 +77,12 @@ class ContactRates:
     exponent: float
 
     def longest_steps(self, scheme: str, tolerance: float = 1e-2) -> dict[str, float]:
-        """Longest step [s] that each of the three allows; infinite for a rate of zero. `tolerance` is the
-        error of the state after a contact [-], see the module's text."""
+        """Return the longest step [s] that each of the three rates allows; infinite for a rate of zero.
+        `tolerance` is the error of the state after a contact [-], see the module's text."""
         limits = SCHEME_LIMITS[check_choice("scheme", scheme, SCHEME_LIMITS)]
         tolerance = check_number("tolerance", tolerance, low=0, high=1, exclusive_low=True)
         order = min(limits.order, self.exponent + 1)
+        # e < C (h w)^p of the module's text, solved for h w
         angle = min((tolerance / limits.error) ** (1 / order), LARGEST_ANGLE)
         allowed = {"elastic": angle, "damping": limits.decay, "friction": limits.decay}
         rates = {name: getattr(self, name) for name in allowed}
@@ -96,13 +97,13 @@ def spring_rates(
     speed: float,
     terrain: Terrain | None = None,
 ) -> tuple[ContactRates, float]:
-    """Rates of a mass on a hoof's spring on the ground, and that of the sole [1/s].
+    """Return the rates of a mass on a hoof's spring on the ground, and the rate of the sole [1/s].
 
     Args:
-        ground: its laws.
+        ground: laws of contact.
         spring: stiffness [N/m] and damping [N s/m] along the normal.
-        mass, load, speed, terrain: as `contact_rates` takes them; no contact is pressed harder than by twice
-            the load, with what spring and damper take of the touch-down.
+        mass, load, speed, terrain: as in `contact_rates`; a contact is assumed to be pressed by at most twice
+            the load and the force of spring and damper in the touch-down.
     """
     k, c = spring
     speed = max(speed, ground.approach_floor)
@@ -112,6 +113,7 @@ def spring_rates(
     force = 2 * load + speed * (math.sqrt(k * mass) + c)
     depth = (force / stiffness) ** (1 / n) * np.linspace(0.0, 1.0, DEPTHS)
     slope = n * stiffness * depth ** (n - 1)
+    # the largest rate is somewhere on the way in, so all depths count
     sole = (k + slope) / (c + chi * stiffness * depth**n / speed + dashpot)
     series = k * slope[-1] / (k + slope[-1])
     return ContactRates(math.sqrt(series / mass), c / mass, 0.0, n), float(sole.max())
@@ -125,17 +127,17 @@ def contact_rates(
     sliding_mass: float | None = None,
     terrain: Terrain | None = None,
 ) -> ContactRates:
-    """Rates of the contact of one hoof point at its deepest.
+    """Return the rates of the contact of one hoof point at its deepest.
 
     Args:
-        ground: its laws.
-        mass: that the hoof point sets against a normal force [kg].
-        load: force that presses the point down from outside [N], as a part of the weight; the spring is taken
-            to overshoot under it.
-        speed: with which the point touches down [m/s]. Fast ones go deep, slow ones are damped strongly:
-            where both occur, ask for both and take the larger rates.
-        sliding_mass: that it sets against friction [kg]; None, the same.
-        terrain: whose stiffest and roughest places count; None, flat.
+        ground: laws of contact.
+        mass: mass that the hoof point sets against a normal force [kg].
+        load: force that presses the point down from outside [N], as a part of the weight; the spring is
+            assumed to overshoot under it.
+        speed: speed at which the point touches down [m/s]. Fast points go deep, slow ones are damped
+            strongly: where both occur, ask for both and take the larger rates.
+        sliding_mass: mass that it sets against friction [kg]; None is `mass`.
+        terrain: shape of the ground, of which the stiffest and the roughest places count; None is flat.
     """
     mass = check_number("mass", mass, low=0, exclusive_low=True)
     load = check_number("load", load, low=0)
@@ -147,10 +149,11 @@ def contact_rates(
     stiffness = ground.stiffness * float(np.max(terrain.stiffness))
     mu = ground.friction * float(np.max(terrain.friction))
     chi, dashpot = ground.damping
-    # K d^(n+1) / (n+1) = m v^2 / 2 + load d; the sum of the two depths alone is not less than d
+    # d of K d^(n+1) / (n+1) = m v^2 / 2 + load d is at most the sum of the depths of either term alone
     depth = ((n + 1) * mass * speed**2 / (2 * stiffness)) ** (1 / (n + 1))
     depth += ((n + 1) * load / stiffness) ** (1 / n)
     force = stiffness * depth**n
+    # slopes of the laws at their steepest: 3 / v0 of Threlfall's, 1 / v0 of tanh, both at rest
     slow = ground.friction_slow if ground.friction_law == "ambrosio" else 0.0
     steepest = (3 if ground.friction_law == "threlfall" else 1) / (ground.friction_fast - slow)
     return ContactRates(

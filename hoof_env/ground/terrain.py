@@ -1,7 +1,7 @@
-"""The shape of the ground along x, and where it is softer, harder or more slippery than `Ground` says.
+"""Shape of the ground along x, and places where it is softer, harder or more slippery than `Ground`.
 
-Height and the two factors are given at evenly spaced knots and are linear between them, so that nothing jumps
-but the slope; beyond the first and the last knot the ground goes on level with their values.
+Height and the two factors are given at evenly spaced knots and are linear in between, so that only the slope
+jumps; beyond the first and the last knot the ground is level and keeps their values.
 """
 
 from __future__ import annotations
@@ -22,25 +22,27 @@ from hoof_env.simd.compile import inline_llvm
 from hoof_env.simd.memory import address
 
 MOST_KNOTS = 1_000_000
+"""Largest number of knots."""
 
 LONG_WAY = 1000.0
-"""How far `Terrain.slope` goes on either side of x = 0 [m]."""
+"""Extent of `Terrain.slope` on either side of x = 0 [m]."""
 
 
 @dataclass(frozen=True)
 class Terrain:
     """Height and factors along x at the knots start + k spacing; `Terrain()` is flat.
 
-    What a point at (x, y) meets is the straight piece at its x, with normal (nx, ny): penetration
-    (height - y) ny, rate -(vx nx + vy ny), sliding velocity vx ny - vy nx. Where two pieces meet at an angle,
-    penetration, normal and so the force on a point inside the ground jump: make a sharp corner of small ones.
+    A point at (x, y) meets the straight piece at its x, with normal (nx, ny): penetration (height - y) ny,
+    rate -(vx nx + vy ny), sliding velocity vx ny - vy nx. Where two pieces meet at an angle, penetration and
+    normal jump, and so does the force on a point inside the ground: make a sharp corner of several small
+    ones.
 
     Attributes:
-        height: at the knots [m].
-        stiffness: factor on `Ground.stiffness` at the knots [-]; a number is for all knots.
-        friction: factor on `Ground.friction` at the knots [-]; a number is for all knots.
+        height: heights at the knots [m].
+        stiffness: factors on `Ground.stiffness` at the knots [-]; a number is for all knots.
+        friction: factors on `Ground.friction` at the knots [-]; a number is for all knots.
         start: x of the first knot [m].
-        spacing: between knots [m].
+        spacing: distance between knots [m].
 
     Raises:
         ParameterError: a value is not finite or out of range, or the lengths differ.
@@ -53,6 +55,7 @@ class Terrain:
     spacing: float = 1.0
 
     def __post_init__(self) -> None:
+        # the dataclass is frozen: `__post_init__` cannot assign
         height = _row("terrain.height", self.height, -1e4, 1e4, None)
         object.__setattr__(self, "height", height)
         for name, low in (("stiffness", 1e-6), ("friction", 0.0)):
@@ -64,18 +67,20 @@ class Terrain:
 
     @classmethod
     def flat(cls) -> Terrain:
-        """Level at y = 0, as `Ground` says everywhere."""
+        """Return level ground at y = 0, with the settings of `Ground` everywhere."""
         return cls()
 
     @classmethod
     def slope(cls, angle: float) -> Terrain:
-        """One slope through (0, 0), from x = -1 km to 1 km; `angle` [rad], positive uphill, within 1.4."""
+        """Return one slope through (0, 0), from x = -1 km to 1 km; `angle` [rad], positive uphill, within
+        1.4."""
         rise = LONG_WAY * math.tan(check_number("angle", angle, low=-1.4, high=1.4))
         return cls(height=(-rise, rise), start=-LONG_WAY, spacing=2 * LONG_WAY)
 
     @classmethod
     def ramp(cls, angle: float, start: float = 0.0, length: float = 10.0) -> Terrain:
-        """Level at y = 0 up to `start`, a slope of `angle` [rad] over `length` of x, then level [m]."""
+        """Return ground that is level at y = 0 up to `start` [m], a slope of `angle` [rad] over `length` [m]
+        of x, then level."""
         length = check_number("length", length, low=1e-4, high=1e6)
         rise = length * math.tan(check_number("angle", angle, low=-1.4, high=1.4))
         return cls(height=(0.0, rise), start=start, spacing=length)
@@ -89,14 +94,14 @@ class Terrain:
         friction: ArrayLike = 1.0,
         spacing: float = 0.01,
     ) -> Terrain:
-        """Straight lines through points at any increasing `x` [m], sampled every `spacing` [m].
+        """Return straight lines through points at any increasing `x` [m], sampled every `spacing` [m].
 
         A corner that is not a whole number of spacings from the first point is cut off within one spacing.
 
         Args:
-            x: shape (n,), n >= 2.
+            x: places of the points [m], shape (n,), n >= 2.
             height, stiffness, friction: as in `Terrain`, at `x`.
-            spacing: [m].
+            spacing: distance between knots [m].
 
         Raises:
             ParameterError: as in `Terrain`; x does not increase.
@@ -107,19 +112,19 @@ class Terrain:
         knots = _knots(points[0], points[-1], spacing)
         rows: dict[str, Any] = {}
         for name, values in (("height", height), ("stiffness", stiffness), ("friction", friction)):
-            given = _row(name, values, -np.inf, np.inf, points.size)
-            rows[name] = tuple(np.interp(knots, points, given).tolist())
+            row = _row(name, values, -np.inf, np.inf, points.size)
+            rows[name] = tuple(np.interp(knots, points, row).tolist())
         return cls(**rows, start=points[0], spacing=spacing)
 
     @classmethod
     def patches(cls, patches: Iterable[Sequence[float]], spacing: float = 0.01) -> Terrain:
-        """Flat ground with patches of another kind.
+        """Return flat ground with patches of other stiffness and friction.
 
         Args:
             patches: (x0, x1, factor of stiffness, factor of friction) each; they may touch, not overlap.
                 Edges are rounded to whole spacings from the first x0, and outside them the factors change
                 back over one spacing.
-            spacing: [m].
+            spacing: distance between knots [m].
 
         Raises:
             ParameterError: a patch is not of that form, or patches overlap.
@@ -141,6 +146,7 @@ class Terrain:
             if before[1] > after[0]:
                 wanted = "patches apart from each other"
                 raise ParameterError(f"patches: expected {wanted}, got {before} and {after}")
+        # a knot more at either end, where the factors are 1 again
         start = rows[0][0] - spacing
         factors = np.ones((2, _knots(start, rows[-1][1] + spacing, spacing).size))
         for x0, x1, *pair in rows:
@@ -151,7 +157,7 @@ class Terrain:
 
     @classmethod
     def from_dict(cls, data: Mapping[str, Any]) -> Terrain:
-        """The terrain that `to_dict` wrote; what is left out is the default.
+        """Return the terrain that `to_dict` wrote; missing entries are the defaults.
 
         Raises:
             ParameterError: an unknown entry or a bad value.
@@ -163,13 +169,13 @@ class Terrain:
         return cls(**data)
 
     def to_dict(self) -> dict[str, Any]:
-        """Entries that JSON can hold; numbers keep their bits."""
+        """Return entries that JSON can hold; numbers keep their bits."""
         values = {field.name: getattr(self, field.name) for field in fields(self)}
         return {name: list(value) if isinstance(value, tuple) else value for name, value in values.items()}
 
     @cached_property
     def x(self) -> NDArray[np.float64]:
-        """Where the knots are [m]; read-only."""
+        """Places of the knots [m]; read-only."""
         knots = self.start + self.spacing * np.arange(len(self.height), dtype=np.float64)
         knots.flags.writeable = False
         return knots
@@ -179,13 +185,14 @@ class Terrain:
         return np.array(self.height)
 
     def height_at(self, x: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Height [m] at `x` [m], same shape."""
+        """Return the height [m] at `x` [m], same shape."""
         return np.interp(x, self.x, self._heights)
 
     def to_grid(self) -> TerrainGrid:
-        """The terrain for the kernel `surface`."""
+        """Return the terrain for the kernel `surface`."""
         rows = np.array([self.height, self.stiffness, self.friction])
-        rows = np.pad(rows, ((0, 0), (1, 1)), mode="edge") + 0.0  # no -0.0
+        # a level cell before the first knot and after the last; + 0.0 makes 0.0 of -0.0
+        rows = np.pad(rows, ((0, 0), (1, 1)), mode="edge") + 0.0
         rises = np.diff(rows, axis=1)
         slope = rises[0] / self.spacing
         ny = 1 / np.sqrt(1 + slope**2)
@@ -196,8 +203,9 @@ class Terrain:
 
 
 def _knots(start: float, end: float, spacing: float) -> NDArray[np.float64]:
-    """From `start` to `end` or just beyond it [m]."""
+    """Return the knots from `start` to `end` or just beyond it [m]."""
     check_number("terrain.spacing", spacing, low=1e-4, high=1e6)
+    # 1e-6: a length that is a whole number of spacings but for rounding gets no knot more
     count = math.ceil((end - start) / spacing - 1e-6) + 1
     if count > MOST_KNOTS:
         wanted = f"at most {MOST_KNOTS} knots from {start:g} to {end:g} m"
@@ -206,7 +214,8 @@ def _knots(start: float, end: float, spacing: float) -> NDArray[np.float64]:
 
 
 def _row(name: str, values: Any, low: float, high: float, count: int | None) -> tuple[float, ...]:
-    """`values` as `count` floats within [low, high], from one number or as many; any number for None."""
+    """Return `values` as `count` floats within [low, high]. They are one number, or `count` numbers; a
+    `count` of None accepts any number of them."""
     if count is not None and np.ndim(values) == 0:
         return (check_number(name, values, low=low, high=high),) * count
     try:
@@ -224,7 +233,7 @@ def _short(value: Any) -> str:
 
 
 class TerrainGrid(NamedTuple):
-    """A terrain for the kernels: the arguments of `surface` after x.
+    """Terrain for the kernels: the arguments of `surface` after x.
 
     `cells` has a row for each cell, from the level one before the first knot to that behind the last, shape
     (knots + 1, 8): height, its rise over the cell, normal x and y, factor of stiffness and its rise, factor
@@ -232,17 +241,19 @@ class TerrainGrid(NamedTuple):
     """
 
     cells: NDArray[np.float64]
-    origin: float  # where the first cell begins [m]
-    per_metre: float  # cells in a metre [1/m]
+    origin: float  # x at which the first cell begins [m]
+    per_metre: float  # number of cells in a metre [1/m]
 
 
 @inline_llvm
 def surface(x, cells, origin, per_metre):  # type: ignore[no-untyped-def]
-    """The ground at `x` [m], which may be lanes: height [m], normal x and y [-], factors of stiffness and
-    friction [-]. An x that is not finite gives heights and factors that are none."""
+    """Return the ground at `x` [m], which may be lanes: height [m], normal x and y [-], factors of stiffness
+    and friction [-]. Heights and factors are NaN where x is not finite."""
     place = (x - origin) * per_metre
-    cell = floor(minimum(maximum(0.0, place), cells.shape[0] - 1.0))  # this order sends NaN to cell 0
-    part = place - cell  # the level cells at the ends have no rises: any part will do
+    # this order of the arguments sends NaN to cell 0
+    cell = floor(minimum(maximum(0.0, place), cells.shape[0] - 1.0))
+    # far beyond the ends `part` is large, but the level cells there have no rises
+    part = place - cell
     height, rise, normal_x, normal_y, stiffness, firmer, friction, rougher = gather_eight(
         address(cells), 8.0 * cell
     )

@@ -1,7 +1,7 @@
 """Numbers side by side: types for kernels that work on many environments, or many legs, in one instruction.
 
-README.md says why, and has the types, the rules and an example. Lanes live inside kernels only: they come
-from `rows` and go back into them.
+README.md has the reason, the types, the rules and an example. Lanes exist inside kernels only: they are read
+from `rows` and written to them.
 """
 
 import hoof_env.simd.layout
@@ -60,4 +60,4 @@ __all__ = [
     "vector",
     "where",
     "write",
-]  # fmt: skip
+]

@@ -1,10 +1,10 @@
-"""Where a compiled kernel is kept, and how processes that need the same one share the work.
+"""Files of compiled kernels, and a lock so that only one of several processes compiles a kernel.
 
 numba keeps what it compiles in files, but processes that begin together, as the workers of a learner do, each
-compile it for themselves. Here one compiles, under a lock beside the kernel's files, and the others wait and
-then load. Everything that leans on numba's private names is in this module.
+compile it for themselves. Here one compiles, under a lock next to the kernel's files, and the others wait and
+then load. Everything that depends on numba's private names is in this module.
 
-The files are pickles, which can run any code. They are read only if nobody else could have written them
+The files are pickles, which can run any code. They are read only if no other user could have written them
 (`hoof_env.simd.trust`), and only whole: an index has a digest of itself and of the files that it names.
 """
 
@@ -35,13 +35,13 @@ from hoof_env.simd import trust
 PACKAGE = Path(__file__).parents[1]
 
 MECHANICS = ("simd", "leg", "ground", "gait", "dynamics")
-"""The rooms of this package whose sources end up in kernels, folders or files."""
+"""Modules and folders of this package that kernels are compiled from."""
 
 CALLED = {"envs": ("tasks",)}
 """Further rooms whose functions the kernels of a room call."""
 
 LONGEST_WAIT = 600.0
-"""Seconds to wait for another process, which may be stopped; then the kernel is compiled here."""
+"""Longest wait [s] for another process, which may be stopped; then the kernel is compiled here."""
 
 COMPILED: list[str] = []
 """Names of the kernels that this process has compiled."""
@@ -52,13 +52,13 @@ _Given: Any = getattr(_caching, "UserProvidedCacheLocator", None) or _caching._U
 
 
 def given_folder() -> str:
-    """What NUMBA_CACHE_DIR was when numba was imported, or nothing."""
+    """Return NUMBA_CACHE_DIR as it was when numba was imported; empty if it was not set."""
     return str(_config.CACHE_DIR)
 
 
 class _GivenFolder(_Given):
-    """The folder named by NUMBA_CACHE_DIR, from which kernels are loaded even where nothing can be written,
-    as in an image of a container. numba would pass over such a folder in silence."""
+    """Folder named by NUMBA_CACHE_DIR. Kernels are loaded from it even if it is read-only, as in a
+    container's image; numba would silently ignore such a folder."""
 
     def ensure_cache_path(self) -> None:
         pass
@@ -69,27 +69,27 @@ class _FilesInGivenFolder(_caching.CompileResultCacheImpl):
 
 
 class _Files(_caching.IndexDataCacheFile):
-    """The index of a kernel's files and the files themselves. What is damaged counts as not there, and `say`
-    tells so: an index is a pickled version, a digest of the rest, and the rest, a pickle of the source stamp
-    and, for each signature, the name and the digest of its file."""
+    """Index of a kernel's files and the files themselves. Damaged files count as missing, and `say` reports
+    them. An index is a pickled version, a digest of the rest, and the rest: a pickle of the source stamp and,
+    for each signature, of the name and the digest of its file."""
 
     FORMAT = "hoof-env.1"
     _OTHER_VERSION = re.compile(rb"\x80.\x95.{8}\x8c.[\w.+-]+\x94\.", re.DOTALL)
 
     def __init__(self, impl: Any, stamp: Any, say: Callable[[str], None]) -> None:
         super().__init__(impl.locator.get_cache_path(), impl.filename_base, stamp)
-        # numba alone, and older versions of this package, take it for one of another numba
+        # to plain numba, and to older versions of this package, this is the index of another numba version
         self._start = pickle.dumps(f"{self._version}+{self.FORMAT}", protocol=-1)
         self._say = say
-        self._told = set[str]()
+        self._reported = set[str]()
 
-    def _tell(self, path: str, what: str) -> None:
-        if path not in self._told:
-            self._told.add(path)
+    def _report(self, path: str, what: str) -> None:
+        if path not in self._reported:
+            self._reported.add(path)
             self._say(f"{what} {path} is damaged: compiling it again")
 
     def save(self, key: Any, data: Any) -> None:
-        """Write the file first: an index never names what is not there yet."""
+        """Write the file first, then the index, so that an index never names a missing file."""
         entries = self._load_index()
         content = self._dump(data)
         taken = {name for name, _ in entries.values()}
@@ -109,7 +109,7 @@ class _Files(_caching.IndexDataCacheFile):
         except FileNotFoundError:
             return None
         if _sha(content) != digest:
-            self._tell(self._data_path(name), "the compiled kernel")
+            self._report(self._data_path(name), "the compiled kernel")
             return None
         return pickle.loads(content)
 
@@ -119,12 +119,13 @@ class _Files(_caching.IndexDataCacheFile):
         except FileNotFoundError:
             return {}
         if not content.startswith(self._start) and self._OTHER_VERSION.match(content):
-            return {}  # of numba, or of this format
+            return {}  # an index of another version of numba, or of this format
+        # checked before it is unpickled
         rest = content.removeprefix(self._start)
         digest = rest[:32]
         rest = rest[32:]
-        if self._own(rest) != digest:
-            self._tell(self._index_path, "the index of compiled kernels")
+        if self._digest_of(rest) != digest:
+            self._report(self._index_path, "the index of compiled kernels")
             return {}
         stamp, entries = pickle.loads(rest)
         return dict(entries) if stamp == self._source_stamp else {}
@@ -132,15 +133,15 @@ class _Files(_caching.IndexDataCacheFile):
     def _save_index(self, entries: dict[Any, tuple[str, bytes]]) -> None:
         rest = self._dump((self._source_stamp, entries))
         with self._open_for_write(self._index_path) as file:
-            file.write(self._start + self._own(rest) + rest)
+            file.write(self._start + self._digest_of(rest) + rest)
 
-    def _own(self, content: bytes) -> bytes:
-        """Digest of an index of this name: another kernel's in its place would be sound by itself."""
+    def _digest_of(self, content: bytes) -> bytes:
+        """Return the digest of an index and its name: the index of another kernel must not pass for it."""
         return _sha(self._index_name.encode() + content)
 
     @contextmanager
     def _open_for_write(self, path: str) -> Iterator[Any]:
-        """As numba's; the file is for its owner alone to write, whatever the umask says."""
+        """Open as numba does; only the owner may write the file, whatever the umask."""
         with super()._open_for_write(path) as file:
             trust.close(file.name)
             yield file
@@ -151,8 +152,11 @@ def _sha(content: bytes) -> bytes:
 
 
 class KernelCache(_caching.FunctionCache):
-    """The files of one kernel; `identity` tells apart kernels of one source that contain different functions.
-    Raises OutputError where no folder is writable, or others could have written what is there."""
+    """Files of one kernel; `identity` distinguishes kernels of one source that contain different functions.
+
+    Raises:
+        OutputError: no folder is writable, or others could have written the files.
+    """
 
     def __init__(self, function: Callable[..., Any], say: Callable[[str], None], identity: str = "") -> None:
         if given_folder():
@@ -162,11 +166,10 @@ class KernelCache(_caching.FunctionCache):
         except (RuntimeError, OSError) as error:
             raise _no_folder(os.path.dirname(function.__code__.co_filename), error) from None
         # numba looks for changes in the file of a kernel alone, but a kernel contains those that it calls
-        own = Path(function.__code__.co_filename).parent
-        beside = "".join(
-            _digest(PACKAGE / room) for room in CALLED.get(own.name, ()) if own.parent == PACKAGE
-        )
-        stamp = self._impl.locator.get_source_stamp(), _sources(), _digest(own), beside
+        folder = Path(function.__code__.co_filename).parent
+        called = CALLED.get(folder.name, ()) if folder.parent == PACKAGE else ()
+        digests = [_digest(room) for room in (folder, *(PACKAGE / name for name in called))]
+        stamp = self._impl.locator.get_source_stamp(), _sources(), "".join(digests)
         self._cache_file = _Files(self._impl, stamp, say)
         if not given_folder():
             trust.close_new(self.cache_path)
@@ -176,32 +179,36 @@ class KernelCache(_caching.FunctionCache):
         self._lock: Any = None
 
     def _index_key(self, sig: Any, codegen: Any) -> Any:
-        # numba's own has a digest of what a function encloses, which changes with every process
+        # numba's key has a digest of what a function encloses, which changes with every process
         return sig, codegen.magic_tuple(), self._identity
 
     def load_overload(self, sig: Any, target_context: Any) -> Any:
-        """As numba's; where there is nothing to load, it returns once this process may compile."""
+        """Load as numba does; if there is nothing to load, return once this process may compile."""
         for folder in filter(None, (given_folder(), self.cache_path)):
             trust.check_folder(folder)
         if (overload := self._load(sig, target_context)) is not None:
             return overload
+        # find out before compiling, which takes half a minute, whether the result can be stored
         try:
             os.makedirs(given_folder() or self.cache_path, 0o755, exist_ok=True)
             os.makedirs(self.cache_path, 0o755, exist_ok=True)
             tempfile.TemporaryFile(dir=self.cache_path).close()
         except OSError as error:
             raise _no_folder(given_folder() or self.cache_path, error) from None
+        # another process may have stored the kernel while this one waited
         return self._load(sig, target_context) if self._take_lock() else None
 
     def _load(self, sig: Any, target_context: Any) -> Any:
-        sys.modules.setdefault(_dynamic_module.__name__, _dynamic_module)  # of functions without a module
+        # pickles of functions without a module name this one, which numba does not add to `sys.modules`
+        sys.modules.setdefault(_dynamic_module.__name__, _dynamic_module)
         try:
             return super().load_overload(sig, target_context)
         except OutputError:
             raise
         except OSError:  # no such folder
             return None
-        except Exception as error:  # a pickle that asks for what is not there raises anything
+        except Exception as error:
+            # a pickle that names something missing may raise anything
             reason = f"{type(error).__name__}: {error}".splitlines()[0]
             self._say(f"cannot load {self._kernel} ({reason}): compiling it again")
             return None
@@ -214,7 +221,7 @@ class KernelCache(_caching.FunctionCache):
             raise _no_folder(given_folder() or self.cache_path, error) from None
 
     def _take_lock(self) -> bool:
-        """Wait until no other process compiles this kernel; False where files cannot be locked."""
+        """Wait until no other process compiles this kernel; return False if files cannot be locked."""
         lock = FileLock(os.path.join(self.cache_path, f"{self._impl.filename_base}.lock"))
         waiting = f"waiting for another process, which compiles {self._kernel} ..."
         gave_up = f"waited {LONGEST_WAIT:.0f} s for {self._kernel}: compiling it here, too"
@@ -231,25 +238,27 @@ class KernelCache(_caching.FunctionCache):
         return False
 
     def release(self) -> None:
-        """Let other processes have the kernel, whether or not it could be compiled."""
+        """Release the lock, also if the kernel could not be compiled."""
         if self._lock is not None:
             self._lock.release()
             self._lock = None
 
 
 def keep(dispatcher: Any, say: Callable[[str], None], identity: str = "") -> None:
-    """Have numba's `dispatcher` keep what it compiles in files, one process at a time compiling a kernel; no
+    """Make numba's `dispatcher` keep what it compiles in files, one process at a time compiling a kernel. No
     folder is looked for before it compiles."""
     compile_now = dispatcher.compile
     files = None
 
     def compile_once(signature: Any) -> Any:
         nonlocal files
-        with global_compiler_lock:  # numba's, of threads; a kernel compiles those that it calls
+        # numba's lock between threads; reentrant, because a kernel compiles those that it calls
+        with global_compiler_lock:
             if files is None:
                 files = dispatcher._cache = KernelCache(dispatcher.py_func, say, identity)
             collects = gc.isenabled()
-            gc.disable()  # it would take a seventh of the time to find nothing
+            # the collector would take a seventh of the time and find nothing
+            gc.disable()
             try:
                 return compile_now(signature)
             finally:
@@ -269,7 +278,7 @@ def _no_folder(folder: str, error: Exception) -> OutputError:
 
 @cache
 def _sources() -> str:
-    """Digest of everything in this package that kernels are made from."""
+    """Return the digest of everything in this package that kernels are made from."""
     rooms = [PACKAGE / room for room in MECHANICS]
     files = [room.with_suffix(".py") for room in rooms]
     return "".join(_digest(file if file.is_file() else room) for room, file in zip(rooms, files, strict=True))
@@ -277,7 +286,7 @@ def _sources() -> str:
 
 @cache
 def _digest(room: Path) -> str:
-    """Digest of a module, or of those in a folder: a kernel may call any that lies beside it."""
+    """Return the digest of a module, or of those in a folder: a kernel may call any module next to it."""
     digest = hashlib.sha256()
     modules = [room] if room.is_file() else room.glob("*.py")
     for path in sorted(path for path in modules if path.is_file()):

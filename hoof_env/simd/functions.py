@@ -1,4 +1,4 @@
-"""Functions of lanes and planes. Where lanes are taken floats are too, so that one function serves both."""
+"""Functions of lanes and planes. Each also takes floats, so that one function serves scalar code, too."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ from hoof_env.simd.types import (
 
 
 def _real(*kinds: Any) -> Any:
-    """The signature of a real result: lanes, or float64 if none of the arguments has lanes."""
+    """Return the signature of a real result: lanes, or float64 if none of the arguments has lanes."""
     count = count_of(*kinds)
     return (Lanes(count) if count else types.float64)(*kinds)
 
@@ -39,34 +39,35 @@ def _like_the_first(*kinds: Any) -> Any:
 
 @instruction(lambda x, y: Plane(count_of(x, y))(x, y))
 def vector(code: Code, x: Any, y: Any) -> Any:
-    """The planar vector (x, y)."""
+    """Return the planar vector (x, y)."""
     return code.join(*code.reals(x, y))
 
 
 @instruction(_like_the_first)
 def perpendicular(code: Code, z: Any) -> Any:
-    """A planar vector turned left by a right angle."""
+    """Return a planar vector turned left by a right angle."""
     ((x, y),) = code.planes(z)
     return code.join(code.builder.fneg(y), x)
 
 
 @instruction(_real_of_planes)
 def dot(code: Code, z: Any, w: Any) -> Any:
-    """Scalar product of planar vectors."""
+    """Return the scalar product of planar vectors."""
     (a, b), (c, d) = code.planes(z, w)
     return fused(code.builder, "+", code.builder.fmul(a, c), code.builder.fmul(b, d))
 
 
 @instruction(_real_of_planes)
 def cross(code: Code, z: Any, w: Any) -> Any:
-    """z x w, positive if w is to the left of z."""
+    """Return z x w, positive if w is to the left of z."""
     (a, b), (c, d) = code.planes(z, w)
     return fused(code.builder, "-", code.builder.fmul(a, d), code.builder.fmul(b, c))
 
 
 @instruction(lambda *kinds: kinds[1](*kinds) if isinstance(kinds[1], Plane) else _real(*kinds))
 def where(code: Code, condition: Any, yes: Any, no: Any) -> Any:
-    """`yes` where the condition holds, else `no`, lane by lane; both real, or both planar vectors."""
+    """Return `yes` where the condition holds, else `no`, lane by lane; both are real, or both planar
+    vectors."""
     select = code.builder.select
     both = code._replace(args=code.args[1:])
     if isinstance(code.result, Plane):
@@ -77,40 +78,40 @@ def where(code: Code, condition: Any, yes: Any, no: Any) -> Any:
 
 @instruction(_real)
 def maximum(code: Code, x: Any, y: Any) -> Any:
-    """y if it is larger, else x: what is not a number stays so if it comes first."""
+    """Return y if it is larger, else x: NaN stays NaN if it is x."""
     x, y = code.reals(x, y)
     return code.builder.select(code.builder.fcmp_ordered(">", y, x), y, x)
 
 
 @instruction(_real)
 def minimum(code: Code, x: Any, y: Any) -> Any:
-    """y if it is smaller, else x: what is not a number stays so if it comes first."""
+    """Return y if it is smaller, else x: NaN stays NaN if it is x."""
     x, y = code.reals(x, y)
     return code.builder.select(code.builder.fcmp_ordered("<", y, x), y, x)
 
 
 @instruction(_real)
 def sqrt(code: Code, x: Any) -> Any:
-    """The square root, rounded correctly."""
+    """Return the square root, correctly rounded."""
     return call(code.builder, "sqrt", code.reals(x))
 
 
 @instruction(_real)
 def absolute(code: Code, x: Any) -> Any:
-    """The absolute value."""
+    """Return the absolute value."""
     return call(code.builder, "fabs", code.reals(x))
 
 
 @instruction(_real)
 def floor(code: Code, x: Any) -> Any:
-    """The largest whole number that is not above it."""
+    """Return the largest whole number that is not above x."""
     return call(code.builder, "floor", code.reals(x))
 
 
 @instruction(lambda *kinds: types.UniTuple(kinds[0], 2)(*kinds))
 def quarter_turns(code: Code, cosine: Any, sine: Any, shifted: Any) -> Any:
-    """(cosine, sine) of an angle plus as many quarter turns as the last two bits of `shifted` say, a whole
-    number to which 3 2^51 was added. Bits are moved, nothing is rounded or compared."""
+    """Return (cosine, sine) of an angle plus some quarter turns: as many as the last two bits of `shifted`
+    say, a whole number to which 3 2^51 was added. Bits are moved, nothing is rounded or compared."""
     builder = code.builder
     count = getattr(code.args[0], "count", 1)
     double = cosine.type
@@ -119,8 +120,10 @@ def quarter_turns(code: Code, cosine: Any, sine: Any, shifted: Any) -> Any:
     def constant(number: int) -> Any:
         return spread(builder, INDEX(number), count)
 
-    odd = builder.sub(constant(0), builder.and_(quarters, constant(1)))  # all bits or none
+    # masks of all bits or none; x ^ ((x ^ y) & mask) exchanges x and y where the mask is set
+    odd = builder.sub(constant(0), builder.and_(quarters, constant(1)))
     swap = builder.and_(builder.xor(cosine, sine), odd)
+    # the sine changes its sign with the second of the two bits, the cosine with that of the next quarter
     top = constant(-(2**63))
     sine_sign = builder.and_(builder.shl(quarters, constant(62)), top)
     cosine_sign = builder.and_(builder.shl(builder.add(quarters, constant(1)), constant(62)), top)
@@ -131,11 +134,12 @@ def quarter_turns(code: Code, cosine: Any, sine: Any, shifted: Any) -> Any:
 
 @instruction(_like_the_first)
 def lane_sum(code: Code, start: Any, x: Any) -> Any:
-    """start + x_0 + x_1 + ..., added in this order, in every lane; `start` is the same in all. Of lanes or of
-    planar vectors."""
+    """Return start + x_0 + x_1 + ..., added in this order, in every lane; `start` is the same in all lanes.
+    Takes lanes or planar vectors."""
     builder = code.builder
     count = code.result.count
 
+    # one lane after the other: the order of a loop over scalars, and so its bits
     def total(start: Any, x: Any) -> Any:
         total = pick(builder, start, 0, count)
         for lane in range(count):
@@ -150,7 +154,7 @@ def lane_sum(code: Code, start: Any, x: Any) -> Any:
 
 @instruction(types.boolean)
 def any_lane(code: Code, condition: Any) -> Any:
-    """Whether a condition holds in any lane."""
+    """Return True if a condition holds in any lane."""
     count = code.args[0].count
     if count == 1:
         return condition
@@ -158,19 +162,21 @@ def any_lane(code: Code, condition: Any) -> Any:
     return code.builder.icmp_unsigned("!=", code.builder.bitcast(condition, bits), bits(0))
 
 
-def _shuffle(builder: Any, one: Any, two: Any, mask: list[int]) -> Any:
-    return builder.shuffle_vector(one, two, ir.Constant(ir.VectorType(ir.IntType(32), len(mask)), mask))
+def _shuffle(builder: Any, left: Any, right: Any, mask: list[int]) -> Any:
+    return builder.shuffle_vector(left, right, ir.Constant(ir.VectorType(ir.IntType(32), len(mask)), mask))
 
 
 def transposed(builder: Any, rows: list[Any], width: int) -> list[Any]:
-    """The columns of rows of so many numbers, one row a lane; both numbers are powers of two. Squares are
-    transposed in log2 steps of exchanging blocks between pairs of rows; where rows are shorter than columns,
-    squares lie side by side."""
+    """Return the columns of rows of `width` numbers, one row a lane; both counts are powers of two.
+
+    Squares are transposed in log2 steps that exchange blocks between pairs of rows; where rows are shorter
+    than columns, squares lie side by side.
+    """
     n = len(rows)
     if n == 1:
         return [pick(builder, rows[0], k, width) for k in range(width)]
     side = min(n, width)
-    found = []
+    columns = []
     for begin in range(0, width, side):
         square = [_shuffle(builder, row, row, list(range(begin, begin + side))) for row in rows]
         size = side
@@ -185,20 +191,20 @@ def transposed(builder: Any, rows: list[Any], width: int) -> list[Any]:
             high = [i + block if not i & block else n + i for i in range(n)]
             for i in range(side):
                 if not i & block:
-                    one = square[i]
-                    two = square[i + block]
-                    swapped[i] = _shuffle(builder, one, two, low)
-                    swapped[i + block] = _shuffle(builder, one, two, high)
+                    upper = square[i]
+                    lower = square[i + block]
+                    swapped[i] = _shuffle(builder, upper, lower, low)
+                    swapped[i + block] = _shuffle(builder, upper, lower, high)
             square = swapped
             block = 2 * block
-        found += square
-    return found
+        columns += square
+    return columns
 
 
 @instruction(lambda pointer, index: types.UniTuple(index, 8)(pointer, index))
 def gather_eight(code: Code, pointer: Any, index: Any) -> Any:
-    """pointer[index] to pointer[index + 7] in every lane, eight results; the index is a double that holds a
-    whole number. One conversion and one load of a vector a lane."""
+    """Return pointer[index] to pointer[index + 7] in every lane, eight results; the index is a double that
+    holds a whole number. It takes one conversion and one load of a vector for each lane."""
     builder = code.builder
     count = getattr(code.args[1], "count", 1)
     loaded = []

@@ -1,5 +1,5 @@
-"""Sets of kernels that are in memory: those of this package stay, those with functions from outside go once
-nothing uses them, but for the last few. numba never gives back the machine code of a set that goes and what
+"""Cache of kernels in memory. Sets of this package stay; sets with functions from outside are dropped once they
+are unused, except for the last few. numba never gives back the machine code of a set that goes and what
 it was made from, 10 MB and more."""
 
 from __future__ import annotations
@@ -11,18 +11,18 @@ from typing import Any
 from weakref import WeakValueDictionary
 
 MOST = 2
-"""Sets with functions from outside that stay though nothing uses them: an id that is made again is there at
-once."""
+"""Number of unused sets with functions from outside that are kept, so that an id that is made again needs no
+compiling."""
 
 
 class Kernels(SimpleNamespace):
-    """A set of kernels by name."""
+    """Set of kernels by name."""
 
-    __slots__ = ("__weakref__",)
+    __slots__ = ("__weakref__",)  # `SimpleNamespace` has no weak references
 
 
 class Kept:
-    """The sets of one kind. Of several threads that ask for a set that is not there one makes it."""
+    """Cache of the sets of one kind. Of several threads that ask for a set that is not there one makes it."""
 
     def __init__(self) -> None:
         self._own: dict[Hashable, Kernels] = {}
@@ -31,7 +31,13 @@ class Kept:
         self._lock = RLock()
 
     def get(self, key: Hashable, make: Callable[[], Kernels], from_outside: bool) -> Any:
-        """The kernels of a key, made where there are none."""
+        """Return the kernels of a key, and make them if there are none.
+
+        Args:
+            key: identifies the set.
+            make: makes it.
+            from_outside: true if the set contains functions from outside this package.
+        """
         with self._lock:
             if not from_outside:
                 if key not in self._own:

@@ -1,6 +1,6 @@
 """Named rows of memory: `leg.theta` instead of a row number.
 
-A subclass of `Layout` says which fields lie one after the other, each a `Row`, a planar `Vector`, a `Block`
+A subclass of `Layout` lists its fields in order, each a `Row`, a planar `Vector`, a `Block`
 of rows or another layout. Positions follow from the order, here and nowhere else. `Annotated[Row, note]` and
 `Annotated[Block, size, note]` keep a note about a field, such as its unit. Kernels reach the fields as
 attributes, of `Rows` on the stack and of `Columns` in an array; Python reaches them by `rows` and `names`.
@@ -24,31 +24,32 @@ from hoof_env.simd.types import INDEX, Code, Columns, Plane, Rows
 
 
 class Row:
-    """One number a lane."""
+    """One number for each lane."""
 
     size: ClassVar[int] = 1
 
 
 class Vector:
-    """A planar vector: two rows, x and y."""
+    """Planar vector: two rows, x and y."""
 
     size: ClassVar[int] = 2
 
 
 class Block:
-    """`Annotated[Block, n]`: n rows, reached by their number; n is a number or a `Size`."""
+    """Several rows that are reached by their number: `Annotated[Block, n]`, where n is a number or a
+    `Size`."""
 
 
 class Size(NamedTuple):
-    """How many rows a block has unless `Layout.sized` says otherwise; with 0 it is no memory, but a name that
-    kernels may mention where they do not go."""
+    """Default number of rows of a block, which `Layout.sized` may change. With 0 it takes no memory; kernels
+    may still mention its name in branches that are not taken."""
 
     name: str
     rows: int
 
 
 class Field(NamedTuple):
-    """The first row of a field, how many it has, and what it is: `Row`, `Vector`, `Block` or a layout."""
+    """First row of a field, its number of rows, and its kind: `Row`, `Vector`, `Block` or a layout."""
 
     start: int
     size: int
@@ -56,7 +57,7 @@ class Field(NamedTuple):
 
 
 class _Named(type):
-    """Makes of the annotations of a `Layout` its fields."""
+    """Metaclass that makes the fields of a `Layout` from its annotations."""
 
     fields: dict[str, Field]
     notes: dict[str, Any]
@@ -81,12 +82,12 @@ class _Named(type):
         cls.names = tuple(names)
 
     def rows(cls, name: str) -> slice:
-        """The rows of a field."""
+        """Return the rows of a field."""
         start, size, _ = cls.fields[name]
         return slice(start, start + size)
 
     def sized(cls, **sizes: int) -> Any:
-        """The layout, and all inside it, with other numbers of rows for the `Size`s that are named."""
+        """Return this layout, and all inside it, with other numbers of rows for the named `Size`s."""
         return _sized(cls, tuple(sorted(sizes.items())))
 
 
@@ -96,8 +97,8 @@ class Layout(metaclass=_Named):
     Attributes:
         fields: `Field`s by name; `sized` gives the layout with other sizes of blocks.
         notes: notes about fields, by name, of those that have one.
-        size: how many rows they take.
-        names: of the rows, those of inner fields behind their field's name.
+        size: number of rows.
+        names: names of the rows, those of inner fields behind their field's name.
     """
 
 
@@ -115,17 +116,21 @@ def _sized(layout: Any, sizes: tuple[tuple[str, int], ...]) -> Any:
         if isinstance(size, Size):
             size = size._replace(rows=wanted.get(size.name, size.rows))
         kept[key] = Annotated[(Block, size, *rest)]
+    # the layout itself if nothing changed: equal layouts must be one type to numba
     if kept == hints:
-        return layout  # one layout, one type
+        return layout
     name = layout.__qualname__ + "".join(f" {key}={rows}" for key, rows in sizes)
     return _Named(name, (Layout,), {"__annotations__": kept, "__module__": layout.__module__})
 
 
 def views(layout: Any, data: NDArray[Any]) -> Any:
-    """The fields of memory by name, as views of an array whose first axis is the rows: of a `Row` without
-    that axis, of anything else with it."""
-    found = {name: data[layout.rows(name)] for name in layout.fields}
-    return SimpleNamespace(**{k: v[0] if layout.fields[k].kind is Row else v for k, v in found.items()})
+    """Return the fields of memory by name, as views of an array. Its first axis is the rows; the view of a
+    `Row` does not have that axis."""
+    fields = {}
+    for name, field in layout.fields.items():
+        rows = data[layout.rows(name)]
+        fields[name] = rows[0] if field.kind is Row else rows
+    return SimpleNamespace(**fields)
 
 
 def _taken_apart(hint: Any) -> tuple[Any, list[Any]]:
@@ -144,7 +149,7 @@ def _names(key: str, field: Field) -> list[str]:
 
 
 class LayoutConstant(types.Opaque):
-    """numba's type of a layout, which a kernel hands to `rows`, `columns` and `block_at`."""
+    """Numba's type of a layout, which a kernel passes to `rows`, `columns` and `block_at`."""
 
     def __init__(self, layout: Any) -> None:
         self.layout = layout
@@ -165,11 +170,11 @@ def _no_value(context: Any, builder: Any, kind: Any, value: Any) -> Any:
 
 
 class Constants:
-    """Base of named tuples that kernels take as a whole: layouts, and numbers that the compiler knows."""
+    """Base of named tuples that kernels take as a whole: layouts, and numbers that the compiler must know."""
 
 
 class ConstantsType(types.Opaque):
-    """numba's type of one such tuple: what it holds is part of the type."""
+    """Numba's type of one such tuple; its values are part of the type."""
 
     def __init__(self, given: Any) -> None:
         self.given = given
@@ -201,6 +206,7 @@ class _PartsOfConstants(AttributeTemplate):
 @lower_getattr_generic(ConstantsType)
 def _get_part(context: Any, builder: Any, kind: Any, value: Any, name: str) -> Any:
     part = getattr(kind.given, name)
+    # a layout is in the type alone; there is nothing at run time
     if isinstance(part, _Named):
         return context.get_dummy_value()
     return context.get_constant(types.boolean if isinstance(part, bool) else types.intp, part)
@@ -213,6 +219,7 @@ def _vector_type(memory: Any) -> Any:
 class _FieldsOfMemory(AttributeTemplate):
     def generic_resolve(self, memory: Any, name: str) -> Any:  # type: ignore[override]
         field = memory.layout and memory.layout.fields.get(name)
+        # None makes numba report an unknown attribute
         if not field:
             return None
         if field.kind is Row:
@@ -238,10 +245,12 @@ def _set_field(context: Any, builder: Any, signature: Any, values: Any, name: st
     (place, value) = values
     (start, _, kind) = memory.layout.fields[name]
     code = Code(context, builder)
+    # a whole block would need a copy of memory; kernels have no use for it
     if kind not in (Row, Vector):
         raise TypeError(f"{name}: the rows of a block or a layout are set one by one")
-    for k, x in enumerate([value] if kind is Row else code.split(given, value)):
-        write_row(code, memory, place, INDEX(start + k), x)
+    parts = [value] if kind is Row else code.split(given, value)
+    for k, part in enumerate(parts):
+        write_row(code, memory, place, INDEX(start + k), part)
 
 
 for _memory in (Rows, Columns):

@@ -2,12 +2,12 @@
 
 Only + - * /, fused operations and sqrt, which IEEE 754 rounds correctly in scalar and in vector code, and
 selections; no library function, no table, no branch that depends on the data. So a lane has the bits that it
-would have alone. Ordinary floats are taken, too, but their products are rounded before they enter a sum. What
-is not a number stays so.
+would have alone. Ordinary floats are accepted, too, but their products are rounded before they enter a sum.
+NaN stays NaN.
 
 Sources: Cody & Waite 1980 (Software Manual for the Elementary Functions) for the reduction in two parts;
 the coefficients of sine and cosine are fdlibm's (Sun Microsystems, k_sin.c and k_cos.c, minimax on
-[-pi/4, pi/4]); Estrin's scheme, whose chains of operations are short.
+[-pi/4, pi/4]); Estrin's scheme, which makes short chains of operations.
 """
 
 from __future__ import annotations
@@ -18,10 +18,10 @@ from hoof_env.simd import absolute, maximum, minimum, quarter_turns, sqrt, where
 from hoof_env.simd.compile import inline_llvm
 
 EXPONENT_UNIT = 8
-"""`root_power` takes the exponents that are whole multiples of 1 / EXPONENT_UNIT."""
+"""Denominator of the exponents that `root_power` takes: whole multiples of 1 / EXPONENT_UNIT."""
 
 LOWEST_EXPONENT = -40.0
-"""Below this `exp_of_negative` stays at exp(-40) = 4e-18."""
+"""Lowest exponent of `exp_of_negative`: below it the result stays at exp(-40) = 4e-18."""
 
 TWO_OVER_PI = 2 / math.pi
 HALF_PI_HIGH = float.fromhex("0x1.921fb54400000p+0")  # 33 bits of pi / 2: exact times whole numbers < 2^20
@@ -31,14 +31,15 @@ ROUNDER = 1.5 * 2.0**52  # adding and subtracting it rounds to the nearest whole
 
 @inline_llvm
 def root_power(d, eighths):  # type: ignore[no-untyped-def]
-    """d^(eighths / 8) by square roots; 0 for negative d, relative error below 1e-15. `eighths` is a whole
-    number from 8 to 24, the same in all lanes."""
+    """Return d^(eighths / 8) by square roots; 0 for negative d, relative error below 1e-15. `eighths` is a
+    whole number from 8 to 24, the same in all lanes."""
     base = maximum(d, 0.0)
     power = base
     if eighths >= 16:
         power = power * base
     if eighths == 24:
         power = power * base
+    # the bits of the rest: 1/2, 1/4 and 1/8
     rest = eighths & 7
     if rest != 0:
         half = sqrt(base)
@@ -55,8 +56,9 @@ def root_power(d, eighths):  # type: ignore[no-untyped-def]
 
 @inline_llvm
 def exp_of_negative(x):  # type: ignore[no-untyped-def]
-    """exp(x) for x <= 0, relative error below 1e-13; exp(-40) below -40. The series of exp(x / 256), squared
-    eight times."""
+    """Return exp(x) for x <= 0, relative error below 1e-13; exp(-40) below -40. The series of exp(x / 256),
+    squared eight times."""
+    # Taylor's series to the tenth power, by Horner's rule
     y = maximum(x, LOWEST_EXPONENT) * (1 / 256)
     e = 1 / 3628800
     e = e * y + 1 / 362880
@@ -81,7 +83,7 @@ def exp_of_negative(x):  # type: ignore[no-untyped-def]
 
 @inline_llvm
 def tanh(x):  # type: ignore[no-untyped-def]
-    """Hyperbolic tangent, error below 1e-13."""
+    """Return the hyperbolic tangent, error below 1e-13."""
     e = exp_of_negative(-2.0 * absolute(x))
     part = (1.0 - e) / (1.0 + e)
     return where(x < 0.0, -part, part)
@@ -89,9 +91,10 @@ def tanh(x):  # type: ignore[no-untyped-def]
 
 @inline_llvm
 def cos_sin(angle):  # type: ignore[no-untyped-def]
-    """Cosine and sine of `angle` [rad], error below 2e-16 for |angle| < 1e4."""
+    """Return cosine and sine of `angle` [rad], error below 2e-16 for |angle| < 1e4."""
     shifted = angle * TWO_OVER_PI + ROUNDER
     turns = shifted - ROUNDER  # quarter turns to the nearest multiple of pi / 2
+    # the first product is exact for up to 2^20 quarter turns, so no digits are lost in the difference
     r = (angle - turns * HALF_PI_HIGH) - turns * HALF_PI_LOW
     z = r * r
     z2 = z * z
@@ -104,11 +107,12 @@ def cos_sin(angle):  # type: ignore[no-untyped-def]
     c = c + z2 * z2 * (2.08757232129817482790e-09 + -1.13596475577881948265e-11 * z)
     half = 0.5 * z
     main = 1.0 - half
-    cosine = main + (((1.0 - main) - half) + z * (z * c))  # what `main` lost in rounding is put back
+    # (1 - main) - half is the rounding error of `main`
+    cosine = main + (((1.0 - main) - half) + z * (z * c))
     return quarter_turns(cosine, sine, shifted)
 
 
 @inline_llvm
 def clip(x, bound):  # type: ignore[no-untyped-def]
-    """`x` limited to [-bound, bound]."""
+    """Return `x` limited to [-bound, bound]."""
     return minimum(maximum(x, -bound), bound)

@@ -1,9 +1,9 @@
 """Memory for kernels without reference counts: the stack, addresses of a caller's arrays, and rows of lanes.
 
-numba counts references to every array that a kernel slices, with atomic instructions; in a step of a
-hundred nanoseconds that is most of the time. Arrays made by `numba.carray` from these pointers are not
-counted. Memory on the stack cannot be aliased, so that loops over it become vector code,
-and where every index is a constant it becomes registers.
+numba counts references to every array that a kernel slices, with atomic instructions; in a step of a hundred
+nanoseconds that is most of the time. Arrays made by `numba.carray` from these pointers are not counted.
+Memory on the stack cannot be aliased, so that loops over it become vector code, and where every index is a
+constant it becomes registers.
 """
 
 from __future__ import annotations
@@ -37,25 +37,31 @@ from hoof_env.simd.types import (
 )
 
 LINE = 64
-"""Bytes of a line of the cache, and of the widest vector."""
+"""Size of a cache line, and of the widest vector [bytes]."""
 
 
 LARGE = 2**21
+"""Size of a large page of the system [bytes]."""
+
 ENOUGH = 2**22
-"""Bytes of a large page of the system, and of the smallest array for which NumPy asks for them."""
+"""Size of the smallest array for which NumPy asks for large pages [bytes]."""
 
 
 def aligned(*shape: int) -> NDArray[np.float64]:
-    """A new array of doubles, not filled, that begins with a line of the cache: a vector that lies across two
-    takes two loads. One as large as a large page begins with one, where the system has them: else each row of
-    many environments is in a page of its own, and to find pages takes time. That reserves up to 4 MiB more,
-    of which nothing is touched."""
+    """Return a new array of doubles, not filled, that begins at a cache line: a vector across two lines takes
+    two loads.
+
+    An array of a large page or more begins at such a page, if the system has them: otherwise each row of many
+    environments lies in a page of its own, and address translation takes time. This reserves up to 4 MiB
+    more, which are not touched.
+    """
     size = math.prod(shape)
-    each = np.dtype(np.float64).itemsize
-    is_large = size * each >= LARGE
-    step, least = (LARGE, ENOUGH // each) if is_large else (LINE, 0)
-    room = np.empty(max(size, least) + step // each)
-    first = -room.ctypes.data % step // each
+    item_size = np.dtype(np.float64).itemsize
+    is_large = size * item_size >= LARGE
+    step, least = (LARGE, ENOUGH // item_size) if is_large else (LINE, 0)
+    # more than needed, so that an aligned array fits wherever NumPy's memory begins
+    room = np.empty(max(size, least) + step // item_size)
+    first = -room.ctypes.data % step // item_size
     return room[first : first + size].reshape(shape)
 
 
@@ -64,8 +70,8 @@ def aligned(*shape: int) -> NDArray[np.float64]:
 
 @instruction(lambda count: types.CPointer(types.float64)(count))
 def doubles(code: Code, count: Any) -> Any:
-    """A pointer to `count` doubles on the stack of the function that calls it, gone when that returns, an
-    inlined one included; not for use in a loop."""
+    """Return a pointer to `count` doubles on the stack of the calling function, an inlined one included; they
+    are gone when it returns. Not for use in a loop, where each turn would take more of the stack."""
     place = code.builder.alloca(DOUBLE, size=count)
     place.align = LINE
     return place
@@ -73,18 +79,19 @@ def doubles(code: Code, count: Any) -> Any:
 
 @instruction(lambda array: types.CPointer(array.dtype)(array))
 def address(code: Code, array: Any) -> Any:
-    """A pointer to the first element of a C-contiguous array; the caller keeps the array alive."""
+    """Return a pointer to the first element of a C-contiguous array; the caller must keep the array alive."""
     return cgutils.create_struct_proxy(code.args[0])(code.context, code.builder, value=array).data
 
 
 @instruction(lambda pointer, count: pointer(pointer, count))
 def offset(code: Code, pointer: Any, count: Any) -> Any:
-    """The pointer `count` elements further on."""
+    """Return the pointer `count` elements further on."""
     return code.builder.gep(pointer, [count])
 
 
 def _pointer_to(kind: Any) -> Any:
-    """A function for kernels that makes a pointer to numba's type `kind` of an address, a whole number."""
+    """Return a function for kernels that makes a pointer to numba's type `kind` from an address, a whole
+    number."""
     return instruction(lambda number: types.CPointer(kind)(types.int64))(
         lambda code, number: code.builder.inttoptr(number, code.context.get_value_type(code.result))
     )
@@ -92,19 +99,21 @@ def _pointer_to(kind: Any) -> Any:
 
 doubles_at = _pointer_to(types.float64)
 singles_at = _pointer_to(types.float32)
-"""For kernels: a pointer to what is at an address."""
+"""Functions for kernels that return a pointer to the doubles, or singles, at an address."""
 
 COLUMNS = 2
-"""Behind the slot of a matrix in an array of `Addresses`: how many columns it has."""
+"""Offset from the slot of a matrix in an array of `Addresses` to its number of columns."""
 
 
 class Addresses:
-    """Where some arrays are, in one array of whole numbers.
+    """Addresses of some arrays, in one array of whole numbers.
 
     A call from Python takes a tenth of a microsecond for each array; one array of addresses replaces many.
-    Whoever makes it keeps the arrays alive, and makes it anew for a copy. `slots` says by the arrays' names
-    where the address of each is; behind it is its shape. In slots `begin` and `end` is which columns a call
-    is about.
+    The caller must keep the arrays alive, and make new addresses for a copy.
+
+    Attributes:
+        slots: for each array, by its name, the position of its address; its shape follows there.
+        begin, end: positions of the range of columns that a call works on.
     """
 
     def __init__(self, *names: str) -> None:
@@ -113,7 +122,8 @@ class Addresses:
         self.end = 4 * len(names) + 1
 
     def of(self, *arrays: NDArray[Any], columns: range) -> NDArray[np.int64]:
-        """The array of addresses; the arrays in the order of the names, each of three axes at most."""
+        """Return the array of addresses. The arrays are in the order of the names, each of at most three
+        axes."""
         rows = [[a.ctypes.data, *a.shape, *[0] * (3 - a.ndim)] for a in arrays]
         assert len(rows) == len(self.slots)
         return np.array([*np.ravel(rows), columns.start, columns.stop], np.int64)
@@ -121,19 +131,19 @@ class Addresses:
 
 @inline_llvm
 def matrix_at(addresses, slot):  # type: ignore[no-untyped-def]
-    """The array of doubles, of two axes, whose slot in an array of `Addresses` is given."""
+    """Return the array of doubles, of two axes, at a slot of an array of `Addresses`."""
     return carray(doubles_at(addresses[slot]), (addresses[slot + 1], addresses[slot + 2]))
 
 
 @inline_llvm
 def cube_at(addresses, slot):  # type: ignore[no-untyped-def]
-    """The same of three axes."""
+    """Return the array of doubles, of three axes, at a slot of an array of `Addresses`."""
     shape = (addresses[slot + 1], addresses[slot + 2], addresses[slot + 3])
     return carray(doubles_at(addresses[slot]), shape)
 
 
 def record_at(kind: np.dtype[Any]) -> Any:
-    """For kernels: the array of one record of a type at an address."""
+    """Return a function for kernels that makes an array of one record of a type from an address."""
     pointer = _pointer_to(from_dtype(kind))
     return inline_llvm(lambda number: carray(pointer(number), (1,)))
 
@@ -147,8 +157,8 @@ def _layout(constant: Any) -> Any:
 
 @instruction(lambda *kinds: Rows(kinds[1].literal_value, _layout(kinds[2]))(*kinds), literal=True)
 def rows(code: Code, pointer: Any, count: Any, layout: Any) -> Any:
-    """The memory at a pointer to doubles, aligned to 64 bytes, as rows of `count` lanes, a constant, with the
-    names of a layout, or None."""
+    """Return the memory at a pointer to doubles, aligned to 64 bytes, as rows of `count` lanes, a constant,
+    with the names of a layout, or None."""
     return pointer
 
 
@@ -159,8 +169,8 @@ def rows(code: Code, pointer: Any, count: Any, layout: Any) -> Any:
     literal=True,
 )
 def columns(code: Code, pointer: Any, count: Any, layout: Any, start: Any, row: Any, stride: Any) -> Any:
-    """Columns of an array of doubles, `stride` apart; its rows are `row` apart, and the first number of the
-    first one is pointer[start]. They have the names of a layout, or None."""
+    """Return columns of an array of doubles, `stride` apart; its rows are `row` apart, and the first number
+    of the first column is pointer[start]. They have the names of a layout, or None."""
     record = code.context.make_helper(code.builder, code.result)
     record.first = code.builder.gep(pointer, [start])
     record.row = row
@@ -170,13 +180,13 @@ def columns(code: Code, pointer: Any, count: Any, layout: Any, start: Any, row: 
 
 @instruction(lambda rows, number: rows(rows, types.intp))
 def block_at(code: Code, rows: Any, number: Any) -> Any:
-    """The rows of the `number`-th of several layouts one after the other; rows with the names of a layout are
-    those of the first."""
+    """Return the rows of the `number`-th of several equal layouts one after the other, the first of which is
+    `rows`."""
     return part_of(code, code.args[0], rows, code.builder.mul(number, INDEX(code.args[0].layout.size)))
 
 
 def part_of(code: Code, memory: Any, value: Any, first: Any) -> Any:
-    """Rows or columns from row `first` on."""
+    """Return the rows or columns from row `first` on."""
     builder = code.builder
     if isinstance(memory, Rows):
         return builder.gep(value, [builder.mul(first, INDEX(memory.count))], inbounds=True)
@@ -186,12 +196,12 @@ def part_of(code: Code, memory: Any, value: Any, first: Any) -> Any:
 
 
 def row_type(memory: Any) -> Any:
-    """The type of a row."""
+    """Return the type of a row."""
     return Lanes(memory.count) if memory.count else types.float64
 
 
 def read_row(code: Code, memory: Any, value: Any, row: Any) -> Any:
-    """The lanes of a row."""
+    """Return the lanes of a row."""
     if isinstance(memory, Rows):
         return code.builder.load(_place(code.builder, value, row, memory.count), align=8 * memory.count)
     record = code.context.make_helper(code.builder, memory, value=value)
@@ -200,7 +210,7 @@ def read_row(code: Code, memory: Any, value: Any, row: Any) -> Any:
 
 
 def write_row(code: Code, memory: Any, value: Any, row: Any, x: Any) -> None:
-    """Put lanes into a row."""
+    """Store lanes in a row."""
     if isinstance(memory, Rows):
         code.builder.store(x, _place(code.builder, value, row, memory.count), align=8 * memory.count)
         return
@@ -215,23 +225,26 @@ def _place(builder: Any, rows: Any, row: Any, count: int) -> Any:
 
 
 def _read(builder: Any, pointer: Any, at: Any, stride: Any, count: int) -> Any:
-    """`count` doubles from pointer[at] on, `stride` apart: one load if they are neighbours."""
+    """Read `count` doubles from pointer[at] on, `stride` apart: one load if they are neighbours."""
     first = builder.gep(pointer, [at])
     element = pointer.type.pointee
     if count == 1:
         loaded = builder.load(first)
     else:
+        # a branch at run time, so that one kernel serves both orders of memory
         with builder.if_else(builder.icmp_signed("==", stride, INDEX(1))) as (near, far):
             with near:
-                one = builder.load(builder.bitcast(first, wide(element, count).as_pointer()), align=4)
+                # singles may begin at any multiple of four bytes
+                whole = builder.load(builder.bitcast(first, wide(element, count).as_pointer()), align=4)
                 after_near = builder.block
             with far:
                 places = [builder.add(at, builder.mul(stride, INDEX(lane))) for lane in range(count)]
-                many = gathered(builder, [builder.load(builder.gep(pointer, [place])) for place in places])
+                loads = [builder.load(builder.gep(pointer, [place])) for place in places]
+                collected = gathered(builder, loads)
                 after_far = builder.block
-        loaded = builder.phi(one.type)
-        loaded.add_incoming(one, after_near)
-        loaded.add_incoming(many, after_far)
+        loaded = builder.phi(whole.type)
+        loaded.add_incoming(whole, after_near)
+        loaded.add_incoming(collected, after_far)
     return builder.fpext(loaded, wide(DOUBLE, count)) if element == SINGLE else loaded
 
 
@@ -253,13 +266,13 @@ def _write(builder: Any, x: Any, pointer: Any, at: Any, stride: Any, count: int)
 
 @instruction(lambda rows, pointer, start, stride: Lanes(rows.count)(rows, pointer, types.intp, types.intp))
 def read(code: Code, rows: Any, pointer: Any, start: Any, stride: Any) -> Any:
-    """pointer[start], pointer[start + stride], ...: as many as the rows have lanes. Singles are widened."""
+    """Return pointer[start], pointer[start + stride], ... as the lanes of `rows`. Singles are widened."""
     return _read(code.builder, pointer, start, stride, code.result.count)
 
 
 @instruction(lambda x, pointer, start, stride: types.void(x, pointer, types.intp, types.intp))
 def write(code: Code, x: Any, pointer: Any, start: Any, stride: Any) -> None:
-    """Put lanes at pointer[start], pointer[start + stride], ...; rounded if singles are there."""
+    """Store lanes at pointer[start], pointer[start + stride], ...; they are rounded if singles are there."""
     _write(code.builder, x, pointer, start, stride, code.args[0].count)
 
 
@@ -279,26 +292,26 @@ def load_rows(code: Code, rows: Any, columns: Any) -> None:
 
 @instruction(lambda rows, value: Lanes(rows.count)(rows, value))
 def full_like(code: Code, rows: Any, value: Any) -> Any:
-    """The same value in every lane of what these rows hold."""
+    """Return the same value in every lane of `rows`."""
     return code.number(code.args[1], value, code.result.count)
 
 
 @instruction(lambda x, lane: types.float64(x, types.intp))
 def lane_of(code: Code, x: Any, lane: Any) -> Any:
-    """One lane as an ordinary number."""
+    """Return one lane as an ordinary number."""
     return x if code.args[0].count == 1 else code.builder.extract_element(x, lane)
 
 
 @instruction(lambda rows, row, lane, x: types.void(rows, types.intp, types.intp, types.float64))
 def set_lane(code: Code, rows: Any, row: Any, lane: Any, x: Any) -> None:
-    """Put an ordinary number into one lane of a row."""
+    """Store an ordinary number in one lane of a row."""
     at = code.builder.add(code.builder.mul(row, INDEX(code.args[0].count)), lane)
     code.builder.store(x, code.builder.gep(rows, [at], inbounds=True))
 
 
 @instruction(types.void)
 def store_vectors(code: Code, rows: Any, vectors: Any) -> None:
-    """Put a tuple of planar vectors into rows, two rows each."""
+    """Store a tuple of planar vectors in rows, two rows each."""
     memory, kind = code.args
     for k in range(kind.count):
         for part, x in enumerate(code.split(kind.dtype, code.builder.extract_value(vectors, k))):

@@ -1,4 +1,4 @@
-"""Operators on lanes, planes and masks."""
+"""Operators on lanes, planes and masks, taught to numba."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from hoof_env.simd.types import Code, Lanes, Mask, Plane, count_of, fused, is_re
 
 
 def _operation(function: Any, typed: Callable[..., Any], lowered: Callable[..., Any], arity: int = 2) -> None:
-    """Teach numba an operator: `typed` gives the result's type or None, `lowered` the code."""
+    """Teach numba an operator: `typed` returns the result's type or None, `lowered` writes the code."""
 
     class Template(AbstractTemplate):
         def generic(self, args: Any, kws: Any) -> Any:
@@ -31,8 +31,9 @@ def _operation(function: Any, typed: Callable[..., Any], lowered: Callable[..., 
     kinds = (Lanes, Plane, Mask)
     patterns: list[Any] = [(kind,) for kind in kinds]
     if arity == 2:
-        patterns = [(one, two) for one in kinds for two in kinds]
-        patterns += [pair for kind in kinds[:2] for pair in ((kind, types.Number), (types.Number, kind))]
+        patterns = [(left, right) for left in kinds for right in kinds]
+        for kind in kinds[:2]:
+            patterns += [(kind, types.Number), (types.Number, kind)]
     for pattern in patterns:
         lower_builtin(function, *pattern)(lower)
 
@@ -78,6 +79,7 @@ def _product(code: Code, one: Any, two: Any) -> Any:
     if isinstance(code.result, Lanes):
         return times(*code.reals(one, two))
     if isinstance(left, Plane) and isinstance(right, Plane):
+        # two planar vectors multiply like complex numbers
         (a, b), (c, d) = code.planes(one, two)
         x = fused(builder, "-", times(a, c), times(b, d))
         y = fused(builder, "+", times(a, d), times(b, c))
@@ -98,6 +100,7 @@ def _negative(code: Code, z: Any) -> Any:
 
 def _comparison(symbol: str) -> Callable[..., Any]:
     def lowered(code: Code, one: Any, two: Any) -> Any:
+        # NaN differs from everything, and no other comparison with it is true
         compare = code.builder.fcmp_unordered if symbol == "!=" else code.builder.fcmp_ordered
         return compare(symbol, *code.reals(one, two))
 
@@ -113,10 +116,15 @@ _operation(operator.sub, _sum_type, _sum("-"))
 _operation(operator.mul, _product_type, _product)
 _operation(operator.truediv, _of_reals(Lanes), _quotient)
 _operation(operator.neg, lambda z: None if isinstance(z, Mask) else z, _negative, arity=1)
-for _function, _symbol in (
-    (operator.lt, "<"), (operator.le, "<="), (operator.gt, ">"), (operator.ge, ">="),
-    (operator.eq, "=="), (operator.ne, "!="),
-):  # fmt: skip
+_COMPARISONS = {
+    operator.lt: "<",
+    operator.le: "<=",
+    operator.gt: ">",
+    operator.ge: ">=",
+    operator.eq: "==",
+    operator.ne: "!=",
+}
+for _function, _symbol in _COMPARISONS.items():
     _operation(_function, _of_reals(Mask), _comparison(_symbol))
 _operation(operator.and_, _both_masks, _logic("and_"))
 _operation(operator.or_, _both_masks, _logic("or_"))

@@ -1,10 +1,10 @@
-"""What the functions from outside this package reach: a digest of all code and of all values that they name,
-so that a stored kernel is never taken for one of other code.
+"""Digest of all code and all values that functions from outside this package reach, so that a stored kernel
+is never used for other code.
 
-Names are followed as the bytecode follows them: globals, what a function encloses, attributes of modules and
-classes, and in turn whatever those functions name. Where a module itself is handed on, all of it counts. Of
-the standard library and of installed packages the version counts, too, for their code may not be readable.
-What numba would compile, but cannot be read, is refused by name.
+Names are followed as the bytecode follows them: globals, enclosed variables, attributes of modules and
+classes, and in turn the names of the functions that are found. A module that is passed on as a whole counts
+as a whole. For the standard library and installed packages the version counts, too, because their code may
+not be readable. What numba would compile, but cannot be read, is refused by name.
 """
 
 from __future__ import annotations
@@ -40,16 +40,16 @@ _PLAIN = (bool, int, float, complex, str, bytes, type(None), type(Ellipsis), np.
 _MISSING = object()
 _FOLLOWED = (ModuleType, type, enum.Enum)
 _NAMED_ONLY = ("numpy", "numba", "llvmlite", "scipy", "math", "cmath", "builtins")
-"""Libraries whose code numba replaces by its own: their versions count alone."""
+"""Libraries with code that numba replaces by its own: only their versions count."""
 
 
 def fingerprint(*values: Any) -> str:
-    """What tells kernels apart that contain different functions: a digest of all that they reach. An edit of
-    any of it changes it; it is the same in every process. Functions of the mechanics are named only, for a
-    digest of their sources is in every kernel's stamp.
+    """Return a digest of everything that functions reach, which identifies the kernels that contain them. An
+    edit of any of it changes the digest; it is the same in every process. Functions of the mechanics are only
+    named: a digest of their sources is in every kernel's stamp.
 
     Raises:
-        ParameterError: something that cannot be read, as a function in machine code.
+        ParameterError: something cannot be read, such as a function in machine code.
     """
     digest = _Digest()
     for value in values:
@@ -58,25 +58,27 @@ def fingerprint(*values: Any) -> str:
 
 
 def refresh(*values: Any) -> None:
-    """Have numba forget what it compiled of the helpers that functions from outside call, where something
-    that they reach has changed since, as in a notebook; what they keep in files is not looked at.
+    """Make numba forget the compiled helpers of functions from outside, if something that they reach has
+    changed since, as in a notebook. Their cache files are not read.
 
-    A helper's machine code gets a name of its own, for of two functions of one name the first is called.
+    The machine code of each version of a helper gets a name of its own: of two functions of one name the
+    first is called.
     """
     reached = _Digest()
     for value in values:
         reached.add(value)
     for helper in reached.helpers.values():
-        now = fingerprint(helper)
-        if _compiled_as.get(helper) == now:
+        present = fingerprint(helper)
+        if _compiled_as.get(helper) == present:
             continue
-        _compiled_as[helper] = now
+        _compiled_as[helper] = present
         function = helper.py_func
         name = _names.setdefault(function, function.__qualname__)
-        function.__qualname__ = f"{name}.{now[:12]}"
+        function.__qualname__ = f"{name}.{present[:12]}"
         with global_compiler_lock:
+            # numba looks for changes only in the helper's own file
             if hasattr(helper, "_cache"):
-                helper._cache = NullCache()  # numba looks for changes in the helper's own file alone
+                helper._cache = NullCache()
             helper._make_finalizer()()
             helper._reset_overloads()
 
@@ -85,15 +87,15 @@ _compiled_as: WeakKeyDictionary[Any, str] = WeakKeyDictionary()
 """Helpers and their fingerprints when they were compiled."""
 
 _names: WeakKeyDictionary[Any, str] = WeakKeyDictionary()
-"""Functions and their names before they got one of their own."""
+"""Functions and their qualified names before `refresh` changed them."""
 
 
 class _Digest:
-    """A walk through everything that is reached."""
+    """Walk through everything that is reached."""
 
     def __init__(self) -> None:
         self.sha = hashlib.sha256()
-        self.known: dict[int, Any] = {}  # with the value, whose id may else be another's
+        self.known: dict[int, Any] = {}  # keeps the values alive, so that no id is used twice
         self.helpers: dict[int, Any] = {}
 
     def hexdigest(self) -> str:
@@ -103,7 +105,7 @@ class _Digest:
         self.sha.update(f"{text};".encode())
 
     def add(self, value: Any, name: str = "") -> None:
-        """Whatever it is; `name` is what a refusal says."""
+        """Add a value of any kind; `name` is its name in a refusal."""
         if isinstance(value, enum.Enum):
             self.put(f"{_named(type(value))} {value.name}")
             self.add(value.value, name)
@@ -132,7 +134,7 @@ class _Digest:
             self._add_code_of(value, name)
 
     def _add_code_of(self, value: Any, name: str) -> None:
-        """What has code: functions, classes, modules and their like."""
+        """Add something that has code: a function, a class, a module or the like."""
         if isinstance(value, Dispatcher):
             if not _is_ours(value.py_func) and not is_library(value.py_func):
                 self.helpers[id(value)] = value
@@ -152,7 +154,8 @@ class _Digest:
             self.put(f"{type(value).__name__} {value!r}")
         elif _is_known_to_numba(value):
             raise _unreadable(name, value)
-        else:  # numba refuses it
+        else:
+            # numba cannot compile it, so it cannot change a kernel
             self.put(_named(type(value)))
 
     def _add_function(self, function: FunctionType) -> None:
@@ -163,7 +166,8 @@ class _Digest:
             self.put(version_of(_module_of(function)))
             if _top(_module_of(function)) in _NAMED_ONLY or _is_standard(function.__code__.co_filename):
                 return
-            with suppress(ParameterError):  # the version stands for what cannot be read
+            # the version stands for what cannot be read
+            with suppress(ParameterError):
                 self._add_code(function.__code__, function.__globals__, cells)
             # a factory of one version makes many functions, which differ in what they enclose
             for name, value in cells.items():
@@ -174,13 +178,14 @@ class _Digest:
         if not _is_ours(function):
             self._add_code(function.__code__, function.__globals__, cells)
         for name, value in cells.items():
-            if not isinstance(value, ModuleType):  # what is read of one is followed
+            # of an enclosed module only the attributes that the code reads count, in `_add_code`
+            if not isinstance(value, ModuleType):
                 self.add(value, name)
         for value in (*(function.__defaults__ or ()), *(function.__kwdefaults__ or {}).values()):
             self.add(value, function.__qualname__)
 
     def _add_code(self, code: CodeType, names: Mapping[str, Any], cells: Mapping[str, Any]) -> None:
-        """The code of a function, that of inner ones, and what both name."""
+        """Add the code of a function and of its inner functions, and what they name."""
         self.put(repr((code.co_names, code.co_varnames, code.co_freevars, code.co_argcount)))
         self.sha.update(code.co_code)
         for constant in code.co_consts:
@@ -201,11 +206,12 @@ class _Digest:
             is_enclosed = root in cells and where == root and not isinstance(value, ModuleType)
             if value is _MISSING:
                 self.put("nothing")
-            elif not is_enclosed:  # that comes next
+            # `_add_function` adds enclosed values itself
+            elif not is_enclosed:
                 self.add(value, where)
 
     def _add_module(self, module: ModuleType) -> None:
-        """A module that is handed on: all that is in it."""
+        """Add a module that is passed on as a whole: all that is in it."""
         self.put(module.__name__)
         if _is_foreign(module):
             self.put(version_of(module.__name__))
@@ -224,7 +230,8 @@ class _Digest:
             return
         if _is_ours(kind):
             return
-        if struct := getattr(kind, "class_type", None):  # of numba.experimental.jitclass
+        # a class of numba.experimental.jitclass keeps fields and methods there
+        if struct := getattr(kind, "class_type", None):
             self.put(repr(struct.struct))
             for method in struct.jit_methods.values():
                 self.add(method)
@@ -236,7 +243,7 @@ class _Digest:
                 self._add_leniently(value, name)
 
     def _add_leniently(self, value: Any, name: str) -> None:
-        """What may be reached, but need not: where it cannot be read, its kind counts."""
+        """Add a value that may be reached, but need not be: if it cannot be read, its type counts."""
         try:
             self.add(value, name)
         except ParameterError:
@@ -244,7 +251,7 @@ class _Digest:
 
 
 def _chains(code: CodeType) -> Iterator[tuple[str, ...]]:
-    """The names that code reads from outside, each with the attributes that are read of it at once:
+    """Return the names that code reads from outside, each with the attributes that are read of it at once:
     ("lab", "numbers", "GRIP")."""
     chain: list[str] = []
     for step in dis.get_instructions(code):
@@ -262,12 +269,13 @@ def _chains(code: CodeType) -> Iterator[tuple[str, ...]]:
 
 
 def _python_of(value: Any) -> Any:
-    """The Python function behind what numba or Python made of it."""
+    """Return the Python function behind an object that numba or Python made of it."""
     if isinstance(value, staticmethod | classmethod):
         value = value.__func__
     if isinstance(value, property):
         value = value.fget
-    for name in ("py_func", "_defn", "_dispatcher"):  # of a dispatcher, an intrinsic and a ufunc of numba's
+    # of a dispatcher, of an intrinsic and of a ufunc of numba's
+    for name in ("py_func", "_defn", "_dispatcher"):
         inner = getattr(value, name, None)
         if inner is not None and not isinstance(value, FunctionType):
             return getattr(inner, "py_func", inner)
@@ -277,7 +285,7 @@ def _python_of(value: Any) -> Any:
 def _content(cell: Any) -> Any:
     try:
         return cell.cell_contents
-    except ValueError:  # nothing yet
+    except ValueError:  # the cell is empty: its variable was not assigned yet
         return None
 
 
@@ -304,12 +312,12 @@ def _unreadable(name: str, value: Any) -> ParameterError:
 
 
 def _named(value: Any) -> str:
-    """Module and name, without what differs from one process to the next."""
+    """Return module and name, without anything that differs from process to process."""
     name = getattr(value, "__qualname__", None) or getattr(value, "__name__", None)
     return f"{getattr(value, '__module__', '')}.{name}" if name else type(value).__qualname__
 
 
-# Whose code it is
+# Origin of code
 
 
 def _module_of(value: Any) -> str:
@@ -325,24 +333,25 @@ def _top(module: str) -> str:
 
 
 def _is_ours(value: Any) -> bool:
-    """Whether it is of the mechanics, whose sources are in every kernel's stamp."""
+    """True if it is of the mechanics: the sources of these are in every kernel's stamp."""
     return _module_of(value).split(".")[:2] in [["hoof_env", room] for room in MECHANICS]
 
 
 def is_library(value: Any) -> bool:
-    """Whether something is of the standard library or of an installed package, this one aside."""
+    """True if it is of the standard library or of an installed package, this one aside."""
     if isinstance(value, FunctionType):
         return _is_installed(value.__code__.co_filename) and _top(_module_of(value)) != "hoof_env"
     return _is_library(_module_of(value))
 
 
 def _is_foreign(value: Any) -> bool:
-    """Whether no attribute of it needs to be followed: it is a module of a library."""
+    """True if it is a module of a library: its attributes need not be followed."""
     return isinstance(value, ModuleType) and _is_library(value.__name__)
 
 
 def _is_library(module: str) -> bool:
-    """The module's file counts: a file of one's own may have the name of a standard module."""
+    """True if it is a module of a library. Its file decides: a user's file may have the name of a standard
+    module."""
     if _top(module) == "hoof_env":
         return False
     found = sys.modules.get(module) or sys.modules.get(_top(module))
@@ -356,13 +365,13 @@ def _is_library(module: str) -> bool:
 
 @cache
 def _library_folders() -> tuple[list[Path], list[Path]]:
-    """Folders of the standard library, and of installed packages."""
+    """Return the folders of the standard library, and those of installed packages."""
     standard = {sysconfig.get_path(name) for name in ("stdlib", "platstdlib")}
     installed = {sysconfig.get_path(name) for name in ("purelib", "platlib")}
     installed |= {*site.getsitepackages(), site.getusersitepackages()}
-    both = (sorted(Path(path).resolve() for path in paths if path) for paths in (standard, installed))
-    one, other = both
-    return one, other
+    standard_folders = sorted(Path(path).resolve() for path in standard if path)
+    installed_folders = sorted(Path(path).resolve() for path in installed if path)
+    return standard_folders, installed_folders
 
 
 @cache
@@ -377,12 +386,13 @@ def _is_standard(file: str) -> bool:
     standard, installed = _library_folders()
     parents = Path(file).resolve().parents
     inside = any(folder in parents for folder in standard)
+    # site-packages lies in a folder of the standard library
     return file.startswith("<frozen ") or (inside and not any(folder in parents for folder in installed))
 
 
 @cache
 def version_of(module: str) -> str:
-    """The version of the package that a module is of."""
+    """Return the version of the package to which a module belongs."""
     top = _top(module)
     file = getattr(sys.modules.get(top), "__file__", None)
     if top in sys.stdlib_module_names and (file is None or _is_standard(file)):
@@ -390,7 +400,8 @@ def version_of(module: str) -> str:
     try:
         return f"{top} {metadata.version(top)}"
     except metadata.PackageNotFoundError:
-        found = metadata.packages_distributions().get(top, [])
-    if found:
-        return " ".join(f"{name} {metadata.version(name)}" for name in sorted(set(found)))
+        # the package that is installed may have another name than the module: scikit-learn, sklearn
+        distributions = metadata.packages_distributions().get(top, [])
+    if distributions:
+        return " ".join(f"{name} {metadata.version(name)}" for name in sorted(set(distributions)))
     return f"{top} {getattr(sys.modules.get(top), '__version__', '')}"

@@ -1,5 +1,5 @@
-"""Kernels on several threads: each call works on columns of its own, so any number of threads gives the same
-bits."""
+"""Kernels on several threads. Each call works on columns of its own, so that any number of threads returns
+the same bits."""
 
 from __future__ import annotations
 
@@ -16,17 +16,20 @@ from typing import Any
 from hoof_env.errors import ParameterError, count
 
 MOST_THREADS = 1024
+"""Largest number of threads."""
 
-PARTS = 8  # blocks of columns for each thread
+PARTS = 8
+"""Number of blocks of columns for each thread."""
 
 
 def available() -> int:
-    """Processors that this process may use."""
+    """Return the number of processors that this process may use."""
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
 def check_threads(num_threads: Any) -> int:
-    """The number of threads; `ParameterError` below 1 or above what there is."""
+    """Return the number of threads; raise `ParameterError` if it is below 1 or above the number of
+    processors."""
     threads = count("num_threads", num_threads)
     most = min(available(), MOST_THREADS)
     if threads > most:
@@ -37,13 +40,14 @@ def check_threads(num_threads: Any) -> int:
 
 
 def limit_threads(num_threads: int) -> int:
-    """So many, or the processors that there are: a copy may go on where there are fewer."""
+    """Return `num_threads`, at most the available processors: a copy may continue on a machine with fewer."""
     return min(num_threads, available())
 
 
 def blocks(columns: int, lanes: int, num_threads: int) -> list[range]:
-    """Columns in equal parts that begin with a group of lanes: one for a thread alone, else `PARTS` a thread
-    where there are enough, since the processors of a busy machine are not equally fast."""
+    """Return columns in equal parts that begin with a group of lanes: one part for a single thread, else
+    `PARTS` for each thread if there are enough, because the processors of a busy machine are not equally
+    fast."""
     groups = -(-columns // lanes)
     parts = min(num_threads * PARTS if num_threads > 1 else 1, groups)
     ends = [min(columns, groups * part // parts * lanes) for part in range(parts + 1)]
@@ -52,7 +56,7 @@ def blocks(columns: int, lanes: int, num_threads: int) -> list[range]:
 
 @cache
 def _workers() -> ThreadPoolExecutor:
-    """The threads of this process, each started when it is needed; they stay."""
+    """Return the threads of this process, each started when it is needed; they stay."""
     return ThreadPoolExecutor(MOST_THREADS, "hoof-env")
 
 
@@ -61,35 +65,41 @@ if hasattr(os, "register_at_fork"):  # a child has none of its parent's threads
 
 
 def run_together(kernel: Any, calls: Sequence[tuple[Any, ...]], num_threads: int) -> list[Any]:
-    """Call a kernel with each of these arguments, so many at once; what the calls returned, in any order.
+    """Call a kernel with each of these arguments, `num_threads` calls at once; return the results, in any
+    order.
 
-    This thread is one of them. All have ended when this returns, and when it raises, as at Ctrl-C.
+    The calling thread is one of the threads. All calls have ended when this returns, and when it raises, as
+    at Ctrl-C.
     """
-    if num_threads == 1 or len(calls) == 1 or not kernel.overloads:  # it is compiled by this thread
+    # a kernel that is not compiled yet is compiled by this thread
+    if num_threads == 1 or len(calls) == 1 or not kernel.overloads:
         return [kernel(*call) for call in calls]
-    # A thread takes a call and makes it without bytecode between, so that no other can take it, too
+    # `list` and `starmap` take a call and make it without bytecode between, so that no other thread takes it
     waiting = starmap(kernel, iter(calls))
     with _interrupts_wait():
-        others = [_workers().submit(list, waiting) for _ in range(min(num_threads, len(calls)) - 1)]
+        helpers = [_workers().submit(list, waiting) for _ in range(min(num_threads, len(calls)) - 1)]
         try:
-            own = list(waiting)
+            results = list(waiting)
         finally:
-            wait(others)
-    return own + [result for other in others for result in other.result()]
+            wait(helpers)
+    for helper in helpers:
+        results += helper.result()
+    return results
 
 
 @contextmanager
 def _interrupts_wait() -> Iterator[None]:
-    """Ctrl-C is heard at the end: in the midst of it, calls and locks of the threads would be lost."""
+    """Defer Ctrl-C to the end of the calls: in between it would lose calls and locks of the threads."""
     handler = signal.getsignal(signal.SIGINT)
+    # only the main thread receives signals, and only a handler in Python can come in between
     if threading.current_thread() is not threading.main_thread() or not callable(handler):
-        yield  # only the main thread hears it, and only a function of Python's can come in between
+        yield
         return
-    heard: list[tuple[int, Any]] = []
-    signal.signal(signal.SIGINT, lambda number, frame: heard.append((number, frame)))
+    received: list[tuple[int, Any]] = []
+    signal.signal(signal.SIGINT, lambda number, frame: received.append((number, frame)))
     try:
         yield
     finally:
         signal.signal(signal.SIGINT, handler)
-        if heard:
-            handler(*heard[0])
+        if received:
+            handler(*received[0])

@@ -1,8 +1,8 @@
-"""Whether files that can run code may be read: nobody but their reader could have written them.
+"""Checks that no other user could have written a file that can run code, before it is read.
 
-Compiled kernels are pickles. Whoever can write to their folder runs code as everybody who reads them, so that
-a folder or file of somebody else's, or one that others can write, is refused before it is read. A system
-without owners and modes, as Windows, is not asked.
+Compiled kernels are pickles. A user with the right to write to their folder could run code as every user that
+reads them, so a folder or file of another user, or one that others can write, is refused. A system without
+owners and modes, such as Windows, is not checked.
 """
 
 from __future__ import annotations
@@ -19,44 +19,49 @@ OTHERS = stat.S_IWGRP | stat.S_IWOTH
 
 
 def read(path: str) -> bytes:
-    """The content of a file; `OutputError` if somebody else could have written it."""
+    """Return the content of a file; raise `OutputError` if another user could have written it."""
+    # the open file is checked, not its path, which could be replaced in between
     with open(path, "rb") as file:
         _check(path, os.fstat(file.fileno()))
         return file.read()
 
 
 def check_folder(folder: str) -> None:
-    """Raise `OutputError` if there is such a folder and somebody else could write to it."""
+    """Raise `OutputError` if there is such a folder and another user could write to it."""
     with suppress(FileNotFoundError, NotADirectoryError, PermissionError):
         _check(folder, os.stat(folder))
 
 
 def close_new(folder: str) -> None:
-    """Close an empty folder of ours to others: it has just been made, perhaps under a generous umask."""
+    """Make an empty folder of this user unwritable for others: it was just made, perhaps under a generous
+    umask."""
     with suppress(OSError):
         if os.name == "posix" and os.stat(folder).st_uid == os.geteuid() and not os.listdir(folder):
             close(folder)
 
 
 def close(path: str) -> None:
-    """Let nobody but its owner write to a file or folder of ours."""
+    """Make a file or folder of this user unwritable for all but its owner."""
     if os.name == "posix" and (mode := stat.S_IMODE(os.stat(path).st_mode)) & OTHERS:
-        with suppress(PermissionError):  # a file system without modes; whoever reads decides
+        # a file system may have no modes; the check at the next reading decides
+        with suppress(PermissionError):
             os.chmod(path, mode & ~OTHERS)
 
 
 def _check(path: str, found: os.stat_result) -> None:
     if os.name != "posix":
         return
-    package = os.stat(PACKAGE)  # whoever owns or writes this package runs code anyway
+    # users that own or can write this package can run code anyway: inside it they are trusted
+    package = os.stat(PACKAGE)
     is_inside = PACKAGE in Path(path).resolve().parents
     open_to = found.st_mode & OTHERS
     if is_inside and found.st_gid == package.st_gid:
         open_to &= ~package.st_mode
     if is_inside:
         open_to &= ~(package.st_mode & stat.S_IWOTH)
+    # a sticky folder, as /tmp: others can add to it, but not replace the folder in it that is checked next
     if found.st_mode & stat.S_ISVTX and stat.S_ISDIR(found.st_mode):
-        open_to = 0  # as /tmp: others can add to it, but not replace the folder in it that is looked at next
+        open_to = 0
     if open_to & stat.S_IWGRP and _is_ours(found.st_gid):
         open_to &= ~stat.S_IWGRP
     is_shared = is_inside and found.st_gid == package.st_gid and package.st_mode & stat.S_IWGRP
@@ -75,10 +80,11 @@ def _check(path: str, found: os.stat_result) -> None:
 
 
 def _is_ours(group: int) -> bool:
-    """Whether a group has nobody else in it: the one that many systems make for each user, whose umask then
-    lets it write; or root's, for another user."""
+    """True for a group without other members: the one that many systems make for each user, and let write by
+    the umask; or root's, unless this user is root."""
     if os.geteuid() == 0:
         return False
+    # modules of POSIX only
     import grp
     import pwd
 

@@ -1,4 +1,5 @@
-"""The types of lanes, their values in LLVM's terms, and how a function writes its own instructions."""
+"""Types of lanes, their values in LLVM's terms, and a decorator for functions that write their own
+instructions."""
 
 from __future__ import annotations
 
@@ -25,11 +26,11 @@ class _Counted(types.Type):
 
 
 class Lanes(_Counted):
-    """`count` doubles."""
+    """`count` doubles, one for each lane."""
 
 
 class Mask(_Counted):
-    """`count` truths."""
+    """`count` truth values, one for each lane."""
 
 
 class Plane(_Counted):
@@ -37,7 +38,7 @@ class Plane(_Counted):
 
 
 class _Memory(_Counted):
-    """Memory whose rows have the names of `layout`, or numbers only where that is None."""
+    """Memory with named rows, those of `layout`, or with numbered rows if that is None."""
 
     def __init__(self, count: int, layout: Any = None) -> None:
         self.layout = layout
@@ -47,16 +48,16 @@ class _Memory(_Counted):
 
 
 class Rows(_Memory):
-    """Memory of a kernel's own with `count` doubles a row, aligned to whole rows."""
+    """Memory of a kernel with `count` doubles a row, aligned to whole rows."""
 
 
 class Columns(_Memory):
-    """`count` columns of an array of doubles, a row for each name; 0 is one column whose rows are ordinary
-    numbers."""
+    """`count` columns of an array of doubles, with a row for each name. A count of 0 is one column with
+    ordinary numbers."""
 
 
 def wide(element: Any, count: int) -> Any:
-    """LLVM's type of `count` elements: one is a scalar."""
+    """Return LLVM's type of `count` elements: a scalar if it is one."""
     return element if count == 1 else ir.VectorType(element, count)
 
 
@@ -87,9 +88,10 @@ class _ColumnsModel(models.StructModel):
 
 
 def spread(builder: Any, x: Any, count: int) -> Any:
-    """A scalar in every lane."""
+    """Return a scalar in every lane."""
     if count == 1:
         return x
+    # a constant stays one, so that LLVM can compute with it
     if isinstance(x, ir.Constant):
         return ir.Constant(ir.VectorType(x.type, count), [x.constant] * count)
     nothing = ir.Constant(ir.VectorType(x.type, count), ir.Undefined)
@@ -98,12 +100,12 @@ def spread(builder: Any, x: Any, count: int) -> Any:
 
 
 def pick(builder: Any, x: Any, lane: int, count: int) -> Any:
-    """One lane as a scalar."""
+    """Return one lane as a scalar."""
     return x if count == 1 else builder.extract_element(x, ir.Constant(_POSITION, lane))
 
 
 def gathered(builder: Any, scalars: list[Any]) -> Any:
-    """Scalars as lanes."""
+    """Return scalars as lanes."""
     if len(scalars) == 1:
         return scalars[0]
     vector = ir.Constant(ir.VectorType(scalars[0].type, len(scalars)), ir.Undefined)
@@ -113,19 +115,24 @@ def gathered(builder: Any, scalars: list[Any]) -> Any:
 
 
 def count_of(*kinds: Any) -> int:
-    """Of lanes in an operation, 0 if it is not one on lanes."""
+    """Return the number of lanes in an operation, 0 if it is not one on lanes."""
+    # 0 also for different numbers of lanes, which no operation combines
     counts = {kind.count for kind in kinds if isinstance(kind, _Counted)}
     return counts.pop() if len(counts) == 1 else 0
 
 
 def is_real(kind: Any) -> bool:
+    """True for types of real numbers: lanes, floats and integers."""
     return isinstance(kind, Lanes | types.Float | types.Integer)
 
 
 def fused(builder: Any, sign: str, x: Any, y: Any) -> Any:
-    """x + y or x - y by `sign`. If one of them is a product that was written just before, the second if both
-    are, it is not rounded: a * b + c is one fused operation. That is decided here, by the expression, and not
-    by the compiler, so that it is the same for any number of lanes."""
+    """Return x + y or x - y by `sign`.
+
+    If x or y is a product that was written just before (y if both are), it is not rounded: a * b + c is one
+    fused operation. The expression decides this here, and not the compiler, so that it is the same for any
+    number of lanes.
+    """
     if _is_product(y):
         a, b = y.operands
         return call(builder, "fma", [builder.fneg(a) if sign == "-" else a, b, x])
@@ -139,7 +146,7 @@ def _is_product(value: Any) -> bool:
 
 
 def call(builder: Any, name: str, values: list[Any]) -> Any:
-    """LLVM's own function of that name, of lanes."""
+    """Return a call of LLVM's own function of that name, on lanes."""
     kind = values[0].type
     full = f"llvm.{name}.{f'v{kind.count}f64' if isinstance(kind, ir.VectorType) else 'f64'}"
     function = ir.FunctionType(kind, [kind] * len(values))
@@ -147,7 +154,8 @@ def call(builder: Any, name: str, values: list[Any]) -> Any:
 
 
 class Code(NamedTuple):
-    """Where instructions are written: numba's context, LLVM's builder, types of arguments and result."""
+    """Place where instructions are written: numba's context, LLVM's builder, types of arguments and
+    result."""
 
     context: Any
     builder: Any
@@ -155,42 +163,48 @@ class Code(NamedTuple):
     result: Any = None
 
     def number(self, kind: Any, value: Any, count: int) -> Any:
-        """Lanes, or a Python number in every lane."""
+        """Return lanes, or a Python number in every lane."""
         if isinstance(kind, Lanes):
             return value
         return spread(self.builder, self.context.cast(self.builder, value, kind, types.float64), count)
 
     def reals(self, *values: Any) -> list[Any]:
-        """The arguments as lanes of the result."""
+        """Return the arguments as lanes of the result."""
         count = getattr(self.result, "count", 1)
         return [self.number(kind, value, count) for kind, value in zip(self.args, values, strict=True)]
 
     def split(self, kind: Any, value: Any) -> tuple[Any, Any]:
-        """x and y of planar vectors."""
-        if isinstance(value, ir.instructions.InsertValue):  # as `join` made it
+        """Return x and y of planar vectors."""
+        # take back what `join` put together: `fused` must still see products as such
+        if isinstance(value, ir.instructions.InsertValue):
             return value.operands[0].operands[1], value.operands[1]
         return self.builder.extract_value(value, 0), self.builder.extract_value(value, 1)
 
     def planes(self, *values: Any) -> list[tuple[Any, Any]]:
-        """x and y of each argument."""
+        """Return x and y of each argument."""
         return [self.split(kind, value) for kind, value in zip(self.args, values, strict=True)]
 
     def join(self, x: Any, y: Any, kind: Any = None) -> Any:
-        """Planar vectors, of the result's type unless `kind` is given."""
+        """Return planar vectors, of the result's type unless `kind` is given."""
         nothing = ir.Constant(self.context.get_value_type(kind or self.result), ir.Undefined)
         return self.builder.insert_value(self.builder.insert_value(nothing, x, 0), y, 1)
 
 
 def instruction(typed: Callable[..., Any], literal: bool = False) -> Callable[[Callable[..., Any]], Any]:
-    """Decorator of a function for kernels that writes its own instructions: it takes a `Code` and LLVM's
-    values. `typed` makes numba's signature from the types of the arguments, of which constants are
-    `literal`."""
+    """Return a decorator for a function for kernels that writes its own instructions: it takes a `Code` and
+    LLVM's values.
+
+    Args:
+        typed: makes numba's signature from the types of the arguments.
+        literal: true if constants among the arguments have literal types.
+    """
 
     def decorate(write: Callable[..., Any]) -> Any:
         @wraps(write)
         def intrinsic(context: Any, *kinds: Any) -> Any:
             def emit(context: Any, builder: Any, signature: Any, values: Any) -> Any:
                 result = write(Code(context, builder, signature.args, signature.return_type), *values)
+                # functions without a result, such as `store_vectors`
                 return context.get_dummy_value() if result is None else result
 
             return typed(*kinds), emit

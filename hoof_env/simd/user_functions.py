@@ -1,5 +1,5 @@
-"""Plain functions from outside this package inside kernels: what they may return, and what is said of one
-that cannot be compiled. `hoof_env.simd.reach` tells them apart."""
+"""Plain functions from outside this package inside kernels: checks of their results, and error messages for
+those that cannot be compiled. `hoof_env.simd.reach` distinguishes them."""
 
 from __future__ import annotations
 
@@ -22,7 +22,8 @@ PACKAGE = Path(__file__).parents[1]
 
 
 def number_of(what: str) -> Any:
-    """For kernels: a function that hands on what `what` returned, and refuses it unless it is a number."""
+    """Return a function for kernels that passes on the result of `what`, and refuses it unless it is a
+    number."""
     names = {Mask: "truths", Plane: "planar vectors", types.Boolean: "a truth", types.NoneType: "nothing"}
 
     def typed(x: Any) -> Any:
@@ -36,7 +37,7 @@ def number_of(what: str) -> Any:
 
 
 def check_function(name: str, function: Any, arguments: int) -> None:
-    """Raise ParameterError unless something is a plain function of so many arguments."""
+    """Raise ParameterError unless something is a plain function of `arguments` arguments."""
     if not isinstance(function, FunctionType) or function.__code__.co_flags & 0x0C:  # *args, **kwargs
         raise ParameterError(f"{name}: expected a plain function of {arguments} arguments, got {function!r}")
     code = function.__code__
@@ -47,8 +48,10 @@ def check_function(name: str, function: Any, arguments: int) -> None:
 
 
 def what_cannot_be_compiled(error: Exception) -> str:
-    """What numba does not compile of a function from outside: the operation, the function and the line."""
+    """Return what numba does not compile in a function from outside: the operation, the function and the
+    line."""
     text = str(error)
+    # the message of `number_of`, which numba has put among its own
     if refused := re.search(r"\{([^{}]* returns [^{}]*; expected a number)\}", text):
         return refused[1]
     where = next((place for place in map(_place, re.findall(r'File "(.*?)", line (\d+)', text)) if place), "")
@@ -59,7 +62,7 @@ def what_cannot_be_compiled(error: Exception) -> str:
 
 
 def _operation(text: str) -> str:
-    """The innermost cause in a message of numba's."""
+    """Return the innermost cause in a message of numba's."""
     if found := re.search(r"No implementation of function Function\(<(.+?)(?: at 0x\w+)?>\)", text):
         name = re.findall(r"[\w.]+", found[1])[-1]
         return "`if`, `and`, `or` or `not` of numbers" if name == "bool" else f"{name}()"
@@ -72,18 +75,18 @@ def _operation(text: str) -> str:
 
 
 def _place(found: tuple[str, str]) -> str:
-    """Function and line of a place in somebody else's file; nothing of one in this package's."""
+    """Return function and line of a place in a user's file; empty if the file belongs to this package."""
     path = os.path.abspath(found[0])
     line = int(found[1])
     if Path(path).is_relative_to(PACKAGE):
         return ""
-    inside = [
-        node.name for node in ast.walk(ast.parse("".join(linecache.getlines(path))))
-        if isinstance(node, ast.FunctionDef) and node.lineno <= line <= (node.end_lineno or line)
-    ]  # fmt: skip
+    tree = ast.parse("".join(linecache.getlines(path)))
+    functions = [node for node in ast.walk(tree) if isinstance(node, ast.FunctionDef)]
+    # the last one is the innermost: `ast.walk` visits outer functions first
+    inside = [node.name for node in functions if node.lineno <= line <= (node.end_lineno or line)]
     return f" in {inside[-1]} ({path}, line {line})" if inside else f" in {path}, line {line}"
 
 
 def function_name(function: Callable[..., Any]) -> str:
-    """Module and name of a function, for people."""
+    """Return module and name of a function, for messages."""
     return f"{function.__module__}.{function.__qualname__}"
