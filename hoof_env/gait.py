@@ -56,8 +56,8 @@ def speed_scale_of(geometry: Geometry) -> float:
 
 
 def limits_of(geometry: Geometry) -> dict[str, tuple[float, float]]:
-    """Return the `LIMITS` of a leg: angles are those of the published leg, and at one Froude number the crank turns
-    faster by the root of how much smaller the leg is."""
+    """Return the `LIMITS` of a leg: angles are those of the published leg, and at one Froude number the
+    crank turns faster by the root of how much smaller the leg is."""
     low, high = LIMITS["crank_speed"]
     speed_scale = speed_scale_of(geometry)
     return {**LIMITS, "crank_speed": (low / speed_scale, high / speed_scale)}
