@@ -32,7 +32,7 @@ TOOLS = {
     "pip": ("pip", "install", "--disable-pip-version-check", "--no-input"),
     "uv": ("uv", "pip", "install", "--python", ".venv/bin/python"),
 }
-HASHES = "hashes.txt"  # of the files that constraints.txt names; uv checks them, INSTALLER=pip does not
+LOCKED_FILES = "pylock.toml"  # of constraints.txt, with hashes: uv checks them, INSTALLER=pip does not
 ONLY_WHEELS = ("--only-binary", ":all:")
 NEEDED_GB = 3.0  # .venv itself takes 1.8 GB on Linux
 
@@ -43,7 +43,7 @@ UNREACHABLE = "the package index cannot be reached; check the network, or name a
 LACKING = "the package index lacks a wheel of a version that constraints.txt names"
 REASONS = {  # a sign in what pip, uv or venv says: what it means. The first sign that is found is told.
     "Failed to initialize cache": "uv cannot write its cache; set UV_CACHE_DIR to a folder, or INSTALLER=pip",
-    "Hash mismatch": "the package index has another file than the one that was locked; see hashes.txt",
+    "Hash mismatch": "the package index has another file than the one that was locked; see pylock.toml",
     "No space left on device": "the disk is full",
     "Read-only file system": "this folder cannot be written to",
     "Permission denied": "this folder cannot be written to",
@@ -241,14 +241,32 @@ def requirements(purpose: str):
 def packages(tool: str, title: str, *arguments: str, **environment: str) -> None:
     """Install into .venv within constraints.txt. The first import compiles what is used."""
     options = ["--constraint", "constraints.txt"]
-    if tool == "uv" and (ROOT / HASHES).is_file():
-        options += ["--constraint", HASHES]
+    if tool == "uv" and (ROOT / LOCKED_FILES).is_file():
+        options += ["--constraint", hashes()]
     if os.environ.get("PYTHONDONTWRITEBYTECODE"):  # then no import will
         options += ["--compile-bytecode"] if tool == "uv" else []
     else:
         options += ["--no-compile"] if tool == "pip" else []
     command = (str(venv("bin/python")), "-I", "-m", *TOOLS[tool], *options, *arguments)
     step(title, command, {**uv_settings(), **environment} if tool == "uv" else environment)
+
+
+def hashes() -> str:
+    """Path of a file that has the hashes as uv takes them for constraints: it takes no pylock.toml there, and
+    installs the whole of one as requirements, whatever the purpose."""
+    import tomllib
+
+    packages = tomllib.loads((ROOT / LOCKED_FILES).read_text(encoding="utf-8"))["packages"]
+    lines = [
+        " ".join(
+            (f"{one['name']}=={one['version']}",
+             *(f"--hash=sha256:{wheel['hashes']['sha256']}" for wheel in one["wheels"]))
+        )
+        for one in packages
+    ]  # fmt: skip
+    path = venv("hashes.txt")
+    path.write_text("\n".join(lines) + "\n", encoding="utf-8")
+    return str(path.relative_to(ROOT))
 
 
 @lru_cache(maxsize=None)  # noqa: UP033  functools.cache is too young

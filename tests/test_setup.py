@@ -7,6 +7,7 @@ import shutil
 import socket
 import subprocess
 import sys
+import tomllib
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -262,6 +263,11 @@ def test_the_lock_is_what_its_command_writes(ours):
     command = [sys.executable, "scripts/lock.py"]
     subprocess.run(command, cwd=ours.ROOT, check=True, env={**os.environ, **ours.uv_settings()})
     assert (ours.ROOT / "constraints.txt").read_text() == (ROOT / "constraints.txt").read_text()
+    found, expected = (
+        [(one["name"], one["version"]) for one in tomllib.loads(path.read_text())["packages"]]
+        for path in (ours.ROOT / ours.LOCKED_FILES, ROOT / ours.LOCKED_FILES)
+    )  # a version may get another wheel
+    assert found == expected
 
 
 # Nothing twice
@@ -309,14 +315,48 @@ def test_interrupted_setup_is_made_anew(setup, installs, monkeypatch, capsys):
     assert installs == ["all anew"]
 
 
+# Hashes
+
+
 def test_hashes_are_of_the_versions_that_are_locked(setup):
     """Without PyTorch, whose builds for the CPU are of another index."""
     locked = {
         line.split(" ;")[0] for line in (ROOT / "constraints.txt").read_text().splitlines() if "==" in line
     }
-    text = (ROOT / setup.HASHES).read_text()
-    hashed = {line.split()[0] for line in text.splitlines() if line[0] not in " #"}
+    packages = tomllib.loads((ROOT / setup.LOCKED_FILES).read_text())["packages"]
+    hashed = {f"{one['name']}=={one['version']}" for one in packages}
+    assert len(hashed) == len(packages)
     assert hashed <= locked
     assert {name.split("==")[0] for name in hashed} > {"numpy", "numba", "pillow", "stable-baselines3"}
     assert not [name for name in hashed if name.startswith("torch==")]
-    assert len(re.findall(r"--hash=sha256:[0-9a-f]{64}", text)) == text.count("--hash") > len(hashed)
+    for one in packages:
+        assert all(re.fullmatch("[0-9a-f]{64}", wheel["hashes"]["sha256"]) for wheel in one["wheels"]), one
+
+
+def test_every_hash_is_told_to_uv(ours):
+    text = (ROOT / ours.LOCKED_FILES).read_text()
+    (ours.ROOT / ours.LOCKED_FILES).write_text(text)
+    told = (ours.ROOT / ours.hashes()).read_text()
+    assert told.count("--hash=sha256:") == text.count("sha256 = ")
+    assert re.search(r"(?m)^numpy==\S+ --hash=sha256:[0-9a-f]{64} --hash=", told)
+
+
+@pytest.mark.parametrize("is_changed", [False, True])
+def test_uv_refuses_another_file_than_the_locked_one(ours, tmp_path, monkeypatch, is_changed):
+    monkeypatch.setitem(ours.TOOLS, "uv", ("uv", "pip", "install", "--python", sys.executable))
+    text = (ROOT / ours.LOCKED_FILES).read_text()
+    at = text.index("sha256", text.index('name = "cycler"')) + len('sha256 = "')
+    if is_changed:
+        text = f"{text[:at]}{'01'[text[at] == '0']}{text[at + 1 :]}"
+    (ours.ROOT / ours.LOCKED_FILES).write_text(text)
+    uv_pip_compile(ours, stdin="cycler\n")  # whether there is an index
+
+    def install():
+        ours.packages("uv", "one", *ours.ONLY_WHEELS, "--no-cache", "--target", str(tmp_path), "cycler")
+
+    if not is_changed:
+        install()
+        assert (tmp_path / "cycler").is_dir()
+        return
+    with pytest.raises(ours.Missing, match="another file than the one that was locked"):
+        install()

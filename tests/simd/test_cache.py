@@ -475,3 +475,31 @@ def test_what_is_made_here_is_closed_to_others_whatever_the_umask(start, tmp_pat
     made = [tmp_path / "cache", *(tmp_path / "cache").rglob("*")]
     assert not [path for path in made if path.stat().st_mode & 0o022 and path.suffix != ".lock"]
     assert ended(start())[0] == "8.0 []"
+
+
+NESTED = """
+from hoof_env.simd.compile import kernel
+from hoof_env.simd.types import instruction
+
+inside = []
+
+@instruction(lambda x: x(x))
+def same(code, x):
+    if not inside:
+        inside.append("called")
+        inside.append(make()(3.0))
+    return x
+
+def make():
+    def twice(x):
+        return 2.0 * same(x)
+    return kernel(twice)
+
+print(make()(1.0), inside)
+"""
+
+
+def test_a_kernel_that_is_needed_while_it_is_compiled_does_not_wait_for_itself(start, tmp_path):
+    """As where a stored kernel asks for a module whose import makes an environment."""
+    (tmp_path / "nested.py").write_text(NESTED)
+    assert ended(start("import nested"), limit=60)[0].split() == ["2.0", "['called',", "6.0]"]
