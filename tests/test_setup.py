@@ -44,6 +44,7 @@ def installs(setup, monkeypatch):
         done.append(f"{purpose} anew" if anew else f"{purpose} more")
         setup.venv("bin").mkdir(parents=True, exist_ok=True)
         setup.venv("bin/python").touch()
+        return purpose
 
     monkeypatch.setattr(setup, "install", install)
     return done
@@ -194,6 +195,66 @@ def test_places_of_pytorch_in_their_order(setup, asked, monkeypatch, capsys):
     assert second == "uv --no-deps torch --default-index https://nowhere.example/cpu"
     assert last == "uv torch"
     assert "PyTorch with CUDA, some gigabytes" in capsys.readouterr().out
+
+
+@pytest.fixture
+def without_torch(setup, monkeypatch):
+    """Packages of which PyTorch has no wheel for this Python, or cannot be had for the reason that is given;
+    what is installed."""
+    done, reason = [], [setup.LACKING]
+
+    def packages(tool, title, *arguments, **environment):
+        if any(word.partition(">=")[0] == "torch" for word in arguments):
+            raise setup.Missing(f"{reason[0]} (more in .venv/set-up.log)")
+        done.extend(word for word in arguments if word not in setup.ONLY_WHEELS)
+
+    def step(title, command, environment=()):
+        setup.venv("bin").mkdir(parents=True)
+        setup.venv("bin/python").touch()
+
+    monkeypatch.setattr(setup, "packages", packages)
+    monkeypatch.setattr(setup, "step", step)
+    monkeypatch.setattr(setup, "pip_settings", dict)
+    return SimpleNamespace(done=done, reason=reason)
+
+
+@pytest.mark.parametrize("platform", ["linux", "darwin"])
+def test_without_a_wheel_of_pytorch_the_tests_get_all_else_and_a_line_says_so(
+    setup, without_torch, monkeypatch, capsys, platform
+):
+    monkeypatch.setattr(setup.sys, "platform", platform)
+    assert setup.main() == 0
+    assert "left out: torch, stable-baselines3, sb3-contrib; the tests that" in capsys.readouterr().out
+    installed = {re.split("[>=;]", one)[0] for one in without_torch.done}
+    assert installed > {"numpy", "numba", "gymnasium", "pytest", "scipy", "mypy", "--editable"}
+    assert not installed & set(setup.NEED_TORCH)
+    count = len(without_torch.done)
+    assert setup.main() == 0  # nothing is tried again
+    assert len(without_torch.done) == count
+    assert setup.main("demo") == 1
+    assert "PyTorch cannot be had for Python 3." in capsys.readouterr().err
+
+
+def test_where_pytorch_cannot_be_reached_set_up_stops(setup, without_torch, capsys):
+    without_torch.reason[0] = setup.UNREACHABLE
+    assert setup.main() == 1
+    assert "the package index cannot be reached" in capsys.readouterr().err
+    assert not setup.stamp_path().exists()
+
+
+def test_what_needs_pytorch_is_known(ours):
+    """What is left brings no PyTorch."""
+    asked = [one for one in ours.requirements("all") if not ours.needs_torch(one)]
+    assert len(asked) == len(ours.requirements("all")) - len(ours.NEED_TORCH)
+    uv_pip_compile(ours, stdin="cycler\n")  # whether there is an index
+    command = [sys.executable, "-m", "uv", "pip", "compile", "--quiet", "--only-binary", ":all:", "-"]
+    environment = {**os.environ, **ours.uv_settings()}
+    found = subprocess.run(
+        command, input="\n".join(asked), env=environment, capture_output=True, text=True, cwd=ours.ROOT
+    )
+    assert found.returncode == 0, found.stderr
+    assert "numpy==" in found.stdout
+    assert not re.search(r"(?m)^torch==", found.stdout)
 
 
 def test_uv_is_told_what_pip_is_told(setup, tmp_path, monkeypatch):

@@ -42,8 +42,8 @@ COMPILED: list[str] = []
 """Names of the kernels that this process has compiled."""
 
 _HELD: set[str] = set()
-"""Locks of kernels that are compiled now. While one is, a module that is imported for it may make an environment
-that needs it, too."""
+"""Locks of kernels that are compiled now. While one is, a module that is imported for it may make an
+environment that needs it, too."""
 
 _caching: Any = numba.core.caching
 _config: Any = numba.core.config
