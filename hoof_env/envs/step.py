@@ -83,12 +83,20 @@ def memories(addresses, lanes, layouts, n):  # type: ignore[no-untyped-def]
 
 
 def _with_terms(terms: tuple[Term, ...], layouts: Memories, k: int = 0) -> Callable[..., Any]:
-    """A function that computes the terms from the k-th on, keeps them in `episode.terms` and returns the sum
-    of all. numba has no loop over functions, so each calls the next."""
-    if k == len(terms):
+    """A function that computes terms, of which the first is the k-th, keeps them in `episode.terms` and
+    returns the sum of all. Those of this package behind the last from outside are compiled once for all tasks
+    that have them there."""
+    if not terms:
         return inlined(lambda addresses, lanes, task, outcome, episode, n, total: total)
-    compute, rest, is_first = inlined(terms[k].compute), _with_terms(terms, layouts, k + 1), k == 0
-    from_outside, number = is_own(terms[k]), number_of(terms[k].title)
+    is_ours = not _from_outside([term.compute for term in terms])
+    return (_our_terms if is_ours else _first_and_rest)(terms, layouts, k)
+
+
+def _first_and_rest(terms: tuple[Term, ...], layouts: Memories, k: int) -> Callable[..., Any]:
+    """The same of one term at least. numba has no loop over functions, so each calls the next."""
+    term, rest = terms[0], _with_terms(terms[1:], layouts, k + 1)
+    compute, is_first, is_scalar = inlined(term.compute), k == 0, term.scalar
+    from_outside, number = is_own(term), number_of(term.title)
 
     @inlined
     def add_term(addresses, lanes, task, outcome, episode, n, total):  # type: ignore[no-untyped-def]
@@ -111,7 +119,11 @@ def _with_terms(terms: tuple[Term, ...], layouts: Memories, k: int = 0) -> Calla
             own.terms[k] = number(compute(one, task.weights[k])) + 0.0
         return add_term(addresses, lanes, task, outcome, episode, n, total)
 
-    return compute_one_by_one if terms[k].scalar else compute_term
+    return compute_one_by_one if is_scalar else compute_term
+
+
+_our_terms = lru_cache(maxsize=64)(_first_and_rest)
+"""The same for terms of this package."""
 
 
 def slots_of(entries: tuple[Entry, ...]) -> tuple[list[int], int, int]:
