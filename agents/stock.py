@@ -44,7 +44,7 @@ class Args:
     seeds: int | None = None
     """trainings of each, from seed 0 on; otherwise those of the table"""
     steps: int | None = None
-    """of each training; otherwise those of the table"""
+    """of each training; otherwise those of the table. Of ppo_flat rounded up to whole rollouts"""
     workers: int = 1
     """trainings side by side, each on one thread"""
     out: Path = OUT
@@ -85,10 +85,20 @@ def jobs(args: Args) -> list[Job]:
         raise ParameterError(f"expected one of {known}; got {args.algo} on {args.env_id}")
     found = []
     for curves in chosen:
-        steps = args.steps or curves.steps
+        steps = whole_rollouts(curves, args.steps) if args.steps else curves.steps
         own = Curves(curves.env_id, curves.algo, args.seeds or curves.seeds, steps, min(curves.every, steps))
         found += [Job(own, seed) for seed in range(own.seeds)]
     return found
+
+
+def whole_rollouts(curves: Curves, steps: int) -> int:
+    """So many steps, of ppo_flat rounded up to whole rollouts of its many environments: it passes over the
+    steps between, where the last score would never be."""
+    if curves.algo != TUNED:
+        return steps
+    settings = load_settings(FOLDER / f"{TUNED}.yml", curves.env_id)
+    rollout = settings["n_envs"] * settings["n_steps"]
+    return -(-steps // rollout) * rollout
 
 
 def train(job: Job) -> list[dict[str, Any]]:
@@ -172,6 +182,8 @@ def stock(args: Args) -> list[dict[str, Any]]:
     args.out.mkdir(parents=True, exist_ok=True)
     rows = read_curves(args.out)
     pending = [] if args.draw else [job for job in wanted if not has_run(rows, job)]
+    for steps in sorted({job.curves.steps for job in pending if args.steps not in (None, job.curves.steps)}):
+        print(f"{TUNED}: {steps} steps instead of {args.steps}, which are no whole rollouts", flush=True)
     for done, new in enumerate(trained(pending, args.workers), 1):
         key = tuple(new[0][name] for name in ("env_id", "algo", "seed"))
         rows = [row for row in rows if (row["env_id"], row["algo"], row["seed"]) != key] + new

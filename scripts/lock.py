@@ -1,10 +1,11 @@
-"""Write constraints.txt and hashes.txt anew, by `uv pip compile`: python scripts/lock.py [options of it, such
-as --upgrade]
+"""Write constraints.txt and pylock.toml anew, by `uv pip compile`: python scripts/lock.py [options of it,
+such as --upgrade]
 
 The versions that stand there stay unless pyproject.toml or an option asks for others. One list serves each
 supported Python and platform. Of PyTorch's CUDA build, which asks for exact versions itself, nothing is kept.
-hashes.txt has the SHA-256 of each file of what set-up installs, but for PyTorch, whose builds for the CPU are
-of another index. uv checks them; pip would refuse an editable install beside hashes: hence a file apart.
+pylock.toml, in the form of PEP 751, has the SHA-256 of each file of what set-up installs, but for PyTorch,
+whose builds for the CPU are of another index. Set-up has uv check them; pip would refuse an editable install
+beside hashes in constraints.txt: hence a file apart.
 """
 
 from __future__ import annotations
@@ -15,11 +16,12 @@ import tempfile
 import tomllib
 from pathlib import Path
 
-from setup_venv import EXTRAS, HASHES, OLDEST, ROOT, dotted
+from setup_venv import EXTRAS, LOCKED_FILES, OLDEST, ROOT, dotted
 
 LOCK = ROOT / "constraints.txt"
-HASHES_HEAD = """\
-# Hashes of the files of constraints.txt, which uv checks in set-up. Made by `python scripts/lock.py`.
+FILES_HEAD = """\
+# Files of the versions in constraints.txt that set-up installs, without PyTorch, and their hashes, which uv
+# checks. Made by `python scripts/lock.py`.
 """
 CUDA = ("nvidia-", "cuda-", "triton")
 HEAD = """\
@@ -42,15 +44,22 @@ def main(*options: str) -> None:
         line for line in compiled(apart, "--no-deps", *options, more="envpool\n") if name(line) not in known
     ]
     LOCK.write_text(HEAD + "\n".join(lines) + "\n" + APART + "\n".join(others) + "\n", encoding="utf-8")
-    text = hashes(compiled(together, "--generate-hashes"))  # of the versions that now stand there
-    (ROOT / HASHES).write_text(HASHES_HEAD + text, encoding="utf-8")
+    text = written(together, "pylock.toml", "--constraints", str(LOCK))
+    (ROOT / LOCKED_FILES).write_text(FILES_HEAD + without_torch(text), encoding="utf-8")
 
 
 def compiled(extras: list[str], *options: str, more: str = "") -> list[str]:
     """Lines of the lock for these extras, and for what `more` asks for, a requirement on each line."""
+    lines = written(extras, LOCK.name, *options, more=more).splitlines()
+    return [line.replace("+cpu", "") for line in lines if not line.startswith(CUDA)]
+
+
+def written(extras: list[str], file: str, *options: str, more: str = "") -> str:
+    """What uv writes to a file of this name, from which it takes the form."""
     with tempfile.TemporaryDirectory() as folder:
-        out = Path(folder) / LOCK.name
-        out.write_text(LOCK.read_text(encoding="utf-8"), encoding="utf-8")  # uv keeps what stands there
+        out = Path(folder) / file
+        if file == LOCK.name:
+            out.write_text(LOCK.read_text(encoding="utf-8"), encoding="utf-8")  # uv keeps what stands there
         command = [sys.executable, "-m", "uv", "pip", "compile", "--quiet", "--universal"]
         command += ["--fork-strategy", "fewest"]  # one version of a package for all
         command += ["--only-binary", ":all:"]
@@ -68,14 +77,14 @@ def compiled(extras: list[str], *options: str, more: str = "") -> list[str]:
         subprocess.run(
             [*command, *options, "pyproject.toml", "-"], input=more, text=True, check=True, cwd=ROOT
         )
-        lines = out.read_text(encoding="utf-8").replace("\\\n", "\\\0").splitlines()  # an entry each
-    return [line.replace("+cpu", "") for line in lines if not line.startswith(CUDA)]
+        return out.read_text(encoding="utf-8")
 
 
-def hashes(entries: list[str]) -> str:
-    """The text of a lock with hashes, without PyTorch."""
-    kept = [entry for entry in entries if "--hash" in entry and not entry.startswith("torch==")]
-    return "\n".join(kept).replace("\0", "\n") + "\n"
+def without_torch(text: str) -> str:
+    """A pylock.toml without PyTorch and what its CUDA build brings."""
+    head, *packages = text.split("[[packages]]\n")
+    left_out = tuple(f'name = "{name}' for name in (*CUDA, 'torch"'))
+    return "[[packages]]\n".join([head, *(one for one in packages if not one.startswith(left_out))])
 
 
 def name(line: str) -> str:

@@ -3,10 +3,11 @@
     python scripts/setup_venv.py demo     what the demo needs
     python scripts/setup_venv.py          all that a checkout can use
 
-One line for each step, and one line that says why when something is missing. Nothing is done when nothing
-has changed. An interrupted set-up is mended by the next one: the stamp is written last, and a .venv without
-a stamp is made anew. uv installs where it can be had, and otherwise pip, which takes longer; INSTALLER=pip
-asks for pip. All packages are wheels of the versions in constraints.txt.
+One line for each step, and one line that says why when something is missing. Where PyTorch has no wheel for
+this Python, the demo stops; for the rest all else is installed, and `make test` leaves out what needs it.
+Nothing is done when nothing has changed. An interrupted set-up is mended by the next one: the stamp is
+written last, and a .venv without a stamp is made anew. uv installs where it can be had, and otherwise pip,
+which takes longer; INSTALLER=pip asks for pip. All packages are wheels of the versions in constraints.txt.
 
 Standard library only, in a syntax that a Python too old for the project can still read.
 """
@@ -32,7 +33,9 @@ TOOLS = {
     "pip": ("pip", "install", "--disable-pip-version-check", "--no-input"),
     "uv": ("uv", "pip", "install", "--python", ".venv/bin/python"),
 }
-HASHES = "hashes.txt"  # of the files that constraints.txt names; uv checks them, INSTALLER=pip does not
+LOCKED_FILES = "pylock.toml"  # of constraints.txt, with hashes: uv checks them, INSTALLER=pip does not
+NEED_TORCH = ("torch", "stable-baselines3", "sb3-contrib")  # of what pyproject.toml asks for
+NO_TORCH = "all but PyTorch"  # in the stamp: a purpose that could not be met in full
 ONLY_WHEELS = ("--only-binary", ":all:")
 NEEDED_GB = 3.0  # .venv itself takes 1.8 GB on Linux
 
@@ -43,7 +46,7 @@ UNREACHABLE = "the package index cannot be reached; check the network, or name a
 LACKING = "the package index lacks a wheel of a version that constraints.txt names"
 REASONS = {  # a sign in what pip, uv or venv says: what it means. The first sign that is found is told.
     "Failed to initialize cache": "uv cannot write its cache; set UV_CACHE_DIR to a folder, or INSTALLER=pip",
-    "Hash mismatch": "the package index has another file than the one that was locked; see hashes.txt",
+    "Hash mismatch": "the package index has another file than the one that was locked; see pylock.toml",
     "No space left on device": "the disk is full",
     "Read-only file system": "this folder cannot be written to",
     "Permission denied": "this folder cannot be written to",
@@ -56,8 +59,10 @@ REASONS = {  # a sign in what pip, uv or venv says: what it means. The first sig
     "ResolutionImpossible": LACKING,
     "invalid peer certificate": "the package index shows an unknown certificate; name yours with PIP_CERT",
     "client error (Connect)": UNREACHABLE,
+    "failed to lookup address": UNREACHABLE,
     "operation timed out": "the package index stopped answering; run the same command again",
     "No solution found": LACKING,
+    "No matching distribution found": LACKING,
 }
 
 UV_FROM_PIP = {  # what pip is told by variables and files: uv's variable for it, and what parts a list there
@@ -76,6 +81,10 @@ class Missing(Exception):
     """Something is missing that set-up cannot do without."""
 
 
+class NoWheel(Missing):
+    """PyTorch has none for this Python."""
+
+
 def main(purpose: str = "all") -> int:
     started = time.monotonic()
     try:
@@ -85,11 +94,12 @@ def main(purpose: str = "all") -> int:
             place, pins = wanted_stamp()
             found = read_stamp()
             is_there = venv("bin/python").exists()  # not so once the Python behind it has gone
-            if is_there and found in ([place, pins, purpose], [place, pins, "all"]):
+            enough = [purpose, "all"] + ([NO_TORCH] if purpose == "all" else [])
+            if is_there and found[:2] == [place, pins] and found[2:] in [[one] for one in enough]:
                 return 0
             check_machine()
-            install(purpose, anew=not is_there or found[:1] != [place])
-            stamp_path().write_text(f"{place}\n{pins}\n{purpose}\n")
+            done = install(purpose, anew=not is_there or found[:1] != [place])
+            stamp_path().write_text(f"{place}\n{pins}\n{done}\n")
     except Missing as missing:
         print(f"set-up stopped: {missing}", file=sys.stderr)
         return 1
@@ -176,7 +186,8 @@ def read_stamp():
 # The steps
 
 
-def install(purpose: str, anew: bool) -> None:
+def install(purpose: str, anew: bool) -> str:
+    """Install for a purpose; returns what the stamp says of it."""
     print(f"{'Making' if anew else 'Updating'} .venv with Python {sys.version.split()[0]}", flush=True)
     with suppress(OSError):
         stamp_path().unlink()
@@ -186,9 +197,22 @@ def install(purpose: str, anew: bool) -> None:
         python = getattr(sys, "_base_executable", sys.executable)
         step("virtual environment", (python, "-I", "-m", "venv", ".venv"))
     tool = installer()
-    install_torch(tool)
-    packages(tool, "all other packages", *ONLY_WHEELS, *requirements(purpose))
+    asked, done = requirements(purpose), purpose
+    try:
+        install_torch(tool)
+    except NoWheel as missing:
+        if purpose != "all":
+            raise
+        print(f"  {missing}")
+        print(f"  left out: {', '.join(NEED_TORCH)}; the tests that need them will say so", flush=True)
+        asked, done = [one for one in asked if not needs_torch(one)], NO_TORCH
+    packages(tool, "all other packages", *ONLY_WHEELS, *asked)
     packages(tool, "this checkout", "--no-deps", "--no-build-isolation", "--editable", ".")
+    return done
+
+
+def needs_torch(requirement: str) -> bool:
+    return requirement.split(">=")[0] in NEED_TORCH
 
 
 def installer() -> str:
@@ -205,8 +229,9 @@ def installer() -> str:
 
 def install_torch(tool: str) -> None:
     """On Linux the build for the CPU: from where pip finds links, or from TORCH_INDEX. Elsewhere the usual
-    index has that one, and it comes with the rest."""
+    index has that one."""
     if sys.platform != "linux":
+        torch_from_the_usual_index(tool, "PyTorch")
         return
     places = [("where pip finds links", "--no-index")] if "find-links" in pip_settings() else []
     if TORCH_INDEX:
@@ -222,10 +247,15 @@ def install_torch(tool: str) -> None:
     print(
         "  what is left is the usual index: PyTorch with CUDA, some gigabytes (TORCH_INDEX=URL names another)"
     )
+    torch_from_the_usual_index(tool, "PyTorch with CUDA")
+
+
+def torch_from_the_usual_index(tool: str, title: str) -> None:
     try:
-        packages(tool, "PyTorch with CUDA", *ONLY_WHEELS, "torch")
+        packages(tool, title, *ONLY_WHEELS, "torch")
     except Missing as missing:
-        raise Missing(f"PyTorch cannot be had for Python {dotted(sys.version_info)}: {missing}") from None
+        words = f"PyTorch cannot be had for Python {dotted(sys.version_info)}: {missing}"
+        raise (NoWheel if str(missing).startswith(LACKING) else Missing)(words) from None
 
 
 def requirements(purpose: str):
@@ -241,14 +271,32 @@ def requirements(purpose: str):
 def packages(tool: str, title: str, *arguments: str, **environment: str) -> None:
     """Install into .venv within constraints.txt. The first import compiles what is used."""
     options = ["--constraint", "constraints.txt"]
-    if tool == "uv" and (ROOT / HASHES).is_file():
-        options += ["--constraint", HASHES]
+    if tool == "uv" and (ROOT / LOCKED_FILES).is_file():
+        options += ["--constraint", hashes()]
     if os.environ.get("PYTHONDONTWRITEBYTECODE"):  # then no import will
         options += ["--compile-bytecode"] if tool == "uv" else []
     else:
         options += ["--no-compile"] if tool == "pip" else []
     command = (str(venv("bin/python")), "-I", "-m", *TOOLS[tool], *options, *arguments)
     step(title, command, {**uv_settings(), **environment} if tool == "uv" else environment)
+
+
+def hashes() -> str:
+    """Path of a file that has the hashes as uv takes them for constraints: it takes no pylock.toml there, and
+    installs the whole of one as requirements, whatever the purpose."""
+    import tomllib
+
+    packages = tomllib.loads((ROOT / LOCKED_FILES).read_text(encoding="utf-8"))["packages"]
+    lines = [
+        " ".join(
+            (f"{one['name']}=={one['version']}",
+             *(f"--hash=sha256:{wheel['hashes']['sha256']}" for wheel in one["wheels"]))
+        )
+        for one in packages
+    ]  # fmt: skip
+    path = venv("hashes.txt")
+    path.write_text("\n".join(lines) + "\n", encoding="utf-8")
+    return str(path.relative_to(ROOT))
 
 
 @lru_cache(maxsize=None)  # noqa: UP033  functools.cache is too young

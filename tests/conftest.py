@@ -1,9 +1,17 @@
 """For all tests: compiling says nothing, whose lines some tests would count, windows are drawn unseen, and
-nobody computes in threads: there is a process on each processor, and threads that wait for others spin."""
+nobody computes in threads: there is a process on each processor, and threads that wait for others spin.
+
+Where PyTorch cannot be had, what needs it is left out, and a line at the end says so."""
 
 import os
 import signal
+import sys
+from importlib.util import find_spec
+from pathlib import Path
 
+import pytest
+
+import hoof_env
 from hoof_env.simd.compile import QUIET
 
 os.environ.setdefault(QUIET, "1")
@@ -14,3 +22,50 @@ for library in ("OMP", "OPENBLAS", "MKL"):
 # A shell's background ignores interrupts, and so does what is started there; tests interrupt what they start.
 if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
     signal.signal(signal.SIGINT, signal.default_int_handler)
+
+HAS_TORCH = find_spec("torch") is not None
+NEED_TORCH = ("torch", "stable_baselines3", "sb3_contrib")
+LEFT_OUT = ("agents", "ecosystem")  # folders of tests whose commands import it in processes of their own
+REASON = "needs PyTorch"
+
+
+class _Absent:
+    """Has what imports PyTorch in this repository skipped; libraries that can do without it go on."""
+
+    root = str(Path(__file__).parents[1])
+
+    def find_spec(self, name, path=None, target=None):
+        if name.partition(".")[0] in NEED_TORCH:
+            frame = sys._getframe(1)
+            while frame and "importlib" in frame.f_code.co_filename:
+                frame = frame.f_back
+            if frame and frame.f_code.co_filename.startswith(self.root):
+                pytest.skip(REASON, allow_module_level=True)
+
+
+class _AbsentVecEnv:
+    """In the place of `hoof_env.Sb3VecEnv`, for files of which not every test makes one."""
+
+    def __new__(cls, *args, **settings):
+        pytest.skip(REASON)
+
+
+if not HAS_TORCH:
+    sys.meta_path.insert(0, _Absent())
+    hoof_env.Sb3VecEnv = _AbsentVecEnv
+
+
+def pytest_ignore_collect(collection_path):
+    here = Path(__file__).parent
+    if not HAS_TORCH and collection_path in [here / name for name in LEFT_OUT]:
+        return True
+    return None
+
+
+def pytest_terminal_summary(terminalreporter):
+    if not HAS_TORCH:
+        skipped = sum(REASON in str(report.longrepr) for report in terminalreporter.stats.get("skipped", ()))
+        folders = " and ".join(f"tests/{name}" for name in LEFT_OUT)
+        terminalreporter.write_line(
+            f"no PyTorch here: left out {folders}, and {skipped} files or tests elsewhere that import it"
+        )

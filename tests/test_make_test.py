@@ -1,5 +1,6 @@
 """`make test` ends whatever a test does: one that kills its process or never ends is named, the run fails."""
 
+import os
 import re
 import subprocess
 import sys
@@ -37,6 +38,33 @@ def test_a_lost_worker_ends_the_run(what, tmp_path):
     assert "crashed while running 'tests/test_bad.py::test_it'" in ended.stdout
     assert "1 failed, 1 passed" in ended.stdout
     assert time.monotonic() - started < 100
+
+
+ABSENT = """
+import sys
+
+NAMES = "torch", "stable_baselines3", "sb3_contrib"
+sys.modules.update(dict.fromkeys(NAMES))  # as if they were not installed
+
+def pytest_collection():  # now the importing itself is asked
+    for name in NAMES:
+        del sys.modules[name]
+"""
+
+
+def test_without_pytorch_what_needs_it_is_left_out_and_a_line_says_so(tmp_path):
+    """Of a file of which some tests need it, the others run."""
+    (tmp_path / "absent.py").write_text(ABSENT)
+    command = [sys.executable, "-m", "pytest", "-q", "-p", "absent", "-p", "no:cacheprovider"]
+    chosen = ["tests/envs/test_without_effect.py", "-k", "libraries"]
+    ended = subprocess.run(
+        [*command, *chosen], cwd=ROOT, env=os.environ | {"PYTHONPATH": f"{ROOT}{os.pathsep}{tmp_path}"},
+        capture_output=True, text=True, timeout=300,
+    )  # fmt: skip
+    assert ended.returncode == 0, ended.stdout + ended.stderr
+    said = "no PyTorch here: left out tests/agents and tests/ecosystem, and 2 files or tests elsewhere that"
+    assert said in ended.stdout
+    assert "1 passed, 2 skipped" in ended.stdout
 
 
 def test_a_test_has_a_limit_of_time(pytestconfig):

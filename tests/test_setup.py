@@ -7,6 +7,7 @@ import shutil
 import socket
 import subprocess
 import sys
+import tomllib
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -43,6 +44,7 @@ def installs(setup, monkeypatch):
         done.append(f"{purpose} anew" if anew else f"{purpose} more")
         setup.venv("bin").mkdir(parents=True, exist_ok=True)
         setup.venv("bin/python").touch()
+        return purpose
 
     monkeypatch.setattr(setup, "install", install)
     return done
@@ -195,6 +197,66 @@ def test_places_of_pytorch_in_their_order(setup, asked, monkeypatch, capsys):
     assert "PyTorch with CUDA, some gigabytes" in capsys.readouterr().out
 
 
+@pytest.fixture
+def without_torch(setup, monkeypatch):
+    """Packages of which PyTorch has no wheel for this Python, or cannot be had for the reason that is given;
+    what is installed."""
+    done, reason = [], [setup.LACKING]
+
+    def packages(tool, title, *arguments, **environment):
+        if any(word.partition(">=")[0] == "torch" for word in arguments):
+            raise setup.Missing(f"{reason[0]} (more in .venv/set-up.log)")
+        done.extend(word for word in arguments if word not in setup.ONLY_WHEELS)
+
+    def step(title, command, environment=()):
+        setup.venv("bin").mkdir(parents=True)
+        setup.venv("bin/python").touch()
+
+    monkeypatch.setattr(setup, "packages", packages)
+    monkeypatch.setattr(setup, "step", step)
+    monkeypatch.setattr(setup, "pip_settings", dict)
+    return SimpleNamespace(done=done, reason=reason)
+
+
+@pytest.mark.parametrize("platform", ["linux", "darwin"])
+def test_without_a_wheel_of_pytorch_the_tests_get_all_else_and_a_line_says_so(
+    setup, without_torch, monkeypatch, capsys, platform
+):
+    monkeypatch.setattr(setup.sys, "platform", platform)
+    assert setup.main() == 0
+    assert "left out: torch, stable-baselines3, sb3-contrib; the tests that" in capsys.readouterr().out
+    installed = {re.split("[>=;]", one)[0] for one in without_torch.done}
+    assert installed > {"numpy", "numba", "gymnasium", "pytest", "scipy", "mypy", "--editable"}
+    assert not installed & set(setup.NEED_TORCH)
+    count = len(without_torch.done)
+    assert setup.main() == 0  # nothing is tried again
+    assert len(without_torch.done) == count
+    assert setup.main("demo") == 1
+    assert "PyTorch cannot be had for Python 3." in capsys.readouterr().err
+
+
+def test_where_pytorch_cannot_be_reached_set_up_stops(setup, without_torch, capsys):
+    without_torch.reason[0] = setup.UNREACHABLE
+    assert setup.main() == 1
+    assert "the package index cannot be reached" in capsys.readouterr().err
+    assert not setup.stamp_path().exists()
+
+
+def test_what_needs_pytorch_is_known(ours):
+    """What is left brings no PyTorch."""
+    asked = [one for one in ours.requirements("all") if not ours.needs_torch(one)]
+    assert len(asked) == len(ours.requirements("all")) - len(ours.NEED_TORCH)
+    uv_pip_compile(ours, stdin="cycler\n")  # whether there is an index
+    command = [sys.executable, "-m", "uv", "pip", "compile", "--quiet", "--only-binary", ":all:", "-"]
+    environment = {**os.environ, **ours.uv_settings()}
+    found = subprocess.run(
+        command, input="\n".join(asked), env=environment, capture_output=True, text=True, cwd=ours.ROOT
+    )
+    assert found.returncode == 0, found.stderr
+    assert "numpy==" in found.stdout
+    assert not re.search(r"(?m)^torch==", found.stdout)
+
+
 def test_uv_is_told_what_pip_is_told(setup, tmp_path, monkeypatch):
     for name in [name for name in os.environ if name.startswith(("PIP_", "UV_"))]:
         monkeypatch.delenv(name)
@@ -262,6 +324,11 @@ def test_the_lock_is_what_its_command_writes(ours):
     command = [sys.executable, "scripts/lock.py"]
     subprocess.run(command, cwd=ours.ROOT, check=True, env={**os.environ, **ours.uv_settings()})
     assert (ours.ROOT / "constraints.txt").read_text() == (ROOT / "constraints.txt").read_text()
+    found, expected = (
+        [(one["name"], one["version"]) for one in tomllib.loads(path.read_text())["packages"]]
+        for path in (ours.ROOT / ours.LOCKED_FILES, ROOT / ours.LOCKED_FILES)
+    )  # a version may get another wheel
+    assert found == expected
 
 
 # Nothing twice
@@ -309,14 +376,48 @@ def test_interrupted_setup_is_made_anew(setup, installs, monkeypatch, capsys):
     assert installs == ["all anew"]
 
 
+# Hashes
+
+
 def test_hashes_are_of_the_versions_that_are_locked(setup):
     """Without PyTorch, whose builds for the CPU are of another index."""
     locked = {
         line.split(" ;")[0] for line in (ROOT / "constraints.txt").read_text().splitlines() if "==" in line
     }
-    text = (ROOT / setup.HASHES).read_text()
-    hashed = {line.split()[0] for line in text.splitlines() if line[0] not in " #"}
+    packages = tomllib.loads((ROOT / setup.LOCKED_FILES).read_text())["packages"]
+    hashed = {f"{one['name']}=={one['version']}" for one in packages}
+    assert len(hashed) == len(packages)
     assert hashed <= locked
     assert {name.split("==")[0] for name in hashed} > {"numpy", "numba", "pillow", "stable-baselines3"}
     assert not [name for name in hashed if name.startswith("torch==")]
-    assert len(re.findall(r"--hash=sha256:[0-9a-f]{64}", text)) == text.count("--hash") > len(hashed)
+    for one in packages:
+        assert all(re.fullmatch("[0-9a-f]{64}", wheel["hashes"]["sha256"]) for wheel in one["wheels"]), one
+
+
+def test_every_hash_is_told_to_uv(ours):
+    text = (ROOT / ours.LOCKED_FILES).read_text()
+    (ours.ROOT / ours.LOCKED_FILES).write_text(text)
+    told = (ours.ROOT / ours.hashes()).read_text()
+    assert told.count("--hash=sha256:") == text.count("sha256 = ")
+    assert re.search(r"(?m)^numpy==\S+ --hash=sha256:[0-9a-f]{64} --hash=", told)
+
+
+@pytest.mark.parametrize("is_changed", [False, True])
+def test_uv_refuses_another_file_than_the_locked_one(ours, tmp_path, monkeypatch, is_changed):
+    monkeypatch.setitem(ours.TOOLS, "uv", ("uv", "pip", "install", "--python", sys.executable))
+    text = (ROOT / ours.LOCKED_FILES).read_text()
+    at = text.index("sha256", text.index('name = "cycler"')) + len('sha256 = "')
+    if is_changed:
+        text = f"{text[:at]}{'01'[text[at] == '0']}{text[at + 1 :]}"
+    (ours.ROOT / ours.LOCKED_FILES).write_text(text)
+    uv_pip_compile(ours, stdin="cycler\n")  # whether there is an index
+
+    def install():
+        ours.packages("uv", "one", *ours.ONLY_WHEELS, "--no-cache", "--target", str(tmp_path), "cycler")
+
+    if not is_changed:
+        install()
+        assert (tmp_path / "cycler").is_dir()
+        return
+    with pytest.raises(ours.Missing, match="another file than the one that was locked"):
+        install()

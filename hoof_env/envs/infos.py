@@ -116,6 +116,20 @@ class NamedArray(np.ndarray[Any, np.dtype[np.float64]]):
         """What is computed from named numbers has no names."""
         return array[()] if return_scalar else np.asarray(array)
 
+    def __repr__(self) -> str:
+        """The numbers by name; of many environments each name has its row."""
+        if self.ndim == 0 or self.shape[-1] != len(self.names):
+            return repr(np.asarray(self))
+        parts = [f"{name}={np.array2string(np.asarray(self[name]), separator=', ')}" for name in self.names]
+        return (
+            f"NamedArray({', '.join(parts)})"
+            if self.ndim == 1
+            else "Named(\n  " + ",\n  ".join(parts) + "\n)"
+        )
+
+    def __str__(self) -> str:
+        return repr(self)
+
     def get(self, key: str, default: Any = None) -> Any:
         return self[key] if key in self.names else default
 

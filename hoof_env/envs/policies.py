@@ -88,7 +88,8 @@ def heading_seen(env: Any) -> Any:
             "policy: expected 'gait' among the observed groups, for a policy that goes to a gait must see the"
             f" present one; got {leg.settings.observation!r}"
         )
-    first = leg.observation_names.index("crank speed")
+    names = leg.observation_names
+    first = names.index("crank speed")
     middle = first + len(LIMITS)
     last = middle + len(LIMITS)
     body = leg.batch.body
@@ -97,6 +98,11 @@ def heading_seen(env: Any) -> Any:
 
     def heading(observation: Any) -> Any:
         seen = np.asarray(observation, float)
+        if not seen.ndim:
+            raise ParameterError(
+                f"observation: expected what the environment returned, of shape (..., {len(names)}), for a"
+                f" policy that goes to a gait must see the present one; got {observation!r}"
+            )
         gait = body.middle + body.half * seen[..., first:middle]
         return gait + lead * rate_bounds * seen[..., middle:last]
 

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import lru_cache
 from typing import Any
 
 from hoof_env.dynamics.limits import has_moved
 from hoof_env.envs.addresses import memories
+from hoof_env.envs.observation_kernel import from_outside
 from hoof_env.envs.outcome import outcome_of_one
 from hoof_env.simd import columns, where
 from hoof_env.simd.compile import inline_llvm
@@ -24,19 +26,30 @@ def is_user_term(term: Term) -> bool:
 
 
 def sum_of_terms(terms: tuple[Term, ...], layouts: Memories, k: int = 0) -> Callable[..., Any]:
-    """A function that computes the terms from the k-th on, keeps them in `episode.terms` and returns the sum
-    of all. numba has no loop over functions, so each calls the next."""
-    if k == len(terms):
+    """Return a function that computes terms, of which the first is the k-th, keeps them in `episode.terms`
+    and returns their sum.
+
+    Terms of this package behind the last one from outside are compiled once for all tasks with them.
+    """
+    if not terms:
         return inline_llvm(lambda addresses, lanes, task, outcome, episode, n, spare, total: total)
-    compute = inline_llvm(terms[k].compute)
-    rest = sum_of_terms(terms, layouts, k + 1)
+    is_ours = not from_outside([term.compute for term in terms])
+    return (_our_terms if is_ours else _first_and_rest)(terms, layouts, k)
+
+
+def _first_and_rest(terms: tuple[Term, ...], layouts: Memories, k: int) -> Callable[..., Any]:
+    """Return the function for at least one term. numba has no loop over functions, so each calls the next."""
+    term = terms[0]
+    rest = sum_of_terms(terms[1:], layouts, k + 1)
+    compute = inline_llvm(term.compute)
     is_first = k == 0
-    from_outside = is_user_term(terms[k])
-    number = number_of(terms[k].title)
+    is_scalar = term.scalar
+    is_from_outside = is_user_term(term)
+    number = number_of(term.title)
 
     @inline_llvm
     def add_term(addresses, lanes, task, outcome, episode, n, spare, total):  # type: ignore[no-untyped-def]
-        if from_outside:
+        if is_from_outside:
             works = has_moved(outcome.trunk.result)  # else the reports that it may read are of where it broke
             episode.terms[k] = where(works, episode.terms[k], 0.0)
         total = episode.terms[k] if is_first else total + episode.terms[k]
@@ -56,4 +69,8 @@ def sum_of_terms(terms: tuple[Term, ...], layouts: Memories, k: int = 0) -> Call
             own.terms[k] = number(compute(one, task.weights[k])) + 0.0
         return add_term(addresses, lanes, task, outcome, episode, n, spare, total)
 
-    return compute_one_by_one if terms[k].scalar else compute_term
+    return compute_one_by_one if is_scalar else compute_term
+
+
+_our_terms = lru_cache(maxsize=64)(_first_and_rest)
+"""Functions for terms of this package, which tasks share."""

@@ -85,7 +85,7 @@ class Sb3VecEnv(VecEnv):
                 rows.append(env)
         for options, _ in groups:  # what is refused changes nothing
             check_options(self.envs.batch, options)
-        self.reset_infos = [{} for _ in range(self.num_envs)]
+        self.reset_infos: list[dict[str, Any]] = [{} for _ in range(self.num_envs)]
         for options, rows in groups:
             mask = np.zeros(self.num_envs, bool)
             mask[rows] = True

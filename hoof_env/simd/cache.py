@@ -46,6 +46,10 @@ LONGEST_WAIT = 600.0
 COMPILED: list[str] = []
 """Names of the kernels that this process has compiled."""
 
+_HELD: set[str] = set()
+"""Locks of kernels that are compiled now. While one is, a module that is imported for it may make an
+environment that needs it, too."""
+
 _caching: Any = numba.core.caching
 _config: Any = numba.core.config
 _Given: Any = getattr(_caching, "UserProvidedCacheLocator", None) or _caching._UserProvidedCacheLocator
@@ -222,7 +226,10 @@ class KernelCache(_caching.FunctionCache):
 
     def _take_lock(self) -> bool:
         """Wait until no other process compiles this kernel; return False if files cannot be locked."""
-        lock = FileLock(os.path.join(self.cache_path, f"{self._impl.filename_base}.lock"))
+        path = os.path.join(self.cache_path, f"{self._impl.filename_base}.lock")
+        if path in _HELD:  # by this thread, as no other compiles now
+            return True
+        lock = FileLock(path)
         waiting = f"waiting for another process, which compiles {self._kernel} ..."
         gave_up = f"waited {LONGEST_WAIT:.0f} s for {self._kernel}: compiling it here, too"
         for timeout, said in ((1.0, waiting), (LONGEST_WAIT, gave_up)):
@@ -234,12 +241,14 @@ class KernelCache(_caching.FunctionCache):
                 return False
             else:
                 self._lock = lock
+                _HELD.add(path)
                 return True
         return False
 
     def release(self) -> None:
         """Release the lock, also if the kernel could not be compiled."""
         if self._lock is not None:
+            _HELD.discard(self._lock.lock_file)
             self._lock.release()
             self._lock = None
 

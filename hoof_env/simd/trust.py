@@ -8,6 +8,7 @@ owners and modes, such as Windows, is not checked.
 from __future__ import annotations
 
 import os
+import shlex
 import stat
 from contextlib import suppress
 from pathlib import Path
@@ -71,11 +72,12 @@ def _check(path: str, found: os.stat_result) -> None:
         why = "it is writable by " + ("everybody" if open_to & stat.S_IWOTH else _group(found.st_gid))
     else:
         return
+    folder = os.environ.get("NUMBA_CACHE_DIR") or (path if os.path.isdir(path) else os.path.dirname(path))
+    close_it = f"run `chmod -R go-w {shlex.quote(folder)}` if all in it is yours, " if open_to else ""
     raise OutputError(
         f"compiled kernels in {path!r} cannot be trusted, for {why}: they are pickles, which can run any "
-        "code; expected a folder and files of your own or of root that nobody else can write: delete these "
-        "files, chmod -R go-w the folder, or set the environment variable NUMBA_CACHE_DIR to a folder of "
-        "your own"
+        f"code; expected a folder and files of your own or of root that nobody else can write: {close_it}"
+        "delete these files, or set the environment variable NUMBA_CACHE_DIR to a folder of your own"
     )
 
 

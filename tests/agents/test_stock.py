@@ -70,6 +70,22 @@ def test_a_training_scores_a_learner_as_its_library_makes_it(tmp_path, monkeypat
     assert first[0]["train_seconds"] == 0.0 < first[1]["train_seconds"]
 
 
+def test_steps_of_ppo_flat_are_whole_rollouts_so_that_the_last_is_scored(tmp_path, monkeypatch, capsys):
+    """Without them a training that has no row of its last step would be made again each time."""
+    monkeypatch.setattr(stock_page, "FINAL_SEEDS", FINAL_SEEDS[:3])
+    monkeypatch.setattr(stock, "FINAL_SEEDS", FINAL_SEEDS[:3])
+    monkeypatch.setattr(stock_page, "anchors", lambda env_id: {"zero action": 0.5, stock_page.BEST: 1.5})
+    args = Args(env_id=LEG, algo=TUNED, seeds=1, steps=1000, out=tmp_path / "curves")
+    assert [row["steps"] for row in stock.stock(args)] == [0, 2048]
+    assert f"{TUNED}: 2048 steps instead of 1000" in capsys.readouterr().out
+    monkeypatch.setattr(stock, "train", None)
+    stock.stock(args)  # nothing is left to train
+    assert "instead" not in capsys.readouterr().out
+    assert [job.curves.steps for job in stock.jobs(Args(env_id=LEG, algo="ppo", seeds=1, steps=1000))] == [
+        1000
+    ]
+
+
 def test_an_interrupted_plan_goes_on_with_what_is_missing(tmp_path, monkeypatch):
     trained = []
 

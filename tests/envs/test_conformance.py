@@ -11,7 +11,6 @@ import numpy as np
 import pytest
 from family import FALLS, HORSE, IDS, actions, effective, make, roll, same, steps
 from gymnasium.utils.env_checker import check_env
-from stable_baselines3.common.env_checker import check_env as sb3_check_env
 
 SETUPS = [
     *((env_id, {}) for env_id in IDS),
@@ -46,6 +45,8 @@ def test_checkers_find_nothing(setup):
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         check_env(gym.make(setup[0], **setup[1]).unwrapped)
+        from stable_baselines3.common.env_checker import check_env as sb3_check_env
+
         sb3_check_env(gym.make(setup[0], **setup[1]))
 
 

@@ -175,3 +175,18 @@ def test_the_row_of_an_environment():
     same(row_of(infos, 2), info)
     _, infos = env.reset(options={"reset_mask": np.array([True, False, True, False])})
     assert row_of(infos, 1) == {}
+
+
+def test_named_numbers_print_their_names_with_their_values():
+    row = name_columns([6.5, -0.25, np.nan], ("crank_speed", "swing_sin", "load"))
+    assert repr(row) == str(row) == f"{row}" == "NamedArray(crank_speed=6.5, swing_sin=-0.25, load=nan)"
+    two = name_columns([[1.0, 2.0], [3.0, 4.0]], ("x", "y"))
+    assert repr(two) == "NamedArray(\n  x=[1., 3.],\n  y=[2., 4.]\n)"
+    assert repr(two["x"]) == repr(np.array([1.0, 3.0]))
+    assert repr(two.reshape(4)) == repr(np.array([1.0, 2.0, 3.0, 4.0]))  # no longer a row of names
+    assert repr(name_columns([], ())) == "NamedArray()"
+    many = name_columns(np.zeros((5000, 2)), ("x", "y"))
+    assert len(repr(many)) < 500
+    env = gym.make(LEG)
+    shown = repr(env.reset(seed=0)[1]["measured"])
+    assert all(f"{name}=" in shown for name in measured_names())

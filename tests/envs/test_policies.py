@@ -298,3 +298,9 @@ def test_policies_that_see_the_crank_find_it_wherever_it_is():
             ParameterError, match=r"expected 'crank' among the observed groups, got \['gait'\]"
         ):
             make_policy(name, gym.make(ENV_ID, observation=["gait"]))
+
+
+def test_a_policy_that_is_shown_nothing_says_what_it_must_see(env):
+    policy = make_policy("run", env)
+    with pytest.raises(ParameterError, match=r"observation: expected what .*shape \(\.\.\., \d+\).*got None"):
+        policy.predict(None)

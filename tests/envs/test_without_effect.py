@@ -10,7 +10,6 @@ import gymnasium as gym
 import numpy as np
 import pytest
 from family import IDS, OTHER, actions, same
-from stable_baselines3.common.vec_env import DummyVecEnv
 
 from hoof_env import RandomizeParameters, Sb3VecEnv
 from hoof_env.dynamics.parts import ONE_LEG
@@ -26,6 +25,12 @@ LEG, RAIL, FIXED, SPEED, TERRAIN = (
     f"hoof_env/HorseLeg{name}-v0" for name in ("", "Rail", "Fixed", "Speed", "Terrain")
 )
 HORSE = "hoof_env/Horse-v0"
+
+
+def dummy_vec_env(makers):
+    from stable_baselines3.common.vec_env import DummyVecEnv
+
+    return DummyVecEnv(makers)
 
 
 def episode(settings, steps=150):
@@ -173,7 +178,7 @@ def test_settings_and_what_follows_from_them_are_not_assigned(kind):
 @pytest.mark.parametrize(
     "many",
     [
-        lambda: DummyVecEnv([lambda: gym.make(LEG).unwrapped]),
+        lambda: dummy_vec_env([lambda: gym.make(LEG).unwrapped]),
         lambda: Sb3VecEnv(LEG, 2),
         lambda: gym.make_vec(LEG, num_envs=2, vectorization_mode="sync"),  # through Gymnasium's wrappers
     ],

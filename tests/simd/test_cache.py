@@ -468,6 +468,24 @@ def test_a_folder_or_file_of_somebody_else_is_refused_before_it_is_read(start, t
     assert "NUMBA_CACHE_DIR" in out
 
 
+@pytest.mark.skipif(os.name != "posix" or os.geteuid() != 0, reason="needs root")
+def test_the_remedy_of_folders_from_a_generous_umask_and_a_group_with_others_in_it_works(start, tmp_path):
+    """As an older version left them under umask 002."""
+    (tmp_path / "go").touch()
+    ended(start())
+    cache = tmp_path / "cache"
+    for path in (cache, *cache.rglob("*")):
+        os.chown(path, -1, 12345)
+        path.chmod(path.stat().st_mode | 0o020)
+    code = CALL_OR_SAY.format(read_only=False)
+    out, _ = ended(start(code))
+    assert "for it is writable by group 12345" in out
+    remedy = f"chmod -R go-w {cache}"
+    assert f"run `{remedy}` if all in it is yours" in out
+    subprocess.run(remedy.split(), check=True)
+    assert ended(start())[0] == "8.0 []"
+
+
 @pytest.mark.skipif(os.name != "posix", reason="needs modes of files")
 def test_what_is_made_here_is_closed_to_others_whatever_the_umask(start, tmp_path):
     (tmp_path / "go").touch()
@@ -475,3 +493,31 @@ def test_what_is_made_here_is_closed_to_others_whatever_the_umask(start, tmp_pat
     made = [tmp_path / "cache", *(tmp_path / "cache").rglob("*")]
     assert not [path for path in made if path.stat().st_mode & 0o022 and path.suffix != ".lock"]
     assert ended(start())[0] == "8.0 []"
+
+
+NESTED = """
+from hoof_env.simd.compile import kernel
+from hoof_env.simd.types import instruction
+
+inside = []
+
+@instruction(lambda x: x(x))
+def same(code, x):
+    if not inside:
+        inside.append("called")
+        inside.append(make()(3.0))
+    return x
+
+def make():
+    def twice(x):
+        return 2.0 * same(x)
+    return kernel(twice)
+
+print(make()(1.0), inside)
+"""
+
+
+def test_a_kernel_that_is_needed_while_it_is_compiled_does_not_wait_for_itself(start, tmp_path):
+    """As where a stored kernel asks for a module whose import makes an environment."""
+    (tmp_path / "nested.py").write_text(NESTED)
+    assert ended(start("import nested"), limit=60)[0].split() == ["2.0", "['called',", "6.0]"]
