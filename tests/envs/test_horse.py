@@ -15,7 +15,7 @@ from hoof_env.errors import ParameterError
 from hoof_env.gait import PARAMETERS, WIDEST
 from hoof_env.leg.limb_masses import segment_masses, trunk_mass
 from hoof_env.tasks import horse_gaits as reference
-from hoof_env.tasks.horse import COMMAND_STEP, MASS, SPANS
+from hoof_env.tasks.horse import COMMAND_STEP, HORSE_KERNELS, MASS, SPANS
 from hoof_env.tasks.horse_gaits import (
     COUPLING,
     FASTEST,
@@ -258,8 +258,9 @@ def test_commands_are_drawn_as_numbers_between_their_bounds():
 
 def test_kernels_are_others_where_the_number_of_stored_gaits_is(monkeypatch):
     def name_of_kernel():
-        task, features = TASKS["horse"], Features(2, springs=True, animal=True)
-        found = step._made([], task.terms, task.entries, None, features, 4)
+        task, features = TASKS["horse"], Features(2, springs=True, has_limits=True)
+        body = HORSE_KERNELS._replace(task_fields=tuple(reference.reference_type()))
+        found = step._made([], task.terms, task.entries, None, features, body)
         return found.step_batch.py_func.__qualname__
 
     before, stored = name_of_kernel(), reference._reference()

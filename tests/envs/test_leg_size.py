@@ -8,7 +8,6 @@ from dataclasses import asdict, replace
 import gymnasium as gym
 import numpy as np
 import pytest
-from hoof_env.envs.tasks import _OWN
 
 import hoof_env
 from hoof_env.envs.manual import page
@@ -16,6 +15,7 @@ from hoof_env.errors import DataFileError, ParameterError
 from hoof_env.gait import LIMITS, FilterSettings, GaitParameters, gait_names, limits_of, speed_scale_of
 from hoof_env.ground.contact import load_ground
 from hoof_env.records import find_policy
+from hoof_env.tasks.registry import _OWN
 
 LEG, RAIL, FIXED = "hoof_env/HorseLeg-v0", "hoof_env/HorseLegRail-v0", "hoof_env/HorseLegFixed-v0"
 PUBLISHED = hoof_env.load_geometry()

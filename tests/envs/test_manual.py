@@ -15,7 +15,7 @@ import pytest
 from family import HORSE, OTHER, scaled
 
 from hoof_env import cli
-from hoof_env.envs import manual
+from hoof_env.envs import manual, manual_bodies, manual_words
 from hoof_env.envs.manual import TABLES
 from hoof_env.envs.vector import HorseLegVectorEnv
 from hoof_env.errors import ParameterError
@@ -248,8 +248,10 @@ def test_the_page_of_the_horse_has_the_numbers_of_the_code(monkeypatch):
         ("HEIGHT", (0.567, 1.678)), ("CLEARANCE", 0.0789), ("MASS", 489.0),
     ):  # fmt: skip
         monkeypatch.setattr(horse, name, value)
-    monkeypatch.setattr(manual, "TABLES", manual.tables())
-    monkeypatch.setattr(manual, "WORDS", manual.TABLES["words"])
+    tables = manual_words.tables()
+    for module in (manual, manual_bodies, manual_words):
+        monkeypatch.setattr(module, "TABLES", tables)
+    monkeypatch.setattr(manual, "WORDS", tables["words"])
     page = manual.page("horse")
     start, end = section(page, "Starting State"), section(page, "Episode End")
     assert "within 0.0123 strides of it, pitch within 0.0234 rad" in start
