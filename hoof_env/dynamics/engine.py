@@ -32,14 +32,12 @@ from hoof_env.dynamics.parts import (
     Mechanics,
     Reactions,
     Result,
-    Tally,
     Trunk,
     broken,
 )
 from hoof_env.dynamics.reactions import Reactions as ReactionRows
 from hoof_env.dynamics.step_length import StepLength
 from hoof_env.dynamics.stepping import SCHEMES
-from hoof_env.dynamics.tally import tally_of
 from hoof_env.errors import (
     Floats,
     NotStartedError,
@@ -366,7 +364,7 @@ class TrunkEngine(Mechanics):
         Args:
             env: index of the environment.
             trunk, ground, drive: those of this environment, with the kinds, exponent and laws of the
-                engine's; None is the engine's own. `total_mass`, `weight`, `tally` and `step_limits` stay
+                engine's; None is the engine's own. `total_mass`, `weight` and `step_limits` stay
                 those of the engine.
             limbs: legs of this environment, in other places, with other springs of the hooves or, in an
                 engine with `limits`, of other sizes, similar to the engine's (`Geometry.scaled`); their trunk
@@ -622,11 +620,6 @@ class TrunkEngine(Mechanics):
         parts = {name: rows[:, ReactionRows.rows(name)].copy() for name in ReactionRows.fields}
         joints = parts.pop("joints").reshape(legs, -1, 2, n)
         return Reactions(joints, **{name: part[:, 0] for name, part in parts.items()})
-
-    def tally(self) -> Tally:
-        """Return momentum, spin and energy at the present instant, added up anew from the motion of all
-        bodies."""
-        return tally_of(self)
 
     def messages(self) -> list[str]:
         """Return a sentence for each environment: how it ended."""

@@ -3,19 +3,15 @@ integrated."""
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 
+from hoof_env.dynamics.engine import TrunkEngine
 from hoof_env.dynamics.parts import GRAVITY, Motor, Tally
 from hoof_env.leg.profile import by_name, cross
 
-if TYPE_CHECKING:
-    from hoof_env.dynamics.engine import TrunkEngine
-
 
 def tally_of(engine: TrunkEngine) -> Tally:
-    """Return momentum, spin and energy of all bodies at present, see `TrunkEngine.tally`."""
+    """Return momentum, spin and energy of all bodies at the present instant of an engine."""
     r = engine.report
     s = engine.state
     trunk = engine.trunk

@@ -160,13 +160,6 @@ class LegBase:
         self._given = given
 
     @property
-    def manual(self) -> str:
-        """The manual page of the id, Markdown."""
-        from hoof_env.envs.manual import page_of
-
-        return page_of(self.task.id)
-
-    @property
     def geometry(self) -> Geometry:
         """The leg."""
         return self.batch.body.geometry

@@ -35,7 +35,7 @@ class HorseLegEnv(LegBase, gym.Env[NDArray[np.float32], NDArray[np.float32]]):
         task: name in `registry.TASKS`; the registered ids set it.
         render_mode: "rgb_array" or "human".
         width, height: of a picture [pixels].
-        settings: any of `settings.Settings`; the manual page (`manual`) says what they mean.
+        settings: any of `settings.Settings`; the manual page (`hoof-env manual`) says what they mean.
 
     Attributes:
         task, settings: the task and its settings.

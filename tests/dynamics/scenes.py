@@ -5,6 +5,7 @@ import numpy as np
 from hoof_env.dynamics.constrained import SOLE
 from hoof_env.dynamics.engine import TrunkEngine
 from hoof_env.dynamics.parts import GRAVITY, Limb, Motor, Trunk
+from hoof_env.dynamics.tally import tally_of
 from hoof_env.gait import load_gait
 from hoof_env.ground.contact import Ground
 from hoof_env.leg.geometry import load_geometry
@@ -28,7 +29,7 @@ def horse(ground=FAR, drive=None, hips=HIPS, settings=(), spring=None, terrain=N
 
 def energy(engine):
     """Kinetic and potential [J], shape (num_envs,)."""
-    tally = engine.tally()
+    tally = tally_of(engine)
     return tally.kinetic + tally.potential
 
 

@@ -6,6 +6,7 @@ import pytest
 from hoof_env.dynamics.engine import TrunkEngine
 from hoof_env.dynamics.parts import GRAVITY, TRUNKS, Limb, Prescribed, Trunk
 from hoof_env.dynamics.stepping import SCHEMES
+from hoof_env.dynamics.tally import tally_of
 from hoof_env.gait import GaitParameters, load_gait
 from hoof_env.ground.contact import Ground
 from hoof_env.leg.geometry import load_geometry
@@ -20,7 +21,7 @@ def test_flight(scheme):
     """Four motors, commands on the move, 2 s in the air: momentum and spin stay to the last bit."""
     engine = horse(height=60.0, settings={"integrator": scheme})
     engine.reset([RUN, WALK, RUN, WALK], [0.0, 1.5, 3.0, 4.5], vx=3.0, vy=8.0, pitch=0.1, pitch_rate=-0.4)
-    first, start, pitches, before = engine.tally(), engine.state, [], energy(engine)
+    first, start, pitches, before = tally_of(engine), engine.state, [], energy(engine)
     for k in range(20):
         command = np.array(
             [
@@ -32,7 +33,7 @@ def test_flight(scheme):
         )
         assert not engine.advance(np.roll(command, k, axis=0), 100).any()
         pitches.append(engine.state["pitch"][0])
-    now, last, t = engine.state, engine.tally(), 2.0
+    now, last, t = engine.state, tally_of(engine), 2.0
     assert now["momentum_x"] == start["momentum_x"]
     assert now["spin"] == start["spin"]
     fallen = last.momentum[0] - first.momentum[0] + 1j * engine.weight * t

@@ -5,6 +5,7 @@ import pytest
 
 from hoof_env.dynamics.engine import TrunkEngine
 from hoof_env.dynamics.parts import Limb, Motor, Prescribed, Result, Trunk
+from hoof_env.dynamics.tally import tally_of
 from hoof_env.errors import ParameterError
 from hoof_env.gait import GaitParameters
 from hoof_env.ground.contact import Ground
@@ -90,7 +91,7 @@ def test_a_crank_that_rocks_keeps_its_energy_account():
     e.reset(GaitParameters(3.0, 0.3, 0.2, -0.1), [-1.5, 1.0])
     before = energy(e)
     assert not e.advance(steps=1000).any()
-    assert energy(e) - before == pytest.approx(drives_less_losses(e), abs=1e-4 * e.tally().kinetic[0])
+    assert energy(e) - before == pytest.approx(drives_less_losses(e), abs=1e-4 * tally_of(e).kinetic[0])
     r, toe = (
         {name: row[..., 0] for name, row in e.report.items()},
         functions(ROCKER, e.state["theta"][0])[0][0],
@@ -127,7 +128,7 @@ def test_a_start_that_fails_is_whole(n):
     engine = TrunkEngine(Limb(LEG), HANGING, num_envs=n)
     engine.reset(WALK, 0.0, y=-0.01, vx=1.0)
     assert set(engine.results) == {Result.FALLEN}
-    assert engine.state["momentum_x"] == pytest.approx(engine.tally().momentum.real)
+    assert engine.state["momentum_x"] == pytest.approx(tally_of(engine).momentum.real)
     np.testing.assert_array_equal(engine.report["vx"], np.ones(n))
     assert set(engine.advance(steps=1)) == {Result.FALLEN}
 
