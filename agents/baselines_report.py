@@ -2,11 +2,17 @@
 pictures.
 
     python -m agents.baselines_report           writes it again, from whatever is done
+
+An agent dominates the scripted run if it is faster, its forces, its cost of transport and its loading rate
+are lower by at least what `LOWER` says, and it bears between the run's share of the weight and all of it:
+bearing less is a way to be soft, and with more the suspension pulls the animal down. An agent of
+HorseLegSpeed-v0 follows its command by the slope of its speed over constant commands.
 """
 
 from __future__ import annotations
 
 import json
+import warnings
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import cycle
@@ -19,33 +25,39 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import EngFormatter, NullFormatter
 
 from agents import runs
-from agents.baselines_results import (
-    OPEN_LOOP,
-    SPEED,
+from agents.baselines_run import (
+    COLUMNS,
+    FOLDERS,
+    LEG,
+    Plan,
     Row,
-    compare,
-    following,
-    following_commands,
+    load_plan,
     read_results,
-    references,
     seconds_to,
-    settled_speeds,
     versions_of,
 )
-from agents.baselines_run import COLUMNS, CURVE, FOLDERS, LEG, Plan, load_plan, read_curve
 from agents.command import run
-from agents.evaluate import Score
-from agents.score import FINAL_SEEDS
+from agents.score import FINAL_SEEDS, score_vector
 from agents.settings import load_settings
-from agents.statistics import PUBLISHED, TABLE, Floats, Scored, cells, iqm
+from agents.statistics import PUBLISHED, TABLE, Floats, Scored, cells, iqm, over_episodes, over_seeds
 from hoof_env._output import markdown_table
 from hoof_env._plotting import BLUE, GREEN, GREY, ORANGE, PURPLE, STYLE
+from hoof_env.envs.tasks import TASKS
+from hoof_env.errors import HoofEnvError
+from hoof_env.saved_policy import ABOUT
 
-TEMPLATES = Path(__file__).with_name("templates")
+GAITS = ("run", "walk")
+OPEN_LOOP = "open-loop"  # name of the gait that CMA-ES found for an id, without learning
+
+SPEED = "hoof_env/HorseLegSpeed-v0"
+COMMANDS = 5  # speeds between the lowest and the highest command
+SETTLED = 4.0  # seconds after which the speed is that of the command
+
+LOWER = {"stance_peak_n": 0.75, "peak_grf_n": 0.85, "cost_of_transport": 0.7, "loading_rate_n_s": 1.0}
+"""What an agent that dominates has at most of the run's."""
 
 POINTS = 40  # of a curve
 SOON = 0.4  # of the first row's time to the open-loop gait's return
-BINS = 60  # of training episodes in the picture of one training
 References = Mapping[str, Mapping[str, Scored]]  # policies without learning, by id and name
 
 
@@ -55,6 +67,98 @@ class Args:
     """which plan"""
     runs: Path | None = None
     """folder of the trainings, and of report.md; otherwise runs/baselines, or the plan's own"""
+
+
+# Comparisons: policies without learning, commands, the paper's run
+
+
+def references(env_id: str) -> dict[str, Scored]:
+    """The paper's gaits and the open-loop gait of an id on the episodes of the agents; those that it has."""
+    known = {}
+    for name in (*GAITS, OPEN_LOOP):
+        try:
+            known[name] = reference(name, name, env_id)
+        except HoofEnvError:
+            if name in GAITS:
+                raise
+    return known
+
+
+def reference(name: str, policy: Any, env_id: str) -> Scored:
+    """Score a policy without learning, as `agents.score.score_vector` takes it."""
+    return Scored(name, over_episodes(score_vector(policy, env_id, FINAL_SEEDS)))
+
+
+def settled_speeds(row: Row) -> dict[int, list[float]]:
+    """By seed, `settled_speed` under each of `following_commands`, of agents of `SPEED` whose policies are
+    there."""
+    found = {}
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", UserWarning)  # they were trained with other commands, which is meant
+        for one in row.results:
+            if (one.folder / ABOUT).is_file():
+                speeds = [settled_speed(str(one.folder), command) for command in following_commands()]
+                found[one.final["seed"]] = speeds
+    return found
+
+
+def following_commands() -> list[float]:
+    """Commands [m/s] from the slowest to the quickest of `SPEED`."""
+    low, high = TASKS["speed"].defaults["target_speed"]
+    return [float(command) for command in np.linspace(low, high, COMMANDS)]
+
+
+def following(title: str, speeds: Mapping[int, Sequence[float]]) -> Scored:
+    """Change of the settled speed over change of command: the slope of a line through them."""
+    slopes = [{"follows": float(np.polyfit(following_commands(), one, 1)[0])} for one in speeds.values()]
+    return Scored(title, over_seeds(slopes), slopes)
+
+
+def settled_speed(policy: str, command: float) -> float:
+    """Mean speed [m/s] behind the first `SETTLED` seconds under one command."""
+    kwargs: dict[str, Any] = {"target_speed": [command, command]}
+    with_start = score_vector(policy, SPEED, FINAL_SEEDS, **kwargs)
+    start = score_vector(policy, SPEED, FINAL_SEEDS, **kwargs, episode_seconds=SETTLED)
+    distance = np.mean([one["distance_m"] for one in with_start]) - np.mean(
+        [one["distance_m"] for one in start]
+    )
+    return float(distance / (with_start[0]["seconds"] - SETTLED))
+
+
+def dominates(figures: Mapping[str, float], run: Mapping[str, float]) -> bool:
+    """Whether some means dominate those of the run."""
+    lower = all(figures[key] <= part * run[key] for key, part in LOWER.items())
+    bears = run["weight_share"] <= figures["weight_share"] <= 1.0
+    return lower and bears and figures["speed_m_s"] > run["speed_m_s"]
+
+
+def dominates_with_confidence(agent: Scored, run: Scored) -> bool:
+    """Whether the intervals lie apart, too; that of the weight share must lie neither below the run's nor
+    above 1."""
+    ours = agent.intervals
+    theirs = run.intervals
+    lower = all(theirs[key].above(ours[key]) for key in LOWER)
+    bears = not theirs["weight_share"].above(ours["weight_share"]) and ours["weight_share"].low <= 1.0
+    return lower and bears and ours["speed_m_s"].above(theirs["speed_m_s"])
+
+
+def compare(agents: Sequence[Scored], run: Scored) -> str:
+    """The paper's run, and what is held against it, as a table."""
+    means = {key: interval.mean for key, interval in run.intervals.items()}
+    lines = [["run", *cells(run)]]
+    for one in agents:
+        mine = {key: interval.mean for key, interval in one.intervals.items()}
+        parts = [f"{mine[key] / means[key]:.2f}" for key in LOWER]
+        verdict = "yes" if dominates(mine, means) and dominates_with_confidence(one, run) else "no"
+        count = sum(dominates(seed, means) for seed in one.seeds)
+        seeds = f"{count}/{len(one.seeds)}" if one.seeds else ""
+        lines.append([one.name, *cells(one), *parts, verdict, seeds])
+    of_run = [f"{TABLE[key][0].rpartition(' ')[0] or key} / run's" for key in LOWER]
+    titles = [title for title, *_ in TABLE.values()]
+    return markdown_table(["", *titles, *of_run, "dominates", "seeds that do"], lines)
+
+
+# Tables and pictures
 
 
 def of_id(rows: Sequence[Row], env_id: str) -> list[Row]:
@@ -268,62 +372,6 @@ def draw_curves(rows: Sequence[Row], known: Mapping[str, Scored], path: Path) ->
         handles, labels = panels[0].get_legend_handles_labels()
         figure.legend(handles, labels, loc="outside lower center", ncols=len(labels))
         figure.savefig(path, dpi=130)
-
-
-def draw_learning_curve(folder: Path, scores: Sequence[Score], path: Path, **options: Any) -> None:
-    """Draw the training episodes of a run folder, the scores on the way where it has a curve.csv, the trained
-    policy, which is the first of `scores`, and the means of the others; `options` are of `Figure.savefig`."""
-    episodes = runs.read_episodes(folder)
-    bins = [part for part in np.array_split(episodes, BINS) if len(part)]
-    with matplotlib.rc_context({**STYLE, "font.size": 10}):
-        figure = Figure(figsize=(7, 3.6), layout="constrained")
-        axes = figure.subplots()
-        if bins:
-            steps = [1e-6 * part[:, 0].mean() for part in bins]
-            low, middle, high = np.transpose([np.quantile(part[:, 1], (0.1, 0.5, 0.9)) for part in bins])
-            axes.fill_between(
-                steps, low, high, color=BLUE, alpha=0.2, lw=0, label="80 % of training episodes"
-            )
-            axes.plot(steps, middle, color=BLUE, lw=1.5, label="their median")
-        if curve := read_curve(folder / CURVE):
-            points = [(1e-6 * row["steps"], row["return"]) for row in curve]
-            axes.plot(*zip(*points, strict=True), color=GREEN, lw=1, label="without noise on the way")
-        policy, *others = [(score.policy, score.estimates["return"].mean) for score in scores]
-        label = f"this policy, without noise: {policy[1]:.1f}"
-        axes.plot(1e-6 * training_length(folder)[0], policy[1], "o", color=GREEN, label=label)
-        for _, level in others:
-            axes.axhline(level, color=ORANGE, lw=1, ls="--")
-        height = 0.065 * np.ptp(axes.get_ylim())  # of a line of text
-        below = -np.inf
-        for name, level in sorted(others, key=lambda one: one[1]):
-            below = max(level, below + height)
-            axes.annotate(
-                f"{name} {level:.1f}", (1, below), (4, 0), xycoords=axes.get_yaxis_transform(),
-                textcoords="offset points", va="center", color=ORANGE,
-            )  # fmt: skip
-        axes.set(xlabel="environment steps [millions]", ylabel="return of an episode")
-        axes.set_xlim(left=0)
-        axes.grid(axis="y", color=GREY, alpha=0.15)
-        figure.legend(loc="outside upper left", ncols=2)
-        figure.savefig(path, **options)
-
-
-def render_template(file: str, /, **values: Any) -> str:
-    """Fill a file of agents/templates; values are escaped in a page of HTML."""
-    from jinja2 import Environment, FileSystemLoader, StrictUndefined
-
-    templates = Environment(
-        loader=FileSystemLoader(TEMPLATES), autoescape=".html" in file, undefined=StrictUndefined,
-        trim_blocks=True, lstrip_blocks=True,
-    )  # fmt: skip
-    return templates.get_template(file).render(values)
-
-
-def training_length(folder: Path) -> tuple[int, float]:
-    if finished := runs.read_record(folder).get("finished"):
-        return int(finished["steps"]), float(finished["seconds"])
-    episodes = runs.read_episodes(folder)
-    return (int(episodes[-1, 0]), float(episodes[:, 2].max())) if len(episodes) else (0, 0.0)
 
 
 def report(args: Args) -> Path:

@@ -12,9 +12,11 @@ from __future__ import annotations
 import csv
 import json
 import os
+import shlex
 import signal
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
 from itertools import zip_longest
 from pathlib import Path
 from typing import Any, Literal
@@ -25,11 +27,11 @@ from agents import runs
 from agents.command import parse_pairs, run
 from agents.score import CURVE_SEEDS, FINAL_SEEDS, score_vector
 from agents.settings import FOLDER, TrainingArgs, load_settings
-from agents.statistics import FIGURES, mean_figures
+from agents.statistics import FIGURES, Scored, mean_figures, over_seeds
 from agents.train import Args as TrainArgs
 from agents.train import train
 from agents.watch import Scorer
-from hoof_env.errors import DataFileError, check_number
+from hoof_env.errors import DataFileError, check_number, parse_json
 
 PLANS = Path(__file__).with_name("plans")
 Plan = Literal["full", "nightly", "trainers"]
@@ -112,6 +114,9 @@ def runs_of(plan: Sequence[Entry]) -> Iterator[Run]:
         yield from filter(None, row)
 
 
+# One training
+
+
 @dataclass(frozen=True)
 class Args(TrainingArgs):
     seed: int = 0
@@ -192,6 +197,102 @@ def read_curve(path: Path) -> list[dict[str, float]]:
         return []
     with path.open(encoding="utf-8", newline="") as file:
         return [{key: float(x) for key, x in row.items() if x} for row in csv.DictReader(file)]
+
+
+# Results
+
+
+@dataclass(frozen=True)
+class Result:
+    folder: Path
+    final: dict[str, Any]
+
+    @cached_property
+    def figures(self) -> dict[str, float]:
+        return mean_figures(self.final["episodes"])
+
+    @cached_property
+    def curve(self) -> list[dict[str, float]]:
+        return read_curve(self.folder / CURVE)
+
+
+@dataclass(frozen=True)
+class Row:
+    entry: Entry
+    results: tuple[Result, ...]
+
+    @property
+    def title(self) -> str:
+        return self.entry.title
+
+    @cached_property
+    def scored(self) -> Scored:
+        seeds = [one.figures for one in self.results]
+        return Scored(self.title, over_seeds(seeds), seeds)
+
+    @property
+    def command(self) -> str:
+        """What trains its first seed."""
+        return shlex.join(["python", "-m", "agents.baselines_run", *Run(self.entry, 0).command()])
+
+
+def read_results(plan: Sequence[Entry], folder: Path) -> list[Row]:
+    """What is done of a plan; entries without a training that is done are left out. `DataFileError`: nothing
+    is done, or a result cannot be read or is not what the plan asks for."""
+    rows = []
+    for entry in plan:
+        folders = [folder / Run(entry, seed).name for seed in range(entry.seeds)]
+        results = tuple(read_result(entry, one) for one in folders if (one / FINAL).is_file())
+        if results:
+            rows.append(Row(entry, results))
+    if not rows:
+        raise DataFileError(f"{folder}: expected trainings of agents.baselines, found none that is done")
+    return rows
+
+
+def read_result(entry: Entry, folder: Path) -> Result:
+    """One training, checked to have the arguments and hyperparameters that its entry has now."""
+    try:
+        result = Result(folder, parse_json((folder / FINAL).read_text(encoding="utf-8")))
+    except (OSError, ValueError) as error:
+        raise DataFileError(f"{folder / FINAL}: expected what agents.baselines_run wrote: {error}") from None
+    config = load_settings(folder / runs.CONFIG, entry.env_id)
+    for used, expected in (
+        (result.final["env_kwargs"], entry.env_kwargs),
+        (config, expected_settings(entry)),
+    ):
+        keys = sorted(key for key in {**used, **expected} if used.get(key) != expected.get(key))
+        if keys:
+            here, there = ({key: some.get(key) for key in keys} for some in (expected, used))
+            raise DataFileError(
+                f"{folder}: expected a training with {here}, got {there}; remove what is outdated"
+            )
+    return result
+
+
+def expected_settings(entry: Entry) -> dict[str, Any]:
+    settings = load_settings(FOLDER / f"{entry.algo}.yml", entry.env_id)
+    return settings | dict(entry.params) | ({} if entry.steps is None else {"n_timesteps": entry.steps})
+
+
+def seconds_to(level: float, result: Result) -> float:
+    """Wall time of training [s] until the learning curve first reaches a return; infinite if it does not."""
+    before, *later = result.curve
+    for row in later:
+        if row["return"] >= level:
+            part = (level - before["return"]) / (row["return"] - before["return"])
+            return before["wall_s"] + max(part, 0.0) * (row["wall_s"] - before["wall_s"])
+        before = row
+    return float("inf")
+
+
+def versions_of(rows: Sequence[Row]) -> dict[str, str]:
+    """Versions that the trainings were made with; several of one package stand beside each other."""
+    versions: dict[str, set[str]] = {}
+    for one in (one for row in rows for one in row.results):
+        for name, value in runs.read_record(one.folder)["versions"].items():
+            versions.setdefault(name, set()).add(value)
+    return {name: ", ".join(sorted(values)) for name, values in versions.items()}
 
 
 def main(argv: list[str] | None = None) -> int:

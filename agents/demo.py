@@ -22,8 +22,8 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from agents import evaluate, runs, train
-from agents.baselines_report import draw_learning_curve, render_template
 from agents.command import run
+from agents.pages import draw_learning_curve, render_template
 from hoof_env._output import check_folder, staged
 from hoof_env.errors import check_number
 from hoof_env.film import render_episode

@@ -25,10 +25,10 @@ import numpy as np
 from tyro.conf import Positional
 
 from agents import runs
-from agents.baselines_report import draw_learning_curve, render_template, training_length
 from agents.command import run
 from agents.evaluate import METRICS, Score, cell, to_json
 from agents.export import about, write_policy
+from agents.pages import draw_learning_curve, render_template, training_length
 from agents.score import FINAL_SEEDS as SCORE_SEEDS
 from agents.score import score_vector
 from agents.statistics import Interval
