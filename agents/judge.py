@@ -29,7 +29,6 @@ from tyro.conf import Positional
 
 from agents import runs
 from agents.command import run
-from agents.conditions import NEAR, distance, rejection_reason
 from agents.gait_figures import SECONDS, mean_lag, play
 from agents.horse_gaits import speed_of
 from agents.judge_pictures import draw
@@ -43,6 +42,12 @@ from hoof_env.errors import ParameterError, check_number, count
 
 ENV_ID = "hoof_env/Horse-v0"
 TROT = 0.05  # largest lag of what counts as one
+
+MOST_FALLS = 0.10  # share of episodes; what is left of more of them is luck
+MOST_OFF = 0.15  # from the commanded speed, over that [-]
+MOST_SLIP = 0.10  # a stance [m]
+TURNS = (0.95, 1.05)  # stances a turn
+NEAR = 0.1  # between Froude numbers, of the speed reached and of the horse
 
 
 @dataclass
@@ -59,6 +64,32 @@ class Args:
     """arguments of the environment: key=value ..., or one JSON object"""
     out: Path = Path("runs/judge")
     """folder for figures.json, table.md, forces.png, footfall.png and speeds.png"""
+
+
+# When figures count: the policy stays up, keeps its speed and does not slip, and hooves land once a turn
+
+
+def rejection_reason(figures: dict[str, Any], pairs: Sequence[str]) -> str:
+    """Why the figures of these pairs of legs do not count at any speed; empty where they do."""
+    found = []
+    if figures["fell"] > MOST_FALLS:
+        found.append(f"fell in {100 * figures['fell']:.3g} % of episodes")
+    kept = figures["reached"] / figures["speed"]
+    if not abs(kept - 1) <= MOST_OFF:
+        found.append(f"{kept:.2f} of the commanded speed")
+    for pair in pairs:
+        slip = figures[f"slip_{pair}"]
+        stances = figures[f"stances_per_turn_{pair}"]
+        if not slip < MOST_SLIP:
+            found.append(f"{pair} hooves slip {slip:.2f} m")
+        if not TURNS[0] <= stances <= TURNS[1]:
+            found.append(f"{stances:.2f} {pair} stances a turn")
+    return ", ".join(found)
+
+
+def distance(figures: dict[str, Any], froude: float) -> float:
+    """Between the Froude number that was reached and another."""
+    return abs(float(figures["froude_reached"]) - froude)
 
 
 # The judges
