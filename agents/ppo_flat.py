@@ -1,12 +1,11 @@
-"""Proximal policy optimisation (PPO) in one file, for small networks and fast environments.
+"""Proximal policy optimisation (PPO) for small networks and fast environments.
 
     python -m agents.train --algo ppo_flat
     python -m agents.train --algo ppo_flat --env-id hoof_env/HorseLegFixed-v0 --steps 100000
 
 Read `FlatPPO` first: it plays a rollout, estimates what its actions were worth, improves the networks. It is
 Stable-Baselines3's PPO with networks of tanh and without what they do not need; training loop, buffer,
-policy and files are that library's. What takes time is written out: the gradient of such networks is a dozen
-products of small matrices, and torch spends more time between them than in them.
+policy and files are that library's. The kernels of networks and gradient are in agents/perceptrons.py.
 
 Three things differ. Rewards are scaled by all returns up to the end of the rollout, not of the step. Among
 the `locals` of a step a callback finds `new_obs`, `rewards`, `dones`, `infos` and `clipped_actions`, but no
@@ -18,7 +17,6 @@ from __future__ import annotations
 import copy
 import inspect
 from collections.abc import Iterator
-from dataclasses import dataclass
 from typing import Any, ClassVar
 
 import numpy as np
@@ -30,17 +28,10 @@ from stable_baselines3.common.on_policy_algorithm import OnPolicyAlgorithm
 from stable_baselines3.common.policies import ActorCriticPolicy
 from stable_baselines3.common.vec_env import VecNormalize
 from torch import nn
-from torch.nn.utils import parameters_to_vector, vector_to_parameters
 
+from agents.perceptrons import ACTIONS, ADVANTAGE, CHUNK, Floats, Weights, compiled_gradient
 from hoof_env.errors import ParameterError
-from hoof_env.simd.compile import inline_llvm, kernel
 from hoof_env.simd.threads import check_threads, limit_threads, run_together
-
-Floats = NDArray[np.float32]
-
-CHUNK = 1000
-"""Most steps of a batch whose gradient is computed at once, by one thread: their numbers stay in the cache.
-The gradients are added up in order, so any number of threads gives the same bits."""
 
 # of Adam
 BETA1 = 0.9
@@ -51,176 +42,6 @@ LARGEST = np.float32(10.0)
 """Reward after `Scale`, as in Stable-Baselines3: one failure in a rollout is not to hide all else."""
 
 POLICY_KWARGS = {"net_arch", "activation_fn", "log_std_init", "ortho_init"}
-
-LOG_PROB = 0
-ADVANTAGE = 1
-TARGET = 2
-ACTIONS = 3
-"""Columns of what is learnt from, with the actions from the last one on."""
-
-ZERO, HALF, ONE, FAR = (np.float32(number) for number in (0.0, 0.5, 1.0, 100.0))
-C0, A1, A2, A3 = (np.float32(number) for number in (34459425, 4729725, 135135, 990))
-B1, B2, B3, B4 = (np.float32(number) for number in (16216200, 945945, 13860, 45))
-
-
-# Networks, perceptrons with tanh: matrices, shape (outputs, inputs) each, and biases
-
-
-@inline_llvm
-def tanh(x):  # type: ignore[no-untyped-def]
-    """Lambert's continued fraction, the first nine terms, within 8e-6: without a call, so that the compiler
-    does many at once."""
-    x = min(max(x, -FAR), FAR)
-    s = x * x
-    above = x * (C0 + s * (A1 + s * (A2 + s * (A3 + s))))
-    y = above / (C0 + s * (B1 + s * (B2 + s * (B3 + s * B4))))
-    return min(max(y, -ONE), ONE)
-
-
-@inline_llvm
-def forward(x, matrices, biases, outputs):  # type: ignore[no-untyped-def]
-    """What each layer gives for rows of inputs, the hidden ones behind a tanh."""
-    for k in range(len(matrices)):
-        y = outputs[k]
-        bias = biases[k]
-        np.dot(x if k == 0 else outputs[k - 1], matrices[k].T, y)
-        if k < len(matrices) - 1:
-            for i in range(y.shape[0]):
-                for j in range(y.shape[1]):
-                    y[i, j] = tanh(y[i, j] + bias[j])
-        else:
-            for i in range(y.shape[0]):
-                for j in range(y.shape[1]):
-                    y[i, j] += bias[j]
-
-
-@inline_llvm
-def backward(x, matrices, outputs, slopes, by_matrices, by_biases):  # type: ignore[no-untyped-def]
-    """The derivatives by matrices and biases from those by the last outputs, in the last of `slopes`; the
-    others are room for those by the hidden layers."""
-    for k in range(len(matrices) - 1, -1, -1):
-        slope = slopes[k]
-        by_bias = by_biases[k]
-        if k < len(matrices) - 1:
-            np.dot(slopes[k + 1], matrices[k + 1], slope)
-            y = outputs[k]
-            for i in range(slope.shape[0]):
-                for j in range(slope.shape[1]):
-                    slope[i, j] *= ONE - y[i, j] * y[i, j]
-        by_bias[:] = ZERO
-        for i in range(slope.shape[0]):
-            for j in range(slope.shape[1]):
-                by_bias[j] += slope[i, j]
-        np.dot(slope.T, x if k == 0 else outputs[k - 1], by_matrices[k])
-
-
-@inline_llvm
-def loss_of(  # type: ignore[no-untyped-def]
-    means, values, log_std, steps, clip_range, vf_coef, ent_coef, count,
-    by_means, by_values, by_log_std, losses,
-):  # fmt: skip
-    """The loss of Schulman et al. 2017 (Eq. 9) of some of `count` steps, and its derivatives. The columns of
-    `steps` are as `LOG_PROB` and so on say. The entropy is the sum of `log_std`, but for a constant."""
-    by_log_std[:] = -ent_coef * np.float32(len(steps)) / count
-    losses[:] = ZERO
-    for i in range(len(steps)):
-        log_prob = ZERO
-        for k in range(ACTIONS, steps.shape[1]):
-            z = (steps[i, k] - means[i, k - ACTIONS]) * np.exp(-log_std[k - ACTIONS])
-            log_prob -= HALF * z * z + log_std[k - ACTIONS]
-        ratio = np.exp(log_prob - steps[i, LOG_PROB])
-        advantage = steps[i, ADVANTAGE]
-        held = min(max(ratio, ONE - clip_range), ONE + clip_range)
-        losses[0] -= min(ratio * advantage, held * advantage) / count
-        weight = -ratio * advantage / count if ratio * advantage <= held * advantage else ZERO
-        for k in range(len(log_std)):
-            z = (steps[i, ACTIONS + k] - means[i, k]) * np.exp(-log_std[k])
-            by_means[i, k] = weight * z * np.exp(-log_std[k])
-            by_log_std[k] += weight * (z * z - ONE)
-        error = values[i, 0] - steps[i, TARGET]
-        losses[1] += error * error / count
-        by_values[i, 0] = (vf_coef + vf_coef) * error / count
-
-
-def gradient_of(  # type: ignore[no-untyped-def]
-    observations, steps, rows, scale, x, own, actor, critic, log_std,
-    clip_range, vf_coef, ent_coef, count, losses,
-):  # fmt: skip
-    """The loss of these rows, some of the `count` of a batch, and its derivatives, into the rooms of `actor`
-    and `critic`: tuples of matrices, biases, outputs, slopes, and derivatives by matrices and biases.
-    Advantages are normalised by `scale`, their mean and deviation."""
-    for i in range(len(rows)):
-        x[i] = observations[rows[i]]
-        own[i] = steps[rows[i]]
-        own[i, ADVANTAGE] = (own[i, ADVANTAGE] - scale[0]) / scale[1]
-    forward(x, actor[0], actor[1], actor[2])
-    forward(x, critic[0], critic[1], critic[2])
-    loss_of(
-        actor[2][-1], critic[2][-1], log_std[0], own, clip_range, vf_coef, ent_coef, count,
-        actor[3][-1], critic[3][-1], log_std[1], losses,
-    )  # fmt: skip
-    backward(x, actor[0], actor[2], actor[3], actor[4], actor[5])
-    backward(x, critic[0], critic[2], critic[3], critic[4], critic[5])
-
-
-def outputs_of(x, matrices, biases, outputs):  # type: ignore[no-untyped-def]
-    """As `forward`."""
-    forward(x, matrices, biases, outputs)
-
-
-compiled_gradient: Any = kernel(gradient_of, threads=True)
-compiled_outputs: Any = kernel(outputs_of)
-
-
-@dataclass(frozen=True)
-class Network:
-    """Matrices and biases of a perceptron with tanh, views of a vector."""
-
-    matrices: tuple[Floats, ...]
-    biases: tuple[Floats, ...]
-
-    def room(self, rows: int) -> tuple[Floats, ...]:
-        """For what each layer gives."""
-        return tuple(np.zeros((rows, len(bias)), np.float32) for bias in self.biases)
-
-    def __call__(self, x: Floats) -> Floats:
-        """Outputs for rows of inputs, shape (..., inputs)."""
-        rows = x.reshape(-1, x.shape[-1])
-        outputs = []
-        for begin in range(0, len(rows), CHUNK):
-            part = rows[begin : begin + CHUNK]
-            room = self.room(len(part))
-            compiled_outputs(part, self.matrices, self.biases, room)
-            outputs.append(room[-1])
-        return np.concatenate(outputs).reshape(*x.shape[:-1], -1)
-
-
-@dataclass(frozen=True)
-class Weights:
-    """All weights of a policy as one vector, and by name as views of it."""
-
-    vector: Floats
-    actor: Network
-    critic: Network
-    log_std: Floats
-
-    @classmethod
-    def of(cls, policy: Any) -> Weights:
-        """Those of a policy, whose parameters are views of the vector from now on."""
-        vector = parameters_to_vector(policy.parameters()).detach()
-        vector_to_parameters(vector, policy.parameters())
-
-        def network(hidden: nn.Sequential, last: nn.Linear) -> Network:
-            layers = [*(layer for layer in hidden if isinstance(layer, nn.Linear)), last]
-            return Network(
-                tuple(layer.weight.detach().numpy() for layer in layers),
-                tuple(layer.bias.detach().numpy() for layer in layers),
-            )
-
-        hidden = policy.mlp_extractor
-        actor = network(hidden.policy_net, policy.action_net)
-        critic = network(hidden.value_net, policy.value_net)
-        return cls(vector.numpy(), actor, critic, policy.log_std.detach().numpy())
 
 
 # Experience
