@@ -24,12 +24,13 @@ from numpy.typing import NDArray
 
 from agents import gait_figures, runs
 from agents.command import run
+from agents.evolution import generations, make_strategy, mean_costs, require
 from agents.score import make_rows
 from hoof_env.dynamics.parts import GRAVITY
 from hoof_env.envs.horse import HIP_HEIGHT
 from hoof_env.envs.policies import make_policy
 from hoof_env.envs.reference import LEGS, LIMITS, PAIRS, Stride, bounds
-from hoof_env.errors import HoofEnvError, parse_json
+from hoof_env.errors import parse_json
 
 Floats = NDArray[np.float64]
 
@@ -163,35 +164,35 @@ class Search:
     """
 
     def __init__(self, seed: int, first: Floats | None = None, lag: float = 0.0) -> None:
-        try:
-            import cma
-        except ModuleNotFoundError:
-            raise HoofEnvError(
-                'agents.horse_gaits needs cma: pip install "hoof-env[train,identify]"'
-            ) from None
+        require("agents.horse_gaits", "cma")
         self.lag = lag
         self.seed = seed
         self.count = 0
         start = np.zeros(2 + len(PAIRS) * len(LIMITS)) if first is None else encode(first[None])[0]
-        options = {"bounds": [-1, 1], "popsize": POPULATION, "seed": seed + 1, "verbose": -9, "verb_log": 0}
-        self.strategy = cma.CMAEvolutionStrategy(start, FIRST if first is None else NEXT, options)
+        spread = FIRST if first is None else NEXT
+        self.strategy = make_strategy(start, spread, POPULATION, seed + 1)
 
     def gaits(self, points: Any) -> Floats:
         """Of points of the box, shape (n, 16)."""
         return decode(np.clip(np.asarray(points), -1, 1))
 
-    def run(self, speed: float, generations: int, tick: Any) -> dict[str, Any]:
+    def run(self, speed: float, count: int, tick: Any) -> dict[str, Any]:
         """Search on at a commanded speed [m/s]; what the mean of the distribution is worth there."""
         course = BatchRollout(speed, POPULATION * STARTS, TROT_WEIGHTS if self.lag else WEIGHTS)
-        for _ in range(generations):
-            points = self.strategy.ask()
+        highest = -np.inf
+
+        def costs_of(points: list[Floats]) -> list[float]:
+            nonlocal highest
             gaits = np.repeat(self.gaits(points), STARTS, axis=0)
             self.count += 1
             returns, _, lags = course.play(gaits, 10_000 * self.seed + STARTS * self.count)
             returns = returns - self.lag * np.abs(lags)
-            self.strategy.tell(points, (-returns.reshape(-1, STARTS).mean(1)).tolist())
+            highest = returns.max()
+            return mean_costs(returns, STARTS)
+
+        for _ in generations(self.strategy, costs_of, count):
             self.strategy.sigma = max(self.strategy.sigma, NEXT)
-            tick(speed, returns.max())
+            tick(speed, highest)
         gait = self.gaits(self.strategy.result.xfavorite[None])[0].round(5)
         returns, summaries, lags = course.play(
             np.tile(gait, (POPULATION * STARTS, 1)), 10**6, POPULATION * STARTS

@@ -29,12 +29,13 @@ from numpy.typing import NDArray
 
 from agents import runs
 from agents.command import parse_pairs, run
+from agents.evolution import generations, make_strategy, mean_costs, require
 from agents.score import make_rows, play_rows
 from agents.statistics import estimate
 from hoof_env._output import check_folder
 from hoof_env.envs.observation import HALF_RANGE, MIDDLE
 from hoof_env.envs.policies import FORM, open_loop, open_loop_record
-from hoof_env.errors import DataFileError, HoofEnvError, ParameterError, check_number, parse_json
+from hoof_env.errors import DataFileError, ParameterError, check_number, parse_json
 from hoof_env.gait import PARAMETERS
 
 Floats = NDArray[np.float64]
@@ -58,11 +59,8 @@ TEST_SEED = 1000
 SEARCH_SEED = 10_000_000
 """First seeds of the final score, `agents.evaluate`'s, and of the searches."""
 
-OPTIONS = {
-    "bounds": [-1, 1], "tolx": 1e-3, "tolfun": 0, "tolfunhist": 0, "tolstagnation": 10**9,
-    "verbose": -9, "verb_log": 0,
-}  # fmt: skip
-"""Of CMA-ES: it ends when the steps are small."""
+TOLERANCES = {"tolx": 1e-3, "tolfun": 0, "tolfunhist": 0, "tolstagnation": 10**9}
+"""Options of CMA-ES that end a search when its steps are small, and for no other reason."""
 
 EPISODES = {"constant": 10_240, "clocked": 30_720}  # of a search, by family
 
@@ -130,8 +128,7 @@ class Objective:
         """Minus the mean returns of candidates, shape (n, size), that meet the same starts; n * len(seeds) is
         `ROWS`."""
         episodes = self._play(decode(self.family, np.repeat(x, len(seeds), axis=0)), [*seeds] * len(x))
-        returns = np.reshape([one["return"] for one in episodes], (len(x), len(seeds)))
-        return [-float(np.mean(some)) for some in returns]
+        return mean_costs(np.array([episode["return"] for episode in episodes]), len(seeds))
 
     def test(self, parameters: dict[str, Any], count: int) -> Episodes:
         episodes: Episodes = []
@@ -160,8 +157,6 @@ def search(
     point, its cost over starts that the search had not met, and whether Ctrl-C ended it; `KeyboardInterrupt`:
     it did before anything was found.
     """
-    import cma
-
     generator = np.random.default_rng([seed, 6])
     fresh = SEARCH_SEED * (seed + 1)
 
@@ -181,19 +176,16 @@ def search(
         screened = generator.uniform(-1, 1, (ROWS // 4, size))
         screened[:, 4:12] *= HARMONIC
         first = screened[np.argmin(costs(screened, 4))]
-    options = OPTIONS | {"popsize": POPULATION, "seed": int(generator.integers(1, 2**31))}
-    strategy = cma.CMAEvolutionStrategy(first, step, options)
+    strategy = make_strategy(first, step, POPULATION, int(generator.integers(1, 2**31)), **TOLERANCES)
     best = [first]
     interrupted = False
     try:
-        for _ in range(episodes // ROWS - 2):
-            if strategy.stop():
-                break
-            candidates = strategy.ask()
-            values = costs(candidates, STARTS)
-            strategy.tell(candidates, values)
+        count = episodes // ROWS - 2  # the screening and the finalists take the other two
+        for candidates, values in generations(strategy, lambda points: costs(points, STARTS), count):
             lowest = [candidates[k] for k in np.argsort(values)[: FINALISTS - 2]]
             best = [strategy.result.xfavorite, strategy.result.xbest, *lowest]
+            if strategy.stop():
+                break
     except KeyboardInterrupt:
         interrupted = True
     finalists = np.clip(np.round((best * FINALISTS)[:FINALISTS], 5), -1.0, 1.0)
@@ -232,13 +224,7 @@ def optimise(args: Args) -> dict[str, Any]:
 
 def check(args: Args) -> int:
     """Refuse what does not fit; returns the episodes of a search."""
-    try:
-        import cma  # noqa: F401
-        import tqdm  # noqa: F401
-    except ModuleNotFoundError as error:
-        raise HoofEnvError(
-            f'agents.open_loop needs {error.name}: pip install "hoof-env[train,identify]"'
-        ) from None
+    require("agents.open_loop", "cma", "tqdm")
     check_number("restarts", args.restarts, low=1, high=1000)
     check_number("test_episodes", args.test_episodes, low=2, high=1e6)
     episodes = args.episodes or EPISODES[args.family]
