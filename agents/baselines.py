@@ -99,9 +99,12 @@ def start(one: Run, folder: Path) -> subprocess.Popen[bytes]:
     with (folder / one.name / "log.txt").open("ab") as log:
         return subprocess.Popen(
             [sys.executable, "-m", "agents.baselines_run", *one.command(folder)],
-            stdin=subprocess.DEVNULL, stdout=log, stderr=log, start_new_session=True,
+            stdin=subprocess.DEVNULL,
+            stdout=log,
+            stderr=log,
+            start_new_session=True,
             env=os.environ | threads,
-        )  # fmt: skip
+        )
 
 
 def last_line(folder: Path) -> str:

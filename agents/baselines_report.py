@@ -167,9 +167,18 @@ def of_id(rows: Sequence[Row], env_id: str) -> list[Row]:
 
 def results_table(rows: Sequence[Row], gaits: References) -> str:
     titles = (
-        "id", "policy", "seeds", "steps", "wall s", "processor s", "return: IQM [95 %]", "mean",
-        "worst to best seed", "seeds above run", "above open-loop",
-    )  # fmt: skip
+        "id",
+        "policy",
+        "seeds",
+        "steps",
+        "wall s",
+        "processor s",
+        "return: IQM [95 %]",
+        "mean",
+        "worst to best seed",
+        "seeds above run",
+        "above open-loop",
+    )
     lines = []
     for env_id, known in gaits.items():
         lines += [
@@ -194,10 +203,15 @@ def row_cells(row: Row, known: Mapping[str, Scored]) -> list[str]:
 
     return [
         str(count) if count == row.entry.seeds else f"{count} of {row.entry.seeds}",
-        f"{steps:,.0f}", f"{wall:,.0f}", f"{cpu:,.0f}",
-        row.scored.intervals["return"].text(), f"{returns.mean():.1f}",
-        f"{returns.min():.1f} to {returns.max():.1f}", above("run"), above(OPEN_LOOP),
-    ]  # fmt: skip
+        f"{steps:,.0f}",
+        f"{wall:,.0f}",
+        f"{cpu:,.0f}",
+        row.scored.intervals["return"].text(),
+        f"{returns.mean():.1f}",
+        f"{returns.min():.1f} to {returns.max():.1f}",
+        above("run"),
+        above(OPEN_LOOP),
+    ]
 
 
 def figures_table(rows: Sequence[Row], gaits: References) -> str:
@@ -228,16 +242,31 @@ def pace_table(rows: Sequence[Row], known: Mapping[str, Scored]) -> str:
         ours = row.scored.intervals["return"]
         theirs = first.scored.intervals["return"]
         lines.append(
-            [row.title, str(len(rate)), span(rate.values(), 0), span(faster, 2), ours.text(),
-             "no" if ours.mean < theirs.low else "yes", span(time.values(), 0),
-             f"{np.isfinite([*time.values()]).sum()}/{len(time)}", span(parts, 2),
-             f"{np.sum(np.array(parts) <= SOON)}/{len(both)}"]
-        )  # fmt: skip
+            [
+                row.title,
+                str(len(rate)),
+                span(rate.values(), 0),
+                span(faster, 2),
+                ours.text(),
+                "no" if ours.mean < theirs.low else "yes",
+                span(time.values(), 0),
+                f"{np.isfinite([*time.values()]).sum()}/{len(time)}",
+                span(parts, 2),
+                f"{np.sum(np.array(parts) <= SOON)}/{len(both)}",
+            ]
+        )
     titles = (
-        "policy", "seeds", "steps/s", f"beside {first.title}", "return: IQM [95 %]",
-        f"IQM not below {first.title}'s interval", f"s to {level:.1f}", "reached", f"beside {first.title}",
+        "policy",
+        "seeds",
+        "steps/s",
+        f"beside {first.title}",
+        "return: IQM [95 %]",
+        f"IQM not below {first.title}'s interval",
+        f"s to {level:.1f}",
+        "reached",
+        f"beside {first.title}",
         f"at most {SOON}",
-    )  # fmt: skip
+    )
     return markdown_table(titles, lines)
 
 
@@ -261,10 +290,14 @@ def draw_frontier(rows: Sequence[Row], known: Mapping[str, Scored], path: Path) 
             of = row.scored.intervals["return"]
             bars = np.nan_to_num([[of.mean - of.low], [of.high - of.mean]])
             axes.errorbar(
-                [rate], [of.mean], bars, fmt=marker, capsize=3,
+                [rate],
+                [of.mean],
+                bars,
+                fmt=marker,
+                capsize=3,
                 color=BLUE if row.entry.algo == "ppo_flat" else ORANGE,
                 label=f"{row.title}, {len(row.results)} seeds",
-            )  # fmt: skip
+            )
         axes.axhline(known[OPEN_LOOP].intervals["return"].mean, color=GREY, lw=1.2, ls="--", label=OPEN_LOOP)
         axes.set(xlabel="environment steps a second of training", ylabel="return: IQM, 95 % interval")
         axes.xaxis.set_major_formatter(EngFormatter(sep=" "))

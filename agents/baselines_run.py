@@ -139,19 +139,28 @@ def train_one(args: Args) -> bool:
     settings = load_settings(FOLDER / f"{args.algo}.yml", args.env_id) | parse_pairs("--params", args.params)
     steps = args.steps if args.steps is not None else int(settings["n_timesteps"])
     training = TrainArgs(
-        env_id=args.env_id, env_kwargs=args.env_kwargs, algo=args.algo, seed=args.seed, steps=steps,
-        params=args.params, out=folder, resume=True,
-    )  # fmt: skip
+        env_id=args.env_id,
+        env_kwargs=args.env_kwargs,
+        algo=args.algo,
+        seed=args.seed,
+        steps=steps,
+        params=args.params,
+        out=folder,
+        resume=True,
+    )
     trained = train(training, CurveScorer(args.env_id, env_kwargs, folder, max(1, steps // args.points)))
     if trained.stopped_by:
         return False
     last = read_curve(folder / CURVE)[-1]
     final = {
-        "algo": args.algo, "env_id": args.env_id, "env_kwargs": env_kwargs, "seed": args.seed,
+        "algo": args.algo,
+        "env_id": args.env_id,
+        "env_kwargs": env_kwargs,
+        "seed": args.seed,
         **{key: last[key] for key in ("steps", "wall_s", "cpu_s")},
         "seeds": [FINAL_SEEDS.start, FINAL_SEEDS.stop],
         "episodes": score_vector(str(folder), args.env_id, FINAL_SEEDS, **env_kwargs),
-    }  # fmt: skip
+    }
     runs.write_text(folder / FINAL, json.dumps(final) + "\n")
     return True
 

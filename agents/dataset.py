@@ -225,10 +225,13 @@ def _collect(minari: Any, env: Any, args: Args, episodes: int, dataset_id: str) 
                 totals.append(total)
                 bar.update()
             returns[name] = {
-                "episodes": episodes, "first_seed": args.seed, "mean_return": float(np.mean(totals)),
-                "sd_return": float(np.std(totals)), **({"start": options} if options else {}),
+                "episodes": episodes,
+                "first_seed": args.seed,
+                "mean_return": float(np.mean(totals)),
+                "sd_return": float(np.std(totals)),
+                **({"start": options} if options else {}),
                 **({"sha256": files[name]} if files[name] else {}),
-            }  # fmt: skip
+            }
     dataset = collector.create_dataset(
         dataset_id,
         algorithm_name=", ".join(returns),

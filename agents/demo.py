@@ -124,10 +124,16 @@ def train_agent(args: Args, budget: Budget, stage: Path) -> train.Trained:
     folder = stage / "training"
     trained = train.train(
         train.Args(
-            env_id=ENV_ID, algo="ppo_flat", seed=args.seed, steps=budget.steps,
-            max_minutes=budget.seconds / 60, params=budget.params, out=folder, checkpoint_every=0,
+            env_id=ENV_ID,
+            algo="ppo_flat",
+            seed=args.seed,
+            steps=budget.steps,
+            max_minutes=budget.seconds / 60,
+            params=budget.params,
+            out=folder,
+            checkpoint_every=0,
         )
-    )  # fmt: skip
+    )
     if trained.stopped_by:
         raise KeyboardInterrupt
     for name in filter(lambda name: (folder / name).is_file(), (*runs.FILES, runs.STATISTICS)):

@@ -136,20 +136,24 @@ def run_trials(args: Trials) -> int:
     varied = [*(key for key in plan if key not in FIXED), "seed"]
     space = plan | {key: tune.grid_search(plan[key]) for key in varied}
     config = tune.TuneConfig(
-        metric="return", mode="max",
+        metric="return",
+        mode="max",
         reuse_actors=True,  # libraries are imported and kernels read once for each worker
         trial_dirname_creator=lambda trial: _folder_name(trial, varied),
-    )  # fmt: skip
+    )
     trainable = tune.with_resources(train_trial, {"cpu": args.cpus_per_trial})
     name = experiment_name(args)
     storage = args.out
     storage = storage if "://" in storage else str(Path(storage).absolute())
     folder = f"{storage}/{name}"
     running = tune.RunConfig(
-        name=name, storage_path=storage, verbose=0, callbacks=[Progress()],
+        name=name,
+        storage_path=storage,
+        verbose=0,
+        callbacks=[Progress()],
         failure_config=tune.FailureConfig(max_failures=args.retries),
         checkpoint_config=tune.CheckpointConfig(num_to_keep=1),
-    )  # fmt: skip
+    )
     try:
         if tune.Tuner.can_restore(folder):
             print(f"going on with {folder}, whose files are pickles, which can run any code", flush=True)

@@ -41,9 +41,14 @@ def train_trial(config: dict[str, Any]) -> None:
     reporter = Reporter(folder, config, env_kwargs, kept.get_metadata() if kept else {})
     # The reporter keeps the checkpoints: two of the same step would not go into one folder
     args = Args(
-        **config["train"], seed=config["seed"], out=folder, resume=True, checkpoint_every=0,
-        env_kwargs=(json.dumps(env_kwargs),), params=(json.dumps(params),),
-    )  # fmt: skip
+        **config["train"],
+        seed=config["seed"],
+        out=folder,
+        resume=True,
+        checkpoint_every=0,
+        env_kwargs=(json.dumps(env_kwargs),),
+        params=(json.dumps(params),),
+    )
     sys.orig_argv = shlex.split(config["command"])
     try:
         train(args, reporter)

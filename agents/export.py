@@ -183,10 +183,15 @@ def write_onnx(module: Any, example: Any, path: Path, metadata: dict[str, Any]) 
         raise HoofEnvError(f'writing ONNX needs {error.name}: pip install "hoof-env[train,onnx]"') from None
     with _quietly():
         program: Any = torch.onnx.export(
-            module, (torch.as_tensor(example),), dynamo=True, opset_version=OPSET, verbose=False,
-            input_names=[INPUT], output_names=[OUTPUT],
+            module,
+            (torch.as_tensor(example),),
+            dynamo=True,
+            opset_version=OPSET,
+            verbose=False,
+            input_names=[INPUT],
+            output_names=[OUTPUT],
             dynamic_shapes=({0: torch.export.Dim("batch")},),
-        )  # fmt: skip
+        )
     graph = program.model.graph
     for part in (graph, *graph, *graph.inputs, *graph.outputs, *graph.initializers.values()):
         part.metadata_props.clear()  # stack traces, with the folders of this machine

@@ -158,8 +158,10 @@ def play(envs: Any, policy: Any, speed: float, gait: Floats | None = None) -> di
     height = envs.batch.body.height
     kilograms = float(envs.weight[0]) / GRAVITY
     result: dict[str, Any] = {
-        "speed": speed, "froude": froude_of(speed, height), "fell": float(1 - played.upright.mean()),
-    }  # fmt: skip
+        "speed": speed,
+        "froude": froude_of(speed, height),
+        "fell": float(1 - played.upright.mean()),
+    }
     if not played.upright.any():
         return result
     return result | _from_sums(played, kilograms, height) | _from_stances(played, kilograms)

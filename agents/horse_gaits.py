@@ -60,9 +60,15 @@ SLIP = 0.1
 """Largest lag [strides] and slip of a stance [m] of what is shipped as trot-like: as for agents."""
 
 WEIGHTS = {
-    "alive": 11.0, "tracking": 5.0, "peak": 0.35, "slip": 6.0, "landing": 0.3, "work": 0.5, "pitch": 4.0,
+    "alive": 11.0,
+    "tracking": 5.0,
+    "peak": 0.35,
+    "slip": 6.0,
+    "landing": 0.3,
+    "work": 0.5,
+    "pitch": 4.0,
     "fall": 20.0,
-}  # fmt: skip
+}
 """Of the reward of the search for the reference gaits: a first reward of the task, which charges less for
 slip than that of today."""
 
@@ -98,10 +104,14 @@ class BatchRollout:
         self, speed: float, num_envs: int, weights: Mapping[str, float] = WEIGHTS, **settings: Any
     ) -> None:
         envs: Any = gym.make_vec(
-            "hoof_env/Horse-v0", num_envs, num_threads=2, target_speed=speed,
-            autoreset_mode=AutoresetMode.SAME_STEP, reward_weights=weights,
+            "hoof_env/Horse-v0",
+            num_envs,
+            num_threads=2,
+            target_speed=speed,
+            autoreset_mode=AutoresetMode.SAME_STEP,
+            reward_weights=weights,
             **{"episode_seconds": SECONDS, **settings},
-        )  # fmt: skip
+        )
         self.envs = envs
         self.steps = int(envs.unwrapped.batch.steps_per_episode)
 

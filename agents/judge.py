@@ -140,10 +140,14 @@ def judged(
     else:
         verdict = f"off by {ours / judge['horse'] - 1:+.0%}" + (f", does not count: {why}" if why else "")
     return (
-        title, "-" if gait.figures is None else f"{gait.figures['froude_reached']:.2f}", str(judge["horse"]),
+        title,
+        "-" if gait.figures is None else f"{gait.figures['froude_reached']:.2f}",
+        str(judge["horse"]),
         " or ".join(f"{low:g} to {high:g}" for low, high in bars) or "none",
-        f"{ours:.3g}" if known else "-", verdict, judge["source"],
-    )  # fmt: skip
+        f"{ours:.3g}" if known else "-",
+        verdict,
+        judge["source"],
+    )
 
 
 def verdicts(figures: list[dict[str, Any]]) -> list[tuple[str, ...]]:
@@ -194,12 +198,33 @@ def _reported(judges: dict[str, Any], standing: list[dict[str, Any]]) -> Iterato
 
 HEAD = ("judge", "Froude number reached", "horse", "bar", "ours", "verdict", "source")
 SHOWN = (
-    "reached", "froude_reached", "fell", "peak_fore", "peak_hind", "peak_over_mean_fore",
-    "peak_over_mean_hind", "duty_fore", "duty_hind", "stances_per_turn_fore", "stances_per_turn_hind",
-    "slip_fore", "slip_hind", "lag", "two_peaked", "peak_braking_fore", "peak_propulsion_fore",
-    "peak_braking_hind", "peak_propulsion_hind", "mean_braking_fore", "mean_propulsion_fore",
-    "mean_braking_hind", "mean_propulsion_hind", "stride_over_hip", "impulse_fore", "transport",
-)  # fmt: skip
+    "reached",
+    "froude_reached",
+    "fell",
+    "peak_fore",
+    "peak_hind",
+    "peak_over_mean_fore",
+    "peak_over_mean_hind",
+    "duty_fore",
+    "duty_hind",
+    "stances_per_turn_fore",
+    "stances_per_turn_hind",
+    "slip_fore",
+    "slip_hind",
+    "lag",
+    "two_peaked",
+    "peak_braking_fore",
+    "peak_propulsion_fore",
+    "peak_braking_hind",
+    "peak_propulsion_hind",
+    "mean_braking_fore",
+    "mean_propulsion_fore",
+    "mean_braking_hind",
+    "mean_propulsion_hind",
+    "stride_over_hip",
+    "impulse_fore",
+    "transport",
+)
 
 
 def pool(each: list[list[dict[str, Any]]]) -> list[dict[str, Any]]:

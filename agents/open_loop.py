@@ -65,9 +65,16 @@ TOLERANCES = {"tolx": 1e-3, "tolfun": 0, "tolfunhist": 0, "tolstagnation": 10**9
 EPISODES = {"constant": 10_240, "clocked": 30_720}  # of a search, by family
 
 KEPT = (
-    "return", "speed_m_s", "stance_peak_n", "loading_rate_n_s", "cost_of_transport", "peak_grf_n",
-    "weight_share", "stances", "failed",
-)  # fmt: skip
+    "return",
+    "speed_m_s",
+    "stance_peak_n",
+    "loading_rate_n_s",
+    "cost_of_transport",
+    "peak_grf_n",
+    "weight_share",
+    "stances",
+    "failed",
+)
 """Figures of an episode whose means are kept."""
 
 
@@ -202,11 +209,15 @@ def optimise(args: Args) -> dict[str, Any]:
 
     path = place(args)
     about: dict[str, Any] = {
-        "env_id": args.env_id, "env_kwargs": parse_pairs("--env-kwargs", args.env_kwargs),
-        "form": FORM, "family": args.family, "objective": "return",
-        "episodes_of_a_search": episodes, "test_episodes": args.test_episodes,
+        "env_id": args.env_id,
+        "env_kwargs": parse_pairs("--env-kwargs", args.env_kwargs),
+        "form": FORM,
+        "family": args.family,
+        "objective": "return",
+        "episodes_of_a_search": episodes,
+        "test_episodes": args.test_episodes,
         "start": open_loop_record(args.start)["parameters"]["constant"] if args.start else None,
-    }  # fmt: skip
+    }
     restarts = earlier(path, about)
     check_folder(path.parent)
     objective = Objective(args.env_id, about["env_kwargs"], args.family)

@@ -48,9 +48,14 @@ def draw_learning_curve(folder: Path, scores: Sequence[Score], path: Path, **opt
         for name, level in sorted(others, key=lambda one: one[1]):
             below = max(level, below + height)
             axes.annotate(
-                f"{name} {level:.1f}", (1, below), (4, 0), xycoords=axes.get_yaxis_transform(),
-                textcoords="offset points", va="center", color=ORANGE,
-            )  # fmt: skip
+                f"{name} {level:.1f}",
+                (1, below),
+                (4, 0),
+                xycoords=axes.get_yaxis_transform(),
+                textcoords="offset points",
+                va="center",
+                color=ORANGE,
+            )
         axes.set(xlabel="environment steps [millions]", ylabel="return of an episode")
         axes.set_xlim(left=0)
         axes.grid(axis="y", color=GREY, alpha=0.15)
@@ -63,9 +68,12 @@ def render_template(file: str, /, **values: Any) -> str:
     from jinja2 import Environment, FileSystemLoader, StrictUndefined
 
     templates = Environment(
-        loader=FileSystemLoader(TEMPLATES), autoescape=".html" in file, undefined=StrictUndefined,
-        trim_blocks=True, lstrip_blocks=True,
-    )  # fmt: skip
+        loader=FileSystemLoader(TEMPLATES),
+        autoescape=".html" in file,
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+    )
     return templates.get_template(file).render(values)
 
 

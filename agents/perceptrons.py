@@ -83,9 +83,19 @@ def backward(x, matrices, outputs, slopes, by_matrices, by_biases):  # type: ign
 
 @inline_llvm
 def loss_of(  # type: ignore[no-untyped-def]
-    means, values, log_std, steps, clip_range, vf_coef, ent_coef, count,
-    by_means, by_values, by_log_std, losses,
-):  # fmt: skip
+    means,
+    values,
+    log_std,
+    steps,
+    clip_range,
+    vf_coef,
+    ent_coef,
+    count,
+    by_means,
+    by_values,
+    by_log_std,
+    losses,
+):
     """The loss of Schulman et al. 2017 (Eq. 9) of some of `count` steps, and its derivatives. The columns of
     `steps` are as `LOG_PROB` and so on say. The entropy is the sum of `log_std`, but for a constant."""
     by_log_std[:] = -ent_coef * np.float32(len(steps)) / count
@@ -110,9 +120,21 @@ def loss_of(  # type: ignore[no-untyped-def]
 
 
 def gradient_of(  # type: ignore[no-untyped-def]
-    observations, steps, rows, scale, x, own, actor, critic, log_std,
-    clip_range, vf_coef, ent_coef, count, losses,
-):  # fmt: skip
+    observations,
+    steps,
+    rows,
+    scale,
+    x,
+    own,
+    actor,
+    critic,
+    log_std,
+    clip_range,
+    vf_coef,
+    ent_coef,
+    count,
+    losses,
+):
     """The loss of these rows, some of the `count` of a batch, and its derivatives, into the rooms of `actor`
     and `critic`: tuples of matrices, biases, outputs, slopes, and derivatives by matrices and biases.
     Advantages are normalised by `scale`, their mean and deviation."""
@@ -123,9 +145,19 @@ def gradient_of(  # type: ignore[no-untyped-def]
     forward(x, actor[0], actor[1], actor[2])
     forward(x, critic[0], critic[1], critic[2])
     loss_of(
-        actor[2][-1], critic[2][-1], log_std[0], own, clip_range, vf_coef, ent_coef, count,
-        actor[3][-1], critic[3][-1], log_std[1], losses,
-    )  # fmt: skip
+        actor[2][-1],
+        critic[2][-1],
+        log_std[0],
+        own,
+        clip_range,
+        vf_coef,
+        ent_coef,
+        count,
+        actor[3][-1],
+        critic[3][-1],
+        log_std[1],
+        losses,
+    )
     backward(x, actor[0], actor[2], actor[3], actor[4], actor[5])
     backward(x, critic[0], critic[2], critic[3], critic[4], critic[5])
 

@@ -169,10 +169,23 @@ class FlatPPO(OnPolicyAlgorithm):
         self.scale = Scale(gamma)
         self.moments: Floats | None = None  # of the gradient, for Adam
         super().__init__(
-            policy, env, learning_rate, n_steps, gamma, gae_lambda, ent_coef, vf_coef, max_grad_norm,
-            use_sde=False, sde_sample_freq=-1, policy_kwargs=kwargs, seed=seed, device="cpu",
-            _init_setup_model=_init_setup_model, supported_action_spaces=(spaces.Box,),
-        )  # fmt: skip
+            policy,
+            env,
+            learning_rate,
+            n_steps,
+            gamma,
+            gae_lambda,
+            ent_coef,
+            vf_coef,
+            max_grad_norm,
+            use_sde=False,
+            sde_sample_freq=-1,
+            policy_kwargs=kwargs,
+            seed=seed,
+            device="cpu",
+            _init_setup_model=_init_setup_model,
+            supported_action_spaces=(spaces.Box,),
+        )
 
     def _setup_model(self) -> None:
         super()._setup_model()

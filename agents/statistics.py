@@ -19,9 +19,15 @@ Floats = NDArray[np.float64]
 REPS = 5000  # of a bootstrap over seeds
 
 FIGURES = (
-    "return", "speed_m_s", "peak_grf_n", "stance_peak_n", "loading_rate_n_s", "cost_of_transport",
-    "weight_share", "failed",
-)  # fmt: skip
+    "return",
+    "speed_m_s",
+    "peak_grf_n",
+    "stance_peak_n",
+    "loading_rate_n_s",
+    "cost_of_transport",
+    "weight_share",
+    "failed",
+)
 """Figures whose means `mean_figures` gives."""
 
 TRANSPORT = ("distance_m", "drive_work_j", "mean_grf_n", "weight_share")

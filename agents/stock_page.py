@@ -86,9 +86,16 @@ def table(rows: Sequence[dict[str, Any]], beside: dict[str, dict[str, float]]) -
         own_cells = [name, curves.algo.upper(), seeds, *cells, f"{last:,}", f"{seconds:.0f}"]
         lines.append([*own_cells, *references, above])
     head = (
-        "id", "algorithm", "seeds", "return at half the steps", "return at the end", "steps", "seconds",
-        *ANCHORS, "seeds above it at the end",
-    )  # fmt: skip
+        "id",
+        "algorithm",
+        "seeds",
+        "return at half the steps",
+        "return at the end",
+        "steps",
+        "seconds",
+        *ANCHORS,
+        "seeds above it at the end",
+    )
     return markdown_table(head, lines)
 
 
@@ -147,9 +154,13 @@ def draw(rows: Sequence[dict[str, Any]], beside: dict[str, dict[str, float]], pa
                 values = [[row["return"] for row in own if row["steps"] == step] for step in steps]
                 panel.plot(steps, [np.median(each) for each in values], color=colour, label=algo.upper())
                 panel.fill_between(
-                    steps, [min(each) for each in values], [max(each) for each in values], color=colour,
-                    alpha=0.2, linewidth=0,
-                )  # fmt: skip
+                    steps,
+                    [min(each) for each in values],
+                    [max(each) for each in values],
+                    color=colour,
+                    alpha=0.2,
+                    linewidth=0,
+                )
             for name, value in beside[env_id].items():
                 panel.axhline(value, color=GREY, linewidth=0.8, linestyle=styles[name], label=name)
             panel.set_title(env_id.rpartition("/")[2])

@@ -61,8 +61,14 @@ def load_space(path: Path, algo: str) -> dict[str, Any]:
                 if not low < high or ("log" in how and low <= 0):
                     raise ValueError(f"{key}: {how}")
     except (
-        OSError, yaml.YAMLError, KeyError, TypeError, ValueError, AttributeError, RecursionError
-    ) as error:  # fmt: skip
+        OSError,
+        yaml.YAMLError,
+        KeyError,
+        TypeError,
+        ValueError,
+        AttributeError,
+        RecursionError,
+    ) as error:
         raise DataFileError(
             f"search space {path}: expected for {algo} keys with lists, or uniform or log: [low, high]; "
             f"{type(error).__name__}: {error}"
@@ -164,9 +170,14 @@ def run_trial(
     trial.set_user_attr("settings", settings)
     scorer = TrialScorer(args.env_id, env_kwargs, -(-settings["n_timesteps"] // args.scores), report)
     training = TrainArgs(
-        env_id=args.env_id, algo=args.algo, env_kwargs=args.env_kwargs, out=out,
-        params=(json.dumps(settings),), seed=args.seed + trial.number, checkpoint_every=0,
-    )  # fmt: skip
+        env_id=args.env_id,
+        algo=args.algo,
+        env_kwargs=args.env_kwargs,
+        out=out,
+        params=(json.dumps(settings),),
+        seed=args.seed + trial.number,
+        checkpoint_every=0,
+    )
     try:
         trained = train(training, scorer)
     except DivergedError:  # no settings to go on with

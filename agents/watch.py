@@ -86,9 +86,13 @@ class Watch(BaseCallback):
         self.started = self.last_kept = time.monotonic()
         interval = 0.3 if sys.stderr.isatty() else 10.0  # seconds between two lines, where each is kept
         self.bar = tqdm(
-            total=self.steps, initial=self.num_timesteps, unit=" steps", unit_scale=True, smoothing=0.1,
+            total=self.steps,
+            initial=self.num_timesteps,
+            unit=" steps",
+            unit_scale=True,
+            smoothing=0.1,
             mininterval=interval,
-        )  # fmt: skip
+        )
         self.summaries: list[dict[str, float]] = []
         if self.resumed:
             self.resumed.start()

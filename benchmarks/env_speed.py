@@ -31,9 +31,13 @@ from hoof_env._output import markdown_table
 
 OF_A_LEG = ((5.0,), (20.0, 35.0))
 BARS = {
-    "HorseLeg": OF_A_LEG, "HorseLegRail": OF_A_LEG, "HorseLegSpeed": OF_A_LEG, "HorseLegTerrain": OF_A_LEG,
-    "Horse": ((3.0,), (10.0,)), "HorseLegFixed": ((), ()),
-}  # fmt: skip
+    "HorseLeg": OF_A_LEG,
+    "HorseLegRail": OF_A_LEG,
+    "HorseLegSpeed": OF_A_LEG,
+    "HorseLegTerrain": OF_A_LEG,
+    "Horse": ((3.0,), (10.0,)),
+    "HorseLegFixed": ((), ()),
+}
 """Least ratios of each id, single and many at once."""
 SMALL = 0.1  # part of random actions that a horse takes, which falls within half a second under whole ones
 BATCH = 1024
@@ -77,10 +81,15 @@ def measure(rounds: int, steps: int) -> dict[str, Any]:
         is_single, bars = name.endswith("single"), BARS.get(name.split(",")[0], ((), ()))
         beside = cheetah if is_single else best
         rows.append(
-            {"case": name, "bits": vector_bits() if name.startswith("Horse") else None,
-             "rate": spread(rate[name]), "beside": beside, "ratio": spread(rate[name] / rate[beside]),
-             "bars": list(bars[0] if is_single else bars[1]) or None}
-        )  # fmt: skip
+            {
+                "case": name,
+                "bits": vector_bits() if name.startswith("Horse") else None,
+                "rate": spread(rate[name]),
+                "beside": beside,
+                "ratio": spread(rate[name] / rate[beside]),
+                "bars": list(bars[0] if is_single else bars[1]) or None,
+            }
+        )
     return {"machine": machine(), "bits": vector_bits(), "rounds": rounds, "rows": rows}
 
 

@@ -161,11 +161,13 @@ class ExudynLegs:
         frame = self._body(0.0, 0.0, (*pose.point("O"), sigma * start.swing[i]), rates)
         bodies = [
             self._body(
-                float(geometry.body_masses[k]), float(geometry.body_inertias[k]),
-                (*pose.centres[k], pose.angles[k]), (*pose.centre_velocities[k], pose.angular_velocities[k]),
+                float(geometry.body_masses[k]),
+                float(geometry.body_inertias[k]),
+                (*pose.centres[k], pose.angles[k]),
+                (*pose.centre_velocities[k], pose.angular_velocities[k]),
             )
             for k in range(len(BODIES))
-        ]  # fmt: skip
+        ]
 
         def local(k: int, point: str) -> tuple[float, float]:
             if k == FRAME:
@@ -223,10 +225,11 @@ class ExudynLegs:
         turns = np.array([0, 0, 0, 0, 0, 1 - motor.gear_ratio, 0, 0, motor.gear_ratio])  # of the rotor
         rotor = self.mbs.AddObject(
             eii.ObjectGenericODE2(
-                nodeNumbers=nodes, massMatrix=motor.rotor_inertia * np.outer(turns, turns),
+                nodeNumbers=nodes,
+                massMatrix=motor.rotor_inertia * np.outer(turns, turns),
                 forceVector=np.zeros(9),
             )
-        )  # fmt: skip
+        )
         if not start.swings:
             return {"swing": self._hold(axes[0], axes[1])}
         crank_at = self._reference[-3 * len(BODIES) + 2] - self._reference[-3 * len(BODIES) - 1]
@@ -249,9 +252,11 @@ class ExudynLegs:
             self.mbs.AddMarker(eii.MarkerNodeCoordinates(nodeNumber=fixed)),
         ]
         gear = eii.CoordinateVectorConstraint(
-            markerNumbers=markers, scalingMarker0=np.zeros((1, 9)), constraintUserFunction=error,
+            markerNumbers=markers,
+            scalingMarker0=np.zeros((1, 9)),
+            constraintUserFunction=error,
             jacobianUserFunction=jacobian,
-        )  # fmt: skip
+        )
         return {"swing": int(self.mbs.AddObject(gear))}
 
     def _servo(self, i: int, speed: float) -> float:

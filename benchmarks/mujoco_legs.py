@@ -234,9 +234,15 @@ class MujocoLegs:
     def look(self) -> tuple[Any, ...]:
         """What `Record` has of the present instant."""
         return (
-            self.data.time, self.crank, self.crank_speed, self.body, self.crank_torque, self.hip_torque,
-            self.pins(), self.closure(),
-        )  # fmt: skip
+            self.data.time,
+            self.crank,
+            self.crank_speed,
+            self.body,
+            self.crank_torque,
+            self.hip_torque,
+            self.pins(),
+            self.closure(),
+        )
 
     def evaluate(self) -> None:
         """Accelerations and forces at the present state."""

@@ -199,8 +199,10 @@ def compare(cases: list[Case], rounds: int) -> list[dict[str, Any]]:
     seconds = interleave({case.name: case.run for case in cases}, rounds)
     costs = {
         case.name + what: seconds[case.name + what] / seconds[case.name]
-        for case in cases for what, _, _ in ANIMAL if case.name + what in seconds
-    }  # fmt: skip
+        for case in cases
+        for what, _, _ in ANIMAL
+        if case.name + what in seconds
+    }
     rate = {case.name: case.units / seconds[case.name] for case in cases}
     rows = []
     for case in cases:
@@ -208,11 +210,18 @@ def compare(cases: list[Case], rounds: int) -> list[dict[str, Any]]:
         others = {a: rate[peer] for a, peer in peers.items() if peer in rate and peer != case.name}
         ratios = {a: spread(rate[case.name] / other) for a, other in others.items()}
         rows.append(
-            {"name": case.name, "group": case.group, "note": case.note, "bits": case.bits,
-             "rate": spread(rate[case.name]), "ratios": ratios,
-             "cost": spread(costs[case.name]) if case.name in costs else None,
-             "required": case.required, "aimed": case.aimed}
-        )  # fmt: skip
+            {
+                "name": case.name,
+                "group": case.group,
+                "note": case.note,
+                "bits": case.bits,
+                "rate": spread(rate[case.name]),
+                "ratios": ratios,
+                "cost": spread(costs[case.name]) if case.name in costs else None,
+                "required": case.required,
+                "aimed": case.aimed,
+            }
+        )
     return rows
 
 
@@ -250,9 +259,17 @@ def measure(quick: bool, rounds: int, clock_name: str) -> dict[str, Any]:
     print(f"{len(cases)} cases, {rounds} rounds", file=sys.stderr, flush=True)
     rows = compare(cases, rounds)
     return {
-        "machine": machine(), "bits": vector_bits(), "preset": PRESET, "quick": quick, "clock": clock_name,
-        "rounds": rounds, "dt_s": DT, "cases": rows, "notes": notes, "start": None if quick else start(),
-    }  # fmt: skip
+        "machine": machine(),
+        "bits": vector_bits(),
+        "preset": PRESET,
+        "quick": quick,
+        "clock": clock_name,
+        "rounds": rounds,
+        "dt_s": DT,
+        "cases": rows,
+        "notes": notes,
+        "start": None if quick else start(),
+    }
 
 
 def speed_table(rows: list[dict[str, Any]]) -> str:

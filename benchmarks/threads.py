@@ -154,9 +154,7 @@ def measure(rounds: int, threads: int) -> dict[str, Any]:
     """Rates, ratios, and what the model takes."""
     one, several, processes = Legs(LEGS), Legs(LEGS, num_threads=threads), Processes(threads)
     shared, apart = f"{threads} threads", f"{threads} processes"
-    runs: dict[str, Callable[[], float]] = {
-        "1 thread": one.run, shared: several.run, apart: processes.run
-    }  # fmt: skip
+    runs: dict[str, Callable[[], float]] = {"1 thread": one.run, shared: several.run, apart: processes.run}
     seconds = interleave(runs, rounds)
     processes.end()
     parts = np.array([one.serial_and_kernel() for _ in range(rounds)])
@@ -167,12 +165,18 @@ def measure(rounds: int, threads: int) -> dict[str, Any]:
         (shared, apart, seconds[apart] / seconds[shared], BESIDE_PROCESSES),
     ]
     return {
-        "machine": machine(), "bits": vector_bits(), "rounds": rounds, "legs": LEGS, "steps": STEPS,
+        "machine": machine(),
+        "bits": vector_bits(),
+        "rounds": rounds,
+        "legs": LEGS,
+        "steps": STEPS,
         "rate": {name: spread(LEGS * STEPS / each) for name, each in seconds.items()},
         "ratios": [(case, beside, spread(ratio), bar) for case, beside, ratio, bar in ratios],
-        "serial": serial, "group": kernel * LANES / LEGS, "call": call_cost(threads),
+        "serial": serial,
+        "group": kernel * LANES / LEGS,
+        "call": call_cost(threads),
         "neighbours": threads / float(np.median(seconds["1 thread"] / seconds[apart])),
-    }  # fmt: skip
+    }
 
 
 def page(result: dict[str, Any]) -> str:
@@ -186,15 +190,19 @@ def page(result: dict[str, Any]) -> str:
     more = [[str(p), *(f"{gain(legs, p, *model):.1f}" for legs in MODELLED)] for p in CORES]
     micro = {key: 1e6 * result[key] for key in ("serial", "group", "call")}
     about = markdown_table(["", ""], [[key, value] for key, value in result["machine"].items()])
-    return "\n\n".join(
-        (
-            INTRO.format(**result), about,
-            markdown_table(["", "environment steps/s", "spread"], rates),
-            markdown_table(["case", "beside", "ratio", "bar"], ratios),
-            MODEL.format(**result | micro),
-            markdown_table(["threads", *(f"{legs} legs" for legs in MODELLED)], more),
+    return (
+        "\n\n".join(
+            (
+                INTRO.format(**result),
+                about,
+                markdown_table(["", "environment steps/s", "spread"], rates),
+                markdown_table(["case", "beside", "ratio", "bar"], ratios),
+                MODEL.format(**result | micro),
+                markdown_table(["threads", *(f"{legs} legs" for legs in MODELLED)], more),
+            )
         )
-    ) + "\n"  # fmt: skip
+        + "\n"
+    )
 
 
 def main() -> None:

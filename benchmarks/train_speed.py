@@ -122,14 +122,22 @@ def measure(rounds: int) -> dict[str, Any]:
     parts = {SB3: where_time_goes(sb3, rounds)}
     parts |= {f"PPO_FLAT, {n} thread{'s' * (n > 1)}": where_time_goes(m, rounds) for n, m in flat.items()}
     return {
-        "machine": machine(), "bits": vector_bits(), "rounds": rounds, "env_id": ENV_ID, "units": units,
+        "machine": machine(),
+        "bits": vector_bits(),
+        "rounds": rounds,
+        "env_id": ENV_ID,
+        "units": units,
         "rows": [
-            {"case": name, "rate": spread(units / each), "ratio": spread(seconds[SB3] / each),
-             "bar": BAR if name.startswith("PPO_FLAT") else None}
+            {
+                "case": name,
+                "rate": spread(units / each),
+                "ratio": spread(seconds[SB3] / each),
+                "bar": BAR if name.startswith("PPO_FLAT") else None,
+            }
             for name, each in seconds.items()
         ],
         "parts": {name: {key: x / units for key, x in part.items()} for name, part in parts.items()},
-    }  # fmt: skip
+    }
 
 
 def page(result: dict[str, Any]) -> str:

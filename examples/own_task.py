@@ -47,13 +47,16 @@ hoof_env.register(
     ],
     entries=[
         hoof_env.Entry(
-            "vertical acceleration", "feel", "m/s^2", vertical_acceleration,
+            "vertical acceleration",
+            "feel",
+            "m/s^2",
+            vertical_acceleration,
             hoof_env.Scale("tanh(x / 9.81)", lambda x, scene: x / 9.81, saturates=True),
         )
     ],
     contact_law=turf,
     stiffness=5e4,
-)  # fmt: skip
+)
 
 if __name__ == "__main__":
     env, envs = gym.make("my_lab/Turf-v0"), gym.make_vec("my_lab/Turf-v0", num_envs=64)
