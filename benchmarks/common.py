@@ -41,7 +41,8 @@ class Assembly:
         link_of = {FRAME: "frame"} | {body: link for link, bodies in self.links.items() for body in bodies}
         pins: Pins = {}
         for row, joint in enumerate(JOINTS):
-            one, two = link_of[joint.i], link_of[joint.j]
+            one = link_of[joint.i]
+            two = link_of[joint.j]
             if one == two:
                 continue  # the inside of a rigid link
             if (joint.point, two, one) in pins:
@@ -149,8 +150,11 @@ class Start:
 
     def phi(self, leg: int, theta: float) -> tuple[float, float]:
         """Swing of a leg at a crank angle, and its slope by the crank angle."""
-        a, b, begin = self.swing_sin, self.swing_cos, self.crank[leg]
-        s, c = math.sin(theta), math.cos(theta)
+        a = self.swing_sin
+        b = self.swing_cos
+        begin = self.crank[leg]
+        s = math.sin(theta)
+        c = math.cos(theta)
         return self.swing[leg] + a * (s - math.sin(begin)) + b * (c - math.cos(begin)), a * c - b * s
 
     def poses(self, limbs: Sequence[Limb]) -> list[Pose]:

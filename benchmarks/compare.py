@@ -74,7 +74,8 @@ def run_cases(tree: Path, runs: int = RUNS) -> dict[str, float]:
 
 def compare(base: Path, now: Path, rounds: int) -> dict[str, list[float]]:
     """Ratios of speed, `now` over `base`, by case, one a round; a round before them compiles and warms up."""
-    trees, order = {"base": base, "now": now}, np.random.default_rng(0)
+    trees = {"base": base, "now": now}
+    order = np.random.default_rng(0)
     ratios: dict[str, list[float]] = {}
     for k in range(rounds + 1):
         seconds = {name: run_cases(trees[name]) for name in order.permutation(list(trees))}

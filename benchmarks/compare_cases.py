@@ -24,7 +24,8 @@ BATCH = 1024
 
 def advance(hips: tuple[float, ...], trunk: str, count: int, steps: int, calls: int) -> Callable[[], object]:
     """So many calls of so many steps of 1 ms of an engine with motors, each from the same state."""
-    leg, walk = load_geometry("identified"), load_gait("walk", "identified")
+    leg = load_geometry("identified")
+    walk = load_gait("walk", "identified")
     low = 0.05 if trunk == "fixed" else 0.0
     body = Trunk(trunk, mass=200.0, pitch_inertia=150.0, height=leg.hip_height - low)
     limbs = [Limb(leg, hip=(x, 0.0), drive=Motor()) for x in hips]
@@ -85,7 +86,8 @@ def least_seconds(cases: dict[str, Callable[[], object]], runs: int) -> dict[str
 
 def main(runs: int) -> None:
     """Time all cases and print them."""
-    leg, terrain = "hoof_env/HorseLeg-v0", "hoof_env/HorseLegTerrain-v0"
+    leg = "hoof_env/HorseLeg-v0"
+    terrain = "hoof_env/HorseLegTerrain-v0"
     many = gym.make_vec(leg, num_envs=BATCH)
     many.reset(seed=0)
     cases = {

@@ -55,10 +55,14 @@ of the widest vectors in the code that numba compiles; the others are as they co
 def measure(rounds: int, steps: int) -> dict[str, Any]:
     """Rates and ratios."""
     cheetah = "HalfCheetah-v5, single"
-    runs, units = {cheetah: step(gym.make("HalfCheetah-v5"), steps)}, {cheetah: steps}
+    runs = {cheetah: step(gym.make("HalfCheetah-v5"), steps)}
+    units = {cheetah: steps}
     for name in BARS:
-        one, all_at_once, many = f"{name}, single", f"{name}, {BATCH} at once", max(steps // 20, 5)
-        env, envs = gym.make(f"hoof_env/{name}-v0"), gym.make_vec(f"hoof_env/{name}-v0", num_envs=BATCH)
+        one = f"{name}, single"
+        all_at_once = f"{name}, {BATCH} at once"
+        many = max(steps // 20, 5)
+        env = gym.make(f"hoof_env/{name}-v0")
+        envs = gym.make_vec(f"hoof_env/{name}-v0", num_envs=BATCH)
         envs.reset(seed=0)
         size = SMALL if name == "Horse" else 1.0
         runs |= {one: step(env, steps, size), all_at_once: step_many(envs, BATCH, many, size)}
@@ -69,8 +73,10 @@ def measure(rounds: int, steps: int) -> dict[str, Any]:
         for size in POOLS:
             pool = envpool.make("HalfCheetah-v4", env_type="gymnasium", num_envs=size, num_threads=1)
             pool.reset()
-            title, few = f"EnvPool HalfCheetah-v4, {size} at once", max(4 * steps // size, 2)
-            runs[title], units[title] = step_many(pool, size, few), few * size
+            title = f"EnvPool HalfCheetah-v4, {size} at once"
+            few = max(4 * steps // size, 2)
+            runs[title] = step_many(pool, size, few)
+            units[title] = few * size
     clocked = {name: partial(timed, time.perf_counter, lambda: None, run) for name, run in runs.items()}
     seconds = interleave(clocked, rounds)
     rate = {name: units[name] / seconds[name] for name in runs}
@@ -78,7 +84,8 @@ def measure(rounds: int, steps: int) -> dict[str, Any]:
     best = max(pools, key=lambda name: float(np.median(rate[name])), default=cheetah)
     rows = []
     for name in rate:
-        is_single, bars = name.endswith("single"), BARS.get(name.split(",")[0], ((), ()))
+        is_single = name.endswith("single")
+        bars = BARS.get(name.split(",")[0], ((), ()))
         beside = cheetah if is_single else best
         rows.append(
             {

@@ -50,7 +50,11 @@ class ExudynLegs:
         dt: float = 1e-3,
         outside: Outside | None = None,
     ) -> None:
-        self.limbs, self.trunk, self.start, self.dt, self.outside = tuple(limbs), trunk, start, dt, outside
+        self.limbs = tuple(limbs)
+        self.trunk = trunk
+        self.start = start
+        self.dt = dt
+        self.outside = outside
         self._container = exu.SystemContainer()
         self.mbs = self._container.AddSystem()
         self._reference: list[float] = []
@@ -89,7 +93,9 @@ class ExudynLegs:
 
         settings: Any = exu.SimulationSettings()
         time = settings.timeIntegration
-        time.numberOfSteps, time.endTime, time.verboseMode = steps, steps * self.dt, 0
+        time.numberOfSteps = steps
+        time.endTime = steps * self.dt
+        time.verboseMode = 0
         time.generalizedAlpha.spectralRadius = SPECTRAL_RADIUS
         time.newton.useModifiedNewton = fast
         time.newton.absoluteTolerance = time.newton.relativeTolerance = 1e-6 if fast else 1e-10
@@ -153,8 +159,10 @@ class ExudynLegs:
         return int(self.mbs.AddMarker(eii.MarkerBodyPosition(bodyNumber=body, localPosition=[x, y, 0])))
 
     def _leg(self, i: int) -> dict[str, Any]:
-        limb, start = self.limbs[i], self.start
-        geometry, sigma = limb.geometry, limb.geometry.travel
+        limb = self.limbs[i]
+        start = self.start
+        geometry = limb.geometry
+        sigma = limb.geometry.travel
         pose = start.poses(self.limbs)[i]
         swing_rate = start.phi(i, start.crank[i])[1] * start.crank_speed[i]
         rates = (*pose.point_velocities[0], sigma * swing_rate)
@@ -177,7 +185,8 @@ class ExudynLegs:
 
         hip = [self._point(self._trunk, *limb.hip), self._point(frame, 0.0, 0.0)]
         self.mbs.AddObject(eii.ObjectJointRevolute2D(markerNumbers=hip))
-        joints, ends = [], []
+        joints = []
+        ends = []
         for joint in JOINTS:
             pair = [(frame if k == FRAME else bodies[k], local(k, joint.point)) for k in (joint.j, joint.i)]
             markers = [self._point(body, *at) for body, at in pair]
@@ -199,8 +208,10 @@ class ExudynLegs:
 
     def _prescribe(self, i: int, axes: list[int]) -> dict[str, Any]:
         """Crank and swing as functions of time."""
-        sigma, start = self.limbs[i].geometry.travel, self.start
-        theta, speed = start.crank[i], start.crank_speed[i]
+        sigma = self.limbs[i].geometry.travel
+        start = self.start
+        theta = start.crank[i]
+        speed = start.crank_speed[i]
 
         def swing(t: float) -> float:
             return sigma * (start.phi(i, theta + speed * t)[0] - start.swing[i])
@@ -210,7 +221,9 @@ class ExudynLegs:
 
     def _motor(self, i: int, frame: int, crank: int, axes: list[int]) -> dict[str, Any]:
         """A torque between frame and crank, the rotor, and the swing geared to the crank."""
-        limb, sigma, start = self.limbs[i], self.limbs[i].geometry.travel, self.start
+        limb = self.limbs[i]
+        sigma = self.limbs[i].geometry.travel
+        start = self.start
         motor = limb.drive
         assert isinstance(motor, Motor)
 
@@ -299,7 +312,8 @@ class ExudynLegs:
         q = (np.array(self._reference) + system.GetODE2Coordinates()).reshape(-1, 3)
         v = np.array(system.GetODE2Coordinates_t()).reshape(-1, 3)
         tied = np.array(system.GetAECoordinates())
-        row, rows = self._rows, []
+        row = self._rows
+        rows = []
 
         def multiplier(item: int) -> Any:
             return -tied[list(system.GetObjectLTGAE(item))]
@@ -309,7 +323,8 @@ class ExudynLegs:
 
         for i, (limb, leg) in enumerate(zip(self.limbs, self._legs, strict=True)):
             sigma = limb.geometry.travel
-            frame, crank = row[leg["frame"]], row[leg["bodies"][0]]
+            frame = row[leg["frame"]]
+            crank = row[leg["bodies"][0]]
             start = self._reference[3 * crank + 2] - self._reference[3 * frame + 2]
             theta = self.start.crank[i] - sigma * (q[crank, 2] - q[frame, 2] - start)
             speed = -sigma * (v[crank, 2] - v[frame, 2])

@@ -165,7 +165,8 @@ def main() -> None:
             print(f"{name} {algo} done", flush=True)
     rows = []
     for name, curves in results.items():
-        near, final = "", ""
+        near = ""
+        final = ""
         if name == "ppo_flat":
             near = spread([first(curve, (1 - NEAR) * curve[-1][2]) for curve in curves])
             final = spread([curve[-1][2] for curve in curves])

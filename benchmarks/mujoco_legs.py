@@ -53,7 +53,8 @@ def _leg(
     assembly: Assembly, limb: Limb, i: int, at: Pose, frame: NDArray[np.float64], contact: bool, rotor: float
 ) -> str:
     """The bodies of a leg, each with the world's axes in the pose `at`; `frame` is the trunk's origin."""
-    masses, inertias = limb.geometry.body_masses, limb.geometry.body_inertias
+    masses = limb.geometry.body_masses
+    inertias = limb.geometry.body_inertias
 
     def body(link: str, parent_at: NDArray[np.float64]) -> str:
         pin = at.point(assembly.carrier[link][1])
@@ -62,7 +63,8 @@ def _leg(
         text += f'<joint name="{link} {i}" axis="0 0 {axis}" armature="{armature:.17g}"/>'
         for order, k in enumerate(assembly.links[link]):
             centre = _xyz((at.centres[k] - pin).tolist())
-            j, m = float(inertias[k]), float(masses[k])
+            j = float(inertias[k])
+            m = float(masses[k])
             inertial = f'mass="{m:.17g}" diaginertia="{j:.17g} {j:.17g} {j:.17g}"'
             if order == 0:
                 text += f'<inertial pos="{centre}" {inertial}/>'
@@ -101,7 +103,8 @@ def build_model(
     """
     if start.swings:
         raise ValueError("MuJoCo's legs keep their swing: expected swing_sin and swing_cos of 0")
-    at, h = start.position, trunk.height - start.position[1]
+    at = start.position
+    h = trunk.height - start.position[1]
     solref = solref or ((2 if contact else 10) * dt, 1.0)
     spring = (trunk.damping, trunk.stiffness, h) if trunk.kind == "suspended" else (0.0, 0.0, 0.0)
     slides = "".join(
@@ -116,11 +119,17 @@ def build_model(
     )
     # A rotor on a trunk that pitches turns with it: an armature of the joint would leave that out.
     pitching = trunk.kind == "free" and not contact
-    legs, loops, locks, motors, rotors = "", "", "", "", ""
+    legs = ""
+    loops = ""
+    locks = ""
+    motors = ""
+    rotors = ""
     for i, (limb, pose) in enumerate(zip(limbs, start.poses(limbs), strict=True)):
-        drive, rotor = limb.drive, FLYWHEEL
+        drive = limb.drive
+        rotor = FLYWHEEL
         if isinstance(drive, Motor):
-            rotor, top = 0.0 if pitching else drive.reflected_inertia, drive.torque_limit
+            rotor = 0.0 if pitching else drive.reflected_inertia
+            top = drive.torque_limit
             motors += f'<velocity joint="crank {i}" kv="{drive.speed_gain:.17g}"'
             motors += f' forcerange="{-top:.17g} {top:.17g}"/>'
             if pitching:
@@ -184,7 +193,10 @@ class MujocoLegs:
         **build: Any,
     ) -> None:
         self.assembly = assembly
-        self.limbs, self.trunk, self.start, self.outside = tuple(limbs), trunk, start, outside
+        self.limbs = tuple(limbs)
+        self.trunk = trunk
+        self.start = start
+        self.outside = outside
         self.model = build_model(limbs, trunk, start, dt, assembly=assembly, **build)
         self.data = mujoco.MjData(self.model)
         joints = {self.model.joint(k).name: k for k in range(self.model.njnt)}
@@ -267,9 +279,11 @@ class MujocoLegs:
             turn = self.data.xmat[hoof].reshape(3, 3)
             spatial = np.zeros(6)
             mujoco.mj_objectVelocity(self.model, self.data, mujoco.mjtObj.mjOBJ_XBODY, hoof, spatial, 0)
-            spin, velocity = spatial[2], complex(spatial[3], spatial[4])
+            spin = spatial[2]
+            velocity = complex(spatial[3], spatial[4])
             centre = complex(*self.data.xipos[hoof][:2])
-            total, moment = 0j, 0.0
+            total = 0j
+            moment = 0.0
             for point, arm in enumerate(self._arms[i]):
                 out = turn[:2, :2] @ arm
                 lever = complex(*out)
@@ -308,10 +322,13 @@ class MujocoLegs:
     @property
     def hip_torque(self) -> NDArray[np.float64]:
         """What holds each leg's frame about O [N m], along phi, against its pins, drive and rotor."""
-        torque, pins, spin = -self.crank_torque, self.pins(), self.data.qacc[self._cranks]
+        torque = -self.crank_torque
+        pins = self.pins()
+        spin = self.data.qacc[self._cranks]
         pitch = self.data.qacc[self._slides[2]] if self.trunk.kind == "free" else 0.0
         for i, limb in enumerate(self.limbs):
-            sigma, (x, y) = limb.geometry.travel, limb.geometry.pivot
+            sigma = limb.geometry.travel
+            (x, y) = limb.geometry.pivot
             c = complex(sigma * x, y) * np.exp(1j * (self.body[2] + sigma * self.start.swing[i]))
             at_c = pins[i][[point == "C" for point, _, _ in self.assembly.pins]].sum(axis=0)
             torque[i] += sigma * cross(c, complex(*at_c))
@@ -322,7 +339,9 @@ class MujocoLegs:
 
     def pins(self) -> NDArray[np.float64]:
         """Forces at the pins [N], shape (legs, pins, 2), in the order of `assembly.pins`."""
-        pins, loops, carrier = self.assembly.pins, self.assembly.loops, self.assembly.carrier
+        pins = self.assembly.pins
+        loops = self.assembly.loops
+        carrier = self.assembly.carrier
         forces = np.empty((len(self.limbs), len(pins), 2))
         ties = np.asarray(self.data.efc_force[: 3 * len(loops) * len(self.limbs)])
         ties = ties.reshape(len(self.limbs), len(loops), 3)[..., :2]

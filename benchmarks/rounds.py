@@ -14,7 +14,8 @@ Floats = NDArray[np.float64]
 
 def interleave(runs: Mapping[str, Callable[[], float]], rounds: int, seed: int = 0) -> dict[str, Floats]:
     """Seconds that each of `runs` took, shape (rounds,), after one round to warm up."""
-    rng, names = np.random.default_rng(seed), list(runs)
+    rng = np.random.default_rng(seed)
+    names = list(runs)
     seconds = {name: np.empty(rounds) for name in names}
     for run in runs.values():
         run()

@@ -54,8 +54,10 @@ class Scene:
 
 def scenes(preset: str) -> dict[str, Scene]:
     """The leg on a fixed trunk, the leg on a suspended one, and the horse."""
-    geometry, swing = load_geometry(preset), load_gait("walk", preset).swing_offset
-    high, one = geometry.hip_height, (Limb(geometry, drive=Motor()),)
+    geometry = load_geometry(preset)
+    swing = load_gait("walk", preset).swing_offset
+    high = geometry.hip_height
+    one = (Limb(geometry, drive=Motor()),)
     hips = ((0.6, 0.0), (0.6, 0.0), (-0.6, 0.0), (-0.6, 0.0))
     four = tuple(Limb(geometry, hip=hip, drive=Motor()) for hip in hips)
     trot = tuple(0.3 + x for x in (0.0, np.pi, np.pi, 0.0))

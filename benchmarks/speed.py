@@ -158,7 +158,9 @@ def mujoco_cases(quick: bool, clock: Clock) -> list[Case]:
     def run_of(scene: Scene, assembly: str, jacobian: int) -> Callable[[], float]:
         parts = ASSEMBLIES[assembly]
         legs = MujocoLegs(scene.limbs, scene.trunk, scene.start, dt=DT, contact=True, assembly=parts)
-        model, data, what = legs.model, legs.data, mujoco.mjtState.mjSTATE_INTEGRATION
+        model = legs.model
+        data = legs.data
+        what = mujoco.mjtState.mjSTATE_INTEGRATION
         model.geom_solref[:] = scene.softness, 1.0
         model.opt.jacobian = jacobian
         state = np.empty(mujoco.mj_stateSize(model, what))
@@ -166,7 +168,8 @@ def mujoco_cases(quick: bool, clock: Clock) -> list[Case]:
         before = partial(mujoco.mj_setState, model, data, state, what)
         return partial(timed, clock, before, partial(mujoco.mj_step, model, data, steps))
 
-    cases, steps = [], 50 if quick else 1000
+    cases = []
+    steps = 50 if quick else 1000
     for name in ("leg", "horse"):
         for assembly in ASSEMBLIES:
             runs = {
@@ -187,7 +190,8 @@ def exudyn_cases(quick: bool, clock: Clock) -> list[Case]:
         legs = ExudynLegs(scene.limbs, scene.trunk, scene.start, dt=DT, outside=law)
         return timed(clock, lambda: None, partial(legs.run, steps * DT, 1, fast=True))
 
-    steps, title = 5 if quick else 50, "Exudyn with our contact law from Python"
+    steps = 5 if quick else 50
+    title = "Exudyn with our contact law from Python"
     return [
         Case(f"{name}, {title}", name, partial(run, scenes(PRESET)[name]), steps, "modified Newton")
         for name in ("leg", "horse")
@@ -233,7 +237,8 @@ def start() -> dict[str, float]:
     def seconds_of(code: str, before: str = "", **settings: str) -> float:
         clock = "import time; begin = time.perf_counter()"
         program = "\n".join((before, clock, code, "print(time.perf_counter() - begin)"))
-        command, environment = [sys.executable, "-c", program], os.environ | settings
+        command = [sys.executable, "-c", program]
+        environment = os.environ | settings
         done = subprocess.run(
             command, cwd=root, env=environment, stdout=subprocess.PIPE, text=True, check=True
         )
@@ -250,7 +255,8 @@ def start() -> dict[str, float]:
 def measure(quick: bool, rounds: int, clock_name: str) -> dict[str, Any]:
     """All of it; what `speed.json` holds."""
     clock = CLOCKS[clock_name]
-    cases, notes = own_cases(quick, clock), []
+    cases = own_cases(quick, clock)
+    notes = []
     for package, title, peer in (("mujoco", "MuJoCo", mujoco_cases), ("exudyn", "Exudyn", exudyn_cases)):
         if importlib.util.find_spec(package):
             cases += peer(quick, clock)
@@ -277,7 +283,8 @@ def speed_table(rows: list[dict[str, Any]]) -> str:
     head = ["case", "bits", "steps/s", "ratio to MuJoCo ALL", "ratio to MuJoCo RIGID", "required", "aimed at"]
     lines = []
     for row in rows:
-        ratios, rate = row["ratios"], row["rate"]["median"]
+        ratios = row["ratios"]
+        rate = row["rate"]["median"]
         lines.append(
             [
                 row["name"] + (f" ({row['note']})" if row["note"] else ""),
@@ -292,7 +299,8 @@ def speed_table(rows: list[dict[str, Any]]) -> str:
 
 def cost_table(rows: list[dict[str, Any]]) -> str:
     """What springs and harmonics cost beside rigid legs."""
-    bars, lines = {what: bar for what, _, bar in ANIMAL}, []
+    bars = {what: bar for what, _, bar in ANIMAL}
+    lines = []
     for row in rows:
         if cost := row["cost"]:
             bar = next(bar for what, bar in bars.items() if row["name"].endswith(what))

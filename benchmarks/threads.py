@@ -31,9 +31,12 @@ from hoof_env.dynamics.advance import LANES
 from hoof_env.envs.vector import HorseLegVectorEnv
 from hoof_env.simd.threads import available, run_together
 
-LEGS, STEPS = 1024, 60
-BESIDE_PROCESSES, BESIDE_ONE = 0.9, 1.5
-CORES, MODELLED = (2, 4, 8, 16, 32, 64), (1024, 8192)
+LEGS = 1024
+STEPS = 60
+BESIDE_PROCESSES = 0.9
+BESIDE_ONE = 1.5
+CORES = (2, 4, 8, 16, 32, 64)
+MODELLED = (1024, 8192)
 
 INTRO = """\
 # What threads gain
@@ -59,7 +62,8 @@ class Legs:
     def __init__(self, count: int, **options: Any) -> None:
         self.envs = HorseLegVectorEnv(num_envs=count, task="leg", **options)
         self.envs.reset(seed=0)
-        shape, uniform = self.envs.action_space.shape or (), np.random.default_rng(0).uniform
+        shape = self.envs.action_space.shape or ()
+        uniform = np.random.default_rng(0).uniform
         self.actions = [uniform(-1, 1, shape).astype(np.float32) for _ in range(8)]
 
     def run(self) -> float:
@@ -71,7 +75,8 @@ class Legs:
 
     def serial_and_kernel(self) -> tuple[float, float]:
         """Wall time [s] of a step outside the kernel and in it."""
-        batch_step, spent = self.envs.batch.step, 0.0
+        batch_step = self.envs.batch.step
+        spent = 0.0
 
         def step(*arguments: Any) -> bool:
             nonlocal spent
@@ -152,8 +157,11 @@ def gain(legs: int, threads: int, serial: float, group: float, call: float, neig
 
 def measure(rounds: int, threads: int) -> dict[str, Any]:
     """Rates, ratios, and what the model takes."""
-    one, several, processes = Legs(LEGS), Legs(LEGS, num_threads=threads), Processes(threads)
-    shared, apart = f"{threads} threads", f"{threads} processes"
+    one = Legs(LEGS)
+    several = Legs(LEGS, num_threads=threads)
+    processes = Processes(threads)
+    shared = f"{threads} threads"
+    apart = f"{threads} processes"
     runs: dict[str, Callable[[], float]] = {"1 thread": one.run, shared: several.run, apart: processes.run}
     seconds = interleave(runs, rounds)
     processes.end()

@@ -110,7 +110,8 @@ def where_time_goes(model: Any, rounds: int) -> dict[str, float]:
 def measure(rounds: int) -> dict[str, Any]:
     """Rates, ratios to Stable-Baselines3 on one thread, and parts."""
     threads = min(2, available())
-    sb3, flat = model_of("ppo"), {n: model_of("ppo_flat", num_threads=n) for n in {1, threads}}
+    sb3 = model_of("ppo")
+    flat = {n: model_of("ppo_flat", num_threads=n) for n in {1, threads}}
     cases = {SB3: partial(train, sb3), f"PPO, {threads} threads": partial(train, model_of("ppo"), threads)}
     cases |= {f"PPO_FLAT, {n} thread{'s' * (n > 1)}": partial(train, model) for n, model in flat.items()}
     too = f"{threads} threads, environments too"
@@ -118,7 +119,8 @@ def measure(rounds: int) -> dict[str, Any]:
         f"PPO, {too}": partial(train, model_of("ppo", threads), threads),
         f"PPO_FLAT, {too}": partial(train, model_of("ppo_flat", threads), threads),
     }
-    seconds, units = interleave(cases, rounds), sb3.n_steps * sb3.n_envs
+    seconds = interleave(cases, rounds)
+    units = sb3.n_steps * sb3.n_envs
     parts = {SB3: where_time_goes(sb3, rounds)}
     parts |= {f"PPO_FLAT, {n} thread{'s' * (n > 1)}": where_time_goes(m, rounds) for n, m in flat.items()}
     return {

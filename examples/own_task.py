@@ -16,7 +16,8 @@ from hoof_env.simd.math import root_power
 
 def friction(step, weight):
     """Charge sliding under load: the power of friction at toe and heel [kW]."""
-    toe, heel = step.leg.report.toe, step.leg.report.heel
+    toe = step.leg.report.toe
+    heel = step.leg.report.heel
     return 0.001 * weight * (toe.friction * toe.slide + heel.friction * heel.slide)
 
 
@@ -59,12 +60,14 @@ hoof_env.register(
 )
 
 if __name__ == "__main__":
-    env, envs = gym.make("my_lab/Turf-v0"), gym.make_vec("my_lab/Turf-v0", num_envs=64)
+    env = gym.make("my_lab/Turf-v0")
+    envs = gym.make_vec("my_lab/Turf-v0", num_envs=64)
     observation, info = env.reset(seed=0)
     envs.reset(seed=0)
     for _ in range(50):
         observation, reward, *_, info = env.step(np.zeros(4, np.float32))
         rewards = envs.step(np.zeros((64, 4), np.float32))[1]
         assert reward == rewards[0]  # the same bits alone and among many
-    rubbed, rode = info["reward_friction"], info["reward_comfort"]
+    rubbed = info["reward_friction"]
+    rode = info["reward_comfort"]
     print(f"reward {reward:.4f}, of which {rubbed:.4f} for friction and {rode:.4f} for comfort")
