@@ -5,8 +5,8 @@
     python -m agents.baselines --only sac td3         some rows of it
     python -m agents.baselines --subset trainers --workers 1      how fast PPO and PPO_FLAT train, by turns
 
-What is trained is in agents/plans. A training that is done is not repeated; Ctrl-C, or kill -9, and the same
-command go on where it was. Each has its log beside its results, RUN/log.txt.
+The files of agents/plans list the trainings. A training that is done is not repeated; Ctrl-C, or kill -9, and
+the same command go on where it was. Each has its log next to its results, RUN/log.txt.
 """
 
 from __future__ import annotations
@@ -32,6 +32,8 @@ from hoof_env.errors import ParameterError, check_number
 
 @dataclass(frozen=True)
 class Args:
+    """Arguments of the command."""
+
     subset: Plan = "full"
     """which plan; each has a folder of its own"""
     only: tuple[str, ...] = ()
@@ -45,8 +47,13 @@ class Args:
 
 
 def train_all(args: Args) -> list[Run]:
-    """Train what is not done yet; returns the trainings that failed. `ParameterError`: no training of that
-    name. `OutputError`: the folder cannot be written. `KeyboardInterrupt`: Ctrl-C; everything can go on."""
+    """Train what is not done yet and return the trainings that failed.
+
+    Raises:
+        ParameterError: there is no training of that name.
+        OutputError: the folder cannot be written.
+        KeyboardInterrupt: Ctrl-C; the same call goes on.
+    """
     check_number("workers", args.workers, low=1)
     folder = args.out or FOLDERS[args.subset]
     names = args.only or ("",)
@@ -58,7 +65,7 @@ def train_all(args: Args) -> list[Run]:
 
 
 def work_off(chosen: Sequence[Run], folder: Path, workers: int) -> list[Run]:
-    """Train so many at a time until all are done; returns those that failed."""
+    """Train `workers` at a time until all are done; return those that failed."""
     waiting = [one for one in chosen if not is_done(one, folder)]
     running: dict[Run, subprocess.Popen[bytes]] = {}
     failed: list[Run] = []
@@ -89,6 +96,7 @@ def work_off(chosen: Sequence[Run], folder: Path, workers: int) -> list[Run]:
 
 
 def is_done(one: Run, folder: Path) -> bool:
+    """True if the training has its final score."""
     return (folder / one.name / FINAL).is_file()
 
 
@@ -108,11 +116,13 @@ def start(one: Run, folder: Path) -> subprocess.Popen[bytes]:
 
 
 def last_line(folder: Path) -> str:
+    """Return the last line of a training's log, which says why it failed."""
     lines = (folder / "log.txt").read_text(encoding="utf-8", errors="replace").split("\n")
     return next((line for line in reversed(lines) if line.strip()), "its log is empty")
 
 
 def main(argv: list[str] | None = None) -> int:
+    """Train all, write the page and return the exit code."""
     import tyro
 
     def interrupt(*_: Any) -> None:

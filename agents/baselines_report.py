@@ -3,10 +3,7 @@ pictures.
 
     python -m agents.baselines_report           writes it again, from whatever is done
 
-An agent dominates the scripted run if it is faster, its forces, its cost of transport and its loading rate
-are lower by at least what `LOWER` says, and it bears between the run's share of the weight and all of it:
-bearing less is a way to be soft, and with more the suspension pulls the animal down. An agent of
-HorseLegSpeed-v0 follows its command by the slope of its speed over constant commands.
+An agent of HorseLegSpeed-v0 follows its command by the slope of its speed over constant commands.
 """
 
 from __future__ import annotations
@@ -39,7 +36,7 @@ from agents.baselines_run import (
 from agents.command import run
 from agents.score import FINAL_SEEDS, score_vector
 from agents.settings import load_settings
-from agents.statistics import PUBLISHED, TABLE, Floats, Scored, cells, iqm, over_episodes, over_seeds
+from agents.statistics import PUBLISHED, TABLE, Floats, Scored, cells, compare, iqm, over_episodes, over_seeds
 from hoof_env._output import markdown_table
 from hoof_env._plotting import BLUE, GREEN, GREY, ORANGE, PURPLE, STYLE
 from hoof_env.envs.tasks import TASKS
@@ -53,9 +50,6 @@ SPEED = "hoof_env/HorseLegSpeed-v0"
 COMMANDS = 5  # speeds between the lowest and the highest command
 SETTLED = 4.0  # seconds after which the speed is that of the command
 
-LOWER = {"stance_peak_n": 0.75, "peak_grf_n": 0.85, "cost_of_transport": 0.7, "loading_rate_n_s": 1.0}
-"""What an agent that dominates has at most of the run's."""
-
 POINTS = 40  # of a curve
 SOON = 0.4  # of the first row's time to the open-loop gait's return
 References = Mapping[str, Mapping[str, Scored]]  # policies without learning, by id and name
@@ -63,17 +57,20 @@ References = Mapping[str, Mapping[str, Scored]]  # policies without learning, by
 
 @dataclass(frozen=True)
 class Args:
+    """Arguments of the command."""
+
     subset: Plan = "full"
     """which plan"""
     runs: Path | None = None
     """folder of the trainings, and of report.md; otherwise runs/baselines, or the plan's own"""
 
 
-# Comparisons: policies without learning, commands, the paper's run
+# Policies without learning, and how commands are followed
 
 
 def references(env_id: str) -> dict[str, Scored]:
-    """The paper's gaits and the open-loop gait of an id on the episodes of the agents; those that it has."""
+    """Score the paper's gaits and the open-loop gait of an id on the episodes of the agents; return those
+    that the id has, by name."""
     known = {}
     for name in (*GAITS, OPEN_LOOP):
         try:
@@ -90,8 +87,8 @@ def reference(name: str, policy: Any, env_id: str) -> Scored:
 
 
 def settled_speeds(row: Row) -> dict[int, list[float]]:
-    """By seed, `settled_speed` under each of `following_commands`, of agents of `SPEED` whose policies are
-    there."""
+    """Return, by seed, `settled_speed` under each of `following_commands`, for agents of `SPEED` with stored
+    policies."""
     found = {}
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", UserWarning)  # they were trained with other commands, which is meant
@@ -103,19 +100,20 @@ def settled_speeds(row: Row) -> dict[int, list[float]]:
 
 
 def following_commands() -> list[float]:
-    """Commands [m/s] from the slowest to the quickest of `SPEED`."""
+    """Return commands [m/s] from the slowest to the fastest of `SPEED`."""
     low, high = TASKS["speed"].defaults["target_speed"]
     return [float(command) for command in np.linspace(low, high, COMMANDS)]
 
 
 def following(title: str, speeds: Mapping[int, Sequence[float]]) -> Scored:
-    """Change of the settled speed over change of command: the slope of a line through them."""
+    """Estimate the change of the settled speed over the change of command: the slope of a line through
+    them."""
     slopes = [{"follows": float(np.polyfit(following_commands(), one, 1)[0])} for one in speeds.values()]
     return Scored(title, over_seeds(slopes), slopes)
 
 
 def settled_speed(policy: str, command: float) -> float:
-    """Mean speed [m/s] behind the first `SETTLED` seconds under one command."""
+    """Return the mean speed [m/s] after the first `SETTLED` seconds under one command."""
     kwargs: dict[str, Any] = {"target_speed": [command, command]}
     with_start = score_vector(policy, SPEED, FINAL_SEEDS, **kwargs)
     start = score_vector(policy, SPEED, FINAL_SEEDS, **kwargs, episode_seconds=SETTLED)
@@ -125,47 +123,16 @@ def settled_speed(policy: str, command: float) -> float:
     return float(distance / (with_start[0]["seconds"] - SETTLED))
 
 
-def dominates(figures: Mapping[str, float], run: Mapping[str, float]) -> bool:
-    """Whether some means dominate those of the run."""
-    lower = all(figures[key] <= part * run[key] for key, part in LOWER.items())
-    bears = run["weight_share"] <= figures["weight_share"] <= 1.0
-    return lower and bears and figures["speed_m_s"] > run["speed_m_s"]
-
-
-def dominates_with_confidence(agent: Scored, run: Scored) -> bool:
-    """Whether the intervals lie apart, too; that of the weight share must lie neither below the run's nor
-    above 1."""
-    ours = agent.intervals
-    theirs = run.intervals
-    lower = all(theirs[key].above(ours[key]) for key in LOWER)
-    bears = not theirs["weight_share"].above(ours["weight_share"]) and ours["weight_share"].low <= 1.0
-    return lower and bears and ours["speed_m_s"].above(theirs["speed_m_s"])
-
-
-def compare(agents: Sequence[Scored], run: Scored) -> str:
-    """The paper's run, and what is held against it, as a table."""
-    means = {key: interval.mean for key, interval in run.intervals.items()}
-    lines = [["run", *cells(run)]]
-    for one in agents:
-        mine = {key: interval.mean for key, interval in one.intervals.items()}
-        parts = [f"{mine[key] / means[key]:.2f}" for key in LOWER]
-        verdict = "yes" if dominates(mine, means) and dominates_with_confidence(one, run) else "no"
-        count = sum(dominates(seed, means) for seed in one.seeds)
-        seeds = f"{count}/{len(one.seeds)}" if one.seeds else ""
-        lines.append([one.name, *cells(one), *parts, verdict, seeds])
-    of_run = [f"{TABLE[key][0].rpartition(' ')[0] or key} / run's" for key in LOWER]
-    titles = [title for title, *_ in TABLE.values()]
-    return markdown_table(["", *titles, *of_run, "dominates", "seeds that do"], lines)
-
-
 # Tables and pictures
 
 
 def of_id(rows: Sequence[Row], env_id: str) -> list[Row]:
+    """Return the rows of one id."""
     return [row for row in rows if row.entry.env_id == env_id]
 
 
 def results_table(rows: Sequence[Row], gaits: References) -> str:
+    """Return the table of returns: policies without learning and agents, by id."""
     titles = (
         "id",
         "policy",
@@ -190,6 +157,7 @@ def results_table(rows: Sequence[Row], gaits: References) -> str:
 
 
 def row_cells(row: Row, known: Mapping[str, Scored]) -> list[str]:
+    """Return the cells of an agent in the table of returns; `known` are the policies without learning."""
     count = len(row.results)
     returns = np.array([one.figures["return"] for one in row.results])
     steps, wall, cpu = (
@@ -215,6 +183,7 @@ def row_cells(row: Row, known: Mapping[str, Scored]) -> list[str]:
 
 
 def figures_table(rows: Sequence[Row], gaits: References) -> str:
+    """Return the table of gait figures: policies without learning and agents, by id."""
     lines = [
         [f"`{env_id}`", one.name, *cells(one)]
         for env_id, known in gaits.items()
@@ -224,8 +193,8 @@ def figures_table(rows: Sequence[Row], gaits: References) -> str:
 
 
 def pace_table(rows: Sequence[Row], known: Mapping[str, Scored]) -> str:
-    """Steps a second, return, and seconds until the open-loop gait's return; beside the first row, seed by
-    seed. Only seeds that reach that return in both are compared."""
+    """Return a table of steps a second, return, and seconds until the open-loop gait's return, compared with
+    the first row seed by seed. Only seeds that reach that return in both rows are compared."""
     level = known[OPEN_LOOP].intervals["return"].mean
     first = rows[0]
     rates = []
@@ -271,7 +240,7 @@ def pace_table(rows: Sequence[Row], known: Mapping[str, Scored]) -> str:
 
 
 def span(values: Iterable[float], digits: int) -> str:
-    """Median, least and greatest; nothing where there is none."""
+    """Format median, least and greatest; an empty text if there are no values."""
     numbers = np.array([*values])
     if not numbers.size:
         return ""
@@ -281,7 +250,7 @@ def span(values: Iterable[float], digits: int) -> str:
 
 
 def draw_frontier(rows: Sequence[Row], known: Mapping[str, Scored], path: Path) -> None:
-    """Return over steps a second, a point for each row."""
+    """Draw the return over steps a second, a point for each row."""
     with matplotlib.rc_context(STYLE):
         figure = Figure(figsize=(8, 3.6), layout="constrained")
         axes = figure.subplots()
@@ -307,7 +276,7 @@ def draw_frontier(rows: Sequence[Row], known: Mapping[str, Scored], path: Path) 
 
 
 def following_table(settled: Mapping[str, Mapping[int, Sequence[float]]]) -> str:
-    """Of settled speeds by row's title and seed."""
+    """Return a table of how commands are followed, from settled speeds by row's title and seed."""
     lines = []
     for title, speeds in settled.items():
         one = following(title, speeds)
@@ -317,7 +286,7 @@ def following_table(settled: Mapping[str, Mapping[int, Sequence[float]]]) -> str
 
 
 def write_settled(settled: Mapping[str, Mapping[int, Sequence[float]]], path: Path) -> None:
-    """A line for each agent and command."""
+    """Write a line for each agent and command."""
     lines = [
         {"policy": title, "seed": seed, "command_m_s": command, "settled_m_s": round(speed, 4)}
         for title, speeds in settled.items()
@@ -328,14 +297,15 @@ def write_settled(settled: Mapping[str, Mapping[int, Sequence[float]]], path: Pa
 
 
 def made_text(rows: Sequence[Row]) -> str:
+    """Return the commands that train the first seeds, and the versions."""
     commands = "\n".join(f"    {row.command}" for row in rows)
     versions = ", ".join(f"{name} {value}" for name, value in versions_of(rows).items())
     return f"The first seed of each:\n\n{commands}\n\nVersions: {versions}.\n"
 
 
 def write_data(rows: Sequence[Row], folder: Path) -> None:
-    """curves.csv, the learning curves of all, runs.csv, a line for each training, and episodes.csv, a line
-    for each episode of the final scores."""
+    """Write curves.csv, the learning curves of all; runs.csv, a line for each training; and episodes.csv, a
+    line for each episode of the final scores."""
     curves = []
     ends = []
     episodes = []
@@ -356,13 +326,14 @@ def write_data(rows: Sequence[Row], folder: Path) -> None:
 
 
 def short(episode: Mapping[str, float]) -> dict[str, str]:
-    """The `PUBLISHED` figures of an episode with five digits."""
+    """Format the `PUBLISHED` figures of an episode with five digits."""
     return {key: f"{episode[key]:.5g}" for key in PUBLISHED if key in episode}
 
 
 def over_time(row: Row, key: str) -> tuple[Floats, Floats]:
-    """IQM and interval of the return, shape (3, `POINTS`), over "steps" or "wall_s", shape (`POINTS`,), from
-    the first score of a trained policy to the last that all seeds have."""
+    """Return steps or seconds, shape (`POINTS`,), and IQM and interval of the return there, shape (3,
+    `POINTS`), from the first score of a trained policy to the last that all seeds have; `key` is "steps" or
+    "wall_s"."""
     curves = [one.curve for one in row.results]
     last = min(curve[-1][key] for curve in curves)
     first = min(max(curve[1][key] for curve in curves), last)
@@ -372,12 +343,13 @@ def over_time(row: Row, key: str) -> tuple[Floats, Floats]:
 
 
 def most(rows: Sequence[Row]) -> list[Row]:
-    """Those with as many seeds as any."""
+    """Return the rows with the largest number of seeds."""
     count = max(row.entry.seeds for row in rows)
     return [row for row in rows if row.entry.seeds == count]
 
 
 def draw_curves(rows: Sequence[Row], known: Mapping[str, Scored], path: Path) -> None:
+    """Draw the return over steps and over seconds for the rows with most seeds."""
     with matplotlib.rc_context(STYLE):
         figure = Figure(figsize=(9, 3.6), layout="constrained")
         panels = figure.subplots(1, 2, sharey=True)
@@ -408,8 +380,11 @@ def draw_curves(rows: Sequence[Row], known: Mapping[str, Scored], path: Path) ->
 
 
 def report(args: Args) -> Path:
-    """Write page, pictures and CSV; returns the page. `DataFileError`: nothing is done, or a result cannot be
-    read."""
+    """Write page, pictures and CSV files, and return the path of the page.
+
+    Raises:
+        DataFileError: nothing is done, or a result cannot be read.
+    """
     folder = args.runs or FOLDERS[args.subset]
     rows = read_results(load_plan(args.subset), folder)
     page = folder / "report.md"
@@ -441,6 +416,7 @@ def report(args: Args) -> Path:
 
 
 def main(argv: list[str] | None = None) -> None:
+    """Write the page."""
     import tyro
 
     args = tyro.cli(Args, args=argv, prog="python -m agents.baselines_report", description=__doc__)

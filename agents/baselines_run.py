@@ -1,10 +1,11 @@
-"""One training of the baselines table, scored as it goes and at its end, and the plans that list all of them.
+"""One training of the baselines table, scored as it goes and at its end, the plans that list all of them, and
+their results.
 
     python -m agents.baselines_run --algo ppo --env-id hoof_env/HorseLeg-v0 --seed 0
 
 The folder is that of `agents.train` with curve.csv, a row per score on the episodes of the learning curves,
 and final.json, the last policy's score on fresh episodes. The same command goes on where it was interrupted.
-Seconds are of training alone; wall time tells of the machine's other work, too.
+Seconds are of training alone; wall time depends on the machine's other work, too.
 """
 
 from __future__ import annotations
@@ -35,20 +36,20 @@ from hoof_env.errors import DataFileError, check_number, parse_json
 
 PLANS = Path(__file__).with_name("plans")
 Plan = Literal["full", "nightly", "trainers"]
-"""The published table, a small part of it that runs in minutes, and the trainers of PPO beside each other:
-files of `PLANS`."""
+"""Names of the plans, files of `PLANS`: the published table, a small part of it that runs in minutes, and the
+trainers of PPO compared with each other."""
 
 FOLDERS = {
     "full": Path("runs/baselines"),
     "nightly": Path("runs/baselines-nightly"),
     "trainers": Path("runs/trainers"),
 }
-"""Of the trainings, by plan."""
+"""Folders of the trainings, by plan."""
 
 LEG = "hoof_env/HorseLeg-v0"
 
 COLUMNS = ("steps", "wall_s", "cpu_s", *FIGURES)
-"""Of curve.csv; a figure that the id does not have stays empty."""
+"""Columns of curve.csv; a figure that the id does not have stays empty."""
 
 CURVE = "curve.csv"
 FINAL = "final.json"
@@ -56,7 +57,7 @@ FINAL = "final.json"
 
 @dataclass(frozen=True)
 class Entry:
-    """One row of the table; agents/plans/full.yml says what the fields mean."""
+    """Row of the table, several seeds of one training; agents/plans/full.yml explains the fields."""
 
     algo: str
     env_id: str
@@ -69,25 +70,30 @@ class Entry:
 
     @property
     def title(self) -> str:
+        """Name in tables and pictures."""
         return " ".join(filter(None, (self.algo.upper(), self.variant)))
 
     @property
     def name(self) -> str:
+        """Name of the folders, without the seed."""
         words = self.algo, *self.variant.split(), self.env_id.rpartition("/")[2]
         return "-".join(words)
 
 
 @dataclass(frozen=True)
 class Run:
+    """Training of an entry with one seed."""
+
     entry: Entry
     seed: int
 
     @property
     def name(self) -> str:
+        """Name of the training and of its folder."""
         return f"{self.entry.name}-s{self.seed}"
 
     def command(self, folder: Path | None = None) -> list[str]:
-        """Arguments of this command that train it, into a folder of `folder` where that is given."""
+        """Return the arguments of this command that train it, into a folder of `folder` if that is given."""
         entry = self.entry
         words = ["--algo", entry.algo, "--env-id", entry.env_id]
         words += ["--seed", str(self.seed), "--points", str(entry.points)]
@@ -100,7 +106,7 @@ class Run:
 
 
 def load_plan(name: str) -> tuple[Entry, ...]:
-    """The entries of a plan; `DataFileError` if there is no such file, or an entry is none."""
+    """Return the entries of a plan; `DataFileError` if there is no such file, or an entry is malformed."""
     path = PLANS / f"{name}.yml"
     try:
         return tuple(Entry(**entry) for entry in yaml.safe_load(path.read_text(encoding="utf-8")))
@@ -109,7 +115,7 @@ def load_plan(name: str) -> tuple[Entry, ...]:
 
 
 def runs_of(plan: Sequence[Entry]) -> Iterator[Run]:
-    """All trainings of a plan, first seeds first: a table of whatever is done is fair at any time."""
+    """Yield all trainings of a plan, first seeds first: a table of whatever is done is fair at any time."""
     for row in zip_longest(*([Run(entry, seed) for seed in range(entry.seeds)] for entry in plan)):
         yield from filter(None, row)
 
@@ -119,6 +125,8 @@ def runs_of(plan: Sequence[Entry]) -> Iterator[Run]:
 
 @dataclass(frozen=True)
 class Args(TrainingArgs):
+    """Arguments of the command."""
+
     seed: int = 0
     """of the training"""
     points: int = 30
@@ -128,7 +136,8 @@ class Args(TrainingArgs):
 
 
 def train_one(args: Args) -> bool:
-    """Train, or go on training, and score; whether it is done, not interrupted; raises as `train` does."""
+    """Train, or go on training, and score; return False if it was interrupted. Errors are those of
+    `train`."""
     check_number("points", args.points, low=1)
     check_number("seed", args.seed, low=0, high=CURVE_SEEDS[0] // 2)
     name = args.env_id.rpartition("/")[2]
@@ -166,8 +175,11 @@ def train_one(args: Args) -> bool:
 
 
 class CurveScorer(Scorer):
-    """Scores the policy before training, too, and into curve.csv of `folder`. Scores that a resumed training
-    has yet to reach again are dropped. Where the process that began the training is gone, it is ended."""
+    """Scorer into curve.csv of `folder`, which scores the untrained policy, too.
+
+    Scores that a resumed training has yet to reach again are dropped. The training ends, with a checkpoint,
+    if the process that began it is gone.
+    """
 
     def __init__(self, env_id: str, env_kwargs: Mapping[str, Any], folder: Path, every: int) -> None:
         super().__init__(env_id, env_kwargs, CURVE_SEEDS, every)
@@ -201,7 +213,7 @@ class CurveScorer(Scorer):
 
 
 def read_curve(path: Path) -> list[dict[str, float]]:
-    """The rows of a curve.csv; none if there is no file."""
+    """Return the rows of a curve.csv, without empty cells; an empty list if there is no file."""
     if not path.is_file():
         return []
     with path.open(encoding="utf-8", newline="") as file:
@@ -213,41 +225,52 @@ def read_curve(path: Path) -> list[dict[str, float]]:
 
 @dataclass(frozen=True)
 class Result:
+    """Result of one training: its folder and what its final.json holds."""
+
     folder: Path
     final: dict[str, Any]
 
     @cached_property
     def figures(self) -> dict[str, float]:
+        """Means over the episodes of the final score, by name."""
         return mean_figures(self.final["episodes"])
 
     @cached_property
     def curve(self) -> list[dict[str, float]]:
+        """Rows of curve.csv."""
         return read_curve(self.folder / CURVE)
 
 
 @dataclass(frozen=True)
 class Row:
+    """Entry with the results of the seeds that are done."""
+
     entry: Entry
     results: tuple[Result, ...]
 
     @property
     def title(self) -> str:
+        """Name of the entry in tables and pictures."""
         return self.entry.title
 
     @cached_property
     def scored(self) -> Scored:
+        """Figures over the seeds, with intervals, and those of each seed."""
         seeds = [one.figures for one in self.results]
         return Scored(self.title, over_seeds(seeds), seeds)
 
     @property
     def command(self) -> str:
-        """What trains its first seed."""
+        """Command that trains the first seed."""
         return shlex.join(["python", "-m", "agents.baselines_run", *Run(self.entry, 0).command()])
 
 
 def read_results(plan: Sequence[Entry], folder: Path) -> list[Row]:
-    """What is done of a plan; entries without a training that is done are left out. `DataFileError`: nothing
-    is done, or a result cannot be read or is not what the plan asks for."""
+    """Return the rows of a plan, those with at least one training that is done.
+
+    Raises:
+        DataFileError: nothing is done, or a result cannot be read or is not what the plan asks for.
+    """
     rows = []
     for entry in plan:
         folders = [folder / Run(entry, seed).name for seed in range(entry.seeds)]
@@ -260,7 +283,7 @@ def read_results(plan: Sequence[Entry], folder: Path) -> list[Row]:
 
 
 def read_result(entry: Entry, folder: Path) -> Result:
-    """One training, checked to have the arguments and hyperparameters that its entry has now."""
+    """Read one training, checked to have the arguments and hyperparameters that its entry has now."""
     try:
         result = Result(folder, parse_json((folder / FINAL).read_text(encoding="utf-8")))
     except (OSError, ValueError) as error:
@@ -280,12 +303,14 @@ def read_result(entry: Entry, folder: Path) -> Result:
 
 
 def expected_settings(entry: Entry) -> dict[str, Any]:
+    """Return the hyperparameters that an entry asks for."""
     settings = load_settings(FOLDER / f"{entry.algo}.yml", entry.env_id)
     return settings | dict(entry.params) | ({} if entry.steps is None else {"n_timesteps": entry.steps})
 
 
 def seconds_to(level: float, result: Result) -> float:
-    """Wall time of training [s] until the learning curve first reaches a return; infinite if it does not."""
+    """Return the wall time of training [s] until the learning curve first reaches a return; infinite if it
+    does not. The curve is linear between two scores."""
     before, *later = result.curve
     for row in later:
         if row["return"] >= level:
@@ -296,7 +321,7 @@ def seconds_to(level: float, result: Result) -> float:
 
 
 def versions_of(rows: Sequence[Row]) -> dict[str, str]:
-    """Versions that the trainings were made with; several of one package stand beside each other."""
+    """Return the versions that the trainings were made with; several of one package are listed together."""
     versions: dict[str, set[str]] = {}
     for one in (one for row in rows for one in row.results):
         for name, value in runs.read_record(one.folder)["versions"].items():
@@ -305,6 +330,7 @@ def versions_of(rows: Sequence[Row]) -> dict[str, str]:
 
 
 def main(argv: list[str] | None = None) -> int:
+    """Train, and return the exit code."""
     import tyro
 
     done = train_one(tyro.cli(Args, args=argv, prog="python -m agents.baselines_run", description=__doc__))

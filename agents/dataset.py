@@ -4,12 +4,12 @@
     python -m agents.dataset agents/policies/Horse-v0 --env-id hoof_env/Horse-v0
 
 A policy is what agents.score takes. Episode k of each policy is reset with seed + k and the options that its
-policy starts with, so that whatever resets `dataset.recover_environment()` likewise and takes the same
-actions sees the same numbers. Beside Minari's files lies manifest.json with the command, the versions, the
-licence, the returns of each policy and how its episodes start, and the SHA-256 of every file and of the files
-of trained policies. A dataset that is not whole is not kept: it is made in a folder of its own and moved.
+policy starts with, so that resetting `dataset.recover_environment()` likewise and taking the same actions
+gives the same numbers. Next to Minari's files lies manifest.json with the command, the versions, the licence,
+the returns of each policy and how its episodes start, and the SHA-256 of every file and of the files of
+trained policies. A dataset that is not whole is not kept: it is made in a folder of its own and moved.
 
-Minari's metadata say what the actions are: `load` and `check_actions` refuse a dataset whose actions are of
+Minari's metadata record the form of the actions: `load` and `check_actions` refuse a dataset with actions of
 another form, which may have the same shape.
 """
 
@@ -52,7 +52,7 @@ class Args:
     """Arguments of the command."""
 
     policies: Positional[tuple[str, ...]]
-    """whose episodes are kept, one policy after the other"""
+    """policies to play, one after the other"""
     env_id: str = "hoof_env/HorseLeg-v0"
     """the environment"""
     env_kwargs: tuple[str, ...] = ()
@@ -76,8 +76,13 @@ def main(argv: list[str] | None = None) -> None:
 
 
 def write(args: Args) -> Path:
-    """The folder of the dataset that the arguments ask for. `OutputError` where there is one already,
-    `ParameterError` of what cannot be played or named, `MissingExtraError` without Minari."""
+    """Write the dataset that the arguments ask for and return its folder.
+
+    Raises:
+        OutputError: there is a dataset already.
+        ParameterError: a policy, an id or a number does not fit.
+        MissingExtraError: Minari is not installed.
+    """
     try:
         import minari
         import minari.data_collector  # which asks for more than reading does
@@ -109,8 +114,12 @@ def write(args: Args) -> Path:
 
 
 def load(dataset_id: str) -> Any:
-    """A dataset as `minari.load_dataset` gives it. `DataFileError`: its actions are not what its environment
-    takes today; others as Minari's."""
+    """Load a dataset as `minari.load_dataset` does.
+
+    Raises:
+        DataFileError: its environment is not registered here, or takes actions of another form today.
+        MissingExtraError: Minari is not installed.
+    """
     try:
         import minari
     except ImportError:
@@ -123,8 +132,8 @@ def load(dataset_id: str) -> Any:
 
 
 def check_environment(dataset: Any) -> None:
-    """Refuse a dataset whose environment is not a registered one as it is registered: the name of code in it
-    would be imported. `DataFileError`."""
+    """Refuse a dataset if its environment is not a registered one as it is registered: `DataFileError`.
+    Otherwise the name of code in the dataset would be imported."""
     spec = dataset.spec.env_spec
     known = gym.registry.get(spec.id)
     task = str(spec.kwargs.get("task", ""))
@@ -138,7 +147,7 @@ def check_environment(dataset: Any) -> None:
 
 
 def check_actions(dataset: Any, env: Any) -> None:
-    """Refuse a dataset, to read it or to add to it, whose actions are not of the form that an environment
+    """Refuse a dataset, to read it or to add to it, if its actions are not of the form that the environment
     takes: `DataFileError`."""
     here = describe_actions(env)
     there = dataset.storage.metadata.get(ACTIONS)
@@ -151,6 +160,7 @@ def check_actions(dataset: Any, env: Any) -> None:
 
 
 def _check_policies(policies: Sequence[str]) -> None:
+    """Check that there is a policy, and none twice."""
     if not policies:
         raise ParameterError("policies: expected at least one, got none")
     for name, times in Counter(policies).items():
@@ -159,7 +169,7 @@ def _check_policies(policies: Sequence[str]) -> None:
 
 
 def check_id(dataset_id: str) -> str:
-    """The id, or `ParameterError` of one that Minari does not take; before anything is played."""
+    """Return the id; `ParameterError` if Minari does not take it, before anything is played."""
     if not ID.fullmatch(dataset_id):
         raise ParameterError(
             "dataset_id: expected NAMESPACE/NAME-vK of letters, digits, _ and -, the namespace of two or "
@@ -169,7 +179,8 @@ def check_id(dataset_id: str) -> str:
 
 
 def default_id(env_id: str, policies: Sequence[str]) -> str:
-    """Of policies on an environment; what an id cannot hold, as the points of numbers, is _ in it."""
+    """Return an id for policies on an environment; characters that an id cannot hold, as the points of
+    numbers, become _."""
     short = env_id.rpartition("/")[2].removesuffix("-v0")
     names = [Path(name).stem if Path(name).exists() else name for name in policies]
     plain = [re.sub(r"[^\w-]+", "_", part) for part in (short, "-".join(names))]
@@ -177,7 +188,7 @@ def default_id(env_id: str, policies: Sequence[str]) -> str:
 
 
 def policy_files(name: str) -> list[Path]:
-    """The files that a trained policy or a gait is read from; none of a scripted policy."""
+    """Return the files that a trained policy or a gait is read from; an empty list for a scripted policy."""
     path = Path(name)
     if name.endswith(".json"):
         return [path]
@@ -189,7 +200,7 @@ def policy_files(name: str) -> list[Path]:
 
 
 def plain_start(policy: Any) -> dict[str, Any]:
-    """Reset options that episodes of a policy begin with, as data that files can hold."""
+    """Return the reset options that episodes of a policy begin with, as data that files can hold."""
     start = start_of(policy)
     return {
         key: asdict(value) if isinstance(value, GaitParameters) else value for key, value in start.items()
@@ -197,7 +208,7 @@ def plain_start(policy: Any) -> dict[str, Any]:
 
 
 def _collect(minari: Any, env: Any, args: Args, episodes: int, dataset_id: str) -> dict[str, Any]:
-    """Play all episodes, and have Minari write them; returns of each policy."""
+    """Play all episodes, have Minari write them, and return the figures of each policy for the manifest."""
     from tqdm import tqdm
 
     policies = {name: find_policy(name, env, args.env_id) for name in args.policies}
@@ -243,6 +254,7 @@ def _collect(minari: Any, env: Any, args: Args, episodes: int, dataset_id: str) 
 
 
 def _write_manifest(folder: Path, args: Args, returns: dict[str, Any]) -> None:
+    """Write the manifest of a dataset, with the digests of all its files."""
     files = sorted(file for file in folder.rglob("*") if file.is_file())
     about = {
         "env_id": args.env_id,
@@ -257,6 +269,7 @@ def _write_manifest(folder: Path, args: Args, returns: dict[str, Any]) -> None:
 
 
 def _sha256(file: Path) -> str:
+    """Return the SHA-256 of a file, hexadecimal."""
     return hashlib.sha256(file.read_bytes()).hexdigest()
 
 

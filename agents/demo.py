@@ -3,7 +3,7 @@
     python -m agents.demo              into runs/demo, in a minute or two
     python -m agents.demo --quick      tiny numbers, only to see that everything works
 
-The paper's four conditions with every solver, published beside simulated; scripted gaits and the simplest
+The paper's four conditions with every solver, published next to simulated; scripted gaits and the simplest
 policies in hoof_env/HorseLeg-v0; a small PPO agent, trained for five seconds and scored on the same episodes;
 and report.html, one file with tables, figures and films. The folder is a run folder, too, which
 agents.evaluate plays. Ctrl-C leaves an older report as it was.
@@ -42,13 +42,13 @@ SLOW = 4  # how many times slower than life the films of the fixed trunk play
 
 @dataclass(frozen=True)
 class Budget:
-    """How long things may take.
+    """Limits of time and size.
 
     Attributes:
-        seconds: of learning; importing, compiling and scoring come on top.
-        steps: after which learning ends if it is through earlier, and to which rates of learning fall.
-        episodes: of each policy that is scored.
-        film_seconds: of each film.
+        seconds: time of learning [s]; importing, compiling and scoring come on top.
+        steps: steps at which learning ends if it is faster, and over which learning rates fall.
+        episodes: episodes of each policy that is scored.
+        film_seconds: length of each film [s].
         params: hyperparameters that differ from the file's.
     """
 
@@ -65,6 +65,8 @@ QUICK = Budget(60.0, 2_048, 2, 0.4, params=("n_envs=4", "n_steps=512", "batch_si
 
 @dataclass(frozen=True)
 class Args:
+    """Arguments of the command."""
+
     out: Path = Path("runs/demo")
     """folder of the report; an older report there is replaced when the new one is complete"""
     seed: int = 0
@@ -74,8 +76,12 @@ class Args:
 
 
 def demo(args: Args) -> Path:
-    """Do all four steps and return the path of the report. `OutputError`: the folder cannot be written.
-    `KeyboardInterrupt`: Ctrl-C; nothing was replaced."""
+    """Do all four steps and return the path of the report.
+
+    Raises:
+        OutputError: the folder cannot be written.
+        KeyboardInterrupt: Ctrl-C; nothing was replaced.
+    """
     check_number("seed", args.seed, low=0, high=FIRST_SEED - 1)
     check_folder(args.out)
     budget = QUICK if args.quick else FULL
@@ -108,11 +114,13 @@ def demo(args: Args) -> Path:
 
 
 def say(line: str) -> None:
+    """Print a line of a step's output."""
     print(f"      {line}", flush=True)
 
 
 @contextmanager
 def announced(number: int, title: str) -> Iterator[None]:
+    """Print the title of a step, and its time at the end."""
     print(f"[{number}/4] {title}", flush=True)
     started = time.monotonic()
     yield
@@ -143,8 +151,8 @@ def train_agent(args: Args, budget: Budget, stage: Path) -> train.Trained:
 
 
 def film_all(scores: Sequence[evaluate.Score], budget: Budget, stage: Path) -> list[dict[str, str]]:
-    """Film gaits and agent on their own trunk, and the gaits, slowly, on a fixed one; returns a title, a
-    caption and the film itself of each."""
+    """Film gaits and agent on their own trunk, and the gaits, slowly, on a fixed one; return title, caption
+    and film of each."""
     clips = []
     size = (640, 360)
     first_episodes = {score.policy: score.episodes[0] for score in scores}
@@ -173,6 +181,7 @@ def film_all(scores: Sequence[evaluate.Score], budget: Budget, stage: Path) -> l
 
 
 def print_counts(reproduction: Reproduction) -> None:
+    """Print how many published numbers each solver reproduces."""
     for solver in SOLVERS:
         say(f"{solver} solver: {counted(reproduction.rows, reproduction.shapes, solver)}")
 
@@ -185,8 +194,10 @@ def render(
     clips: Sequence[dict[str, str]],
     folder: Path,
 ) -> str:
-    """The report: one HTML page that holds its pictures and films and needs no network. The trained policy is
-    the last of `scores`; its run folder is `folder`, where the figures lie as SVG."""
+    """Return the report: one HTML page that holds its pictures and films and needs no network.
+
+    The trained policy is the last of `scores`; its run folder is `folder`, which also has the figures as SVG.
+    """
     *others, agent = scores
     episodes = len(agent.episodes)
     gaits = [score for score in others if score.policy in GAITS]
@@ -222,11 +233,13 @@ def render(
 
 
 def data_uri(path: Path) -> str:
+    """Return a file as a data URI."""
     kind = {".svg": "image/svg+xml", ".mp4": "video/mp4"}[path.suffix]
     return f"data:{kind};base64,{base64.b64encode(path.read_bytes()).decode('ascii')}"
 
 
 def main(argv: list[str] | None = None) -> None:
+    """Make the report."""
     import tyro
 
     started = time.monotonic()

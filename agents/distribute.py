@@ -41,6 +41,8 @@ SHIPPED = {
 
 @dataclass(frozen=True)
 class Cluster:
+    """Arguments of every command on a cluster."""
+
     what: Positional[Literal["trials"]] = "trials"
     """trainings, each a trial of Ray Tune"""
     address: str | None = None
@@ -51,13 +53,15 @@ class Cluster:
     """more for Ray's runtime_env on a cluster: key=value ..., or one JSON object, as
     '{"pip": ["numba", "stable-baselines3"]}'"""
     retries: int = 3
-    """of each trial whose worker dies or fails"""
+    """of each trial after its worker died or failed"""
     out: str = "runs/distribute"
     """folder that all machines see, or s3://... and the like; each experiment has its own folder there"""
 
 
 @dataclass(frozen=True)
 class Trials(Cluster, TrainingArgs):
+    """Arguments of the command."""
+
     seeds: int = 1
     """trainings of each setting, from seed 0 on"""
     space: tuple[str, ...] = ()
@@ -70,7 +74,7 @@ class Trials(Cluster, TrainingArgs):
 
 
 def parse_space(items: Sequence[str]) -> dict[str, list[Any]]:
-    """Read `key=[...]`; `ParameterError` if an item is something else or a key comes twice.
+    """Parse `key=[...]`; `ParameterError` if an item is something else or a key comes twice.
 
     >>> parse_space(["n_steps=[16, 32]", 'env.trunk=["rail"]'])
     {'n_steps': [16, 32], 'env.trunk': ['rail']}
@@ -100,7 +104,7 @@ def check_keys(keys: Iterable[str], algo: str, settings: Iterable[str]) -> None:
 
 
 def prepare(args: Trials) -> dict[str, Any]:
-    """The parameter space of `args`: constants, lists of what varies and of seeds; all checked."""
+    """Return the parameter space of `args`, checked: constants, lists of what varies and of seeds."""
     for name in ("seeds", "report_every", "cpus_per_trial"):
         check_number(name, getattr(args, name), low=1)
     algorithm_class(args.algo)
@@ -126,7 +130,7 @@ def prepare(args: Trials) -> dict[str, Any]:
 
 
 def run_trials(args: Trials) -> int:
-    """Run the trials of `args` that have not ended yet and write their table; returns its exit code."""
+    """Run the trials of `args` that have not ended yet, write their table and return its exit code."""
     plan = prepare(args)
     start(args)
     from ray import tune
@@ -169,13 +173,15 @@ def run_trials(args: Trials) -> int:
 
 
 def experiment_name(args: Trials) -> str:
-    """What the folder is called: a digest tells apart what was asked for, wherever it runs."""
+    """Return the folder's name, with a digest of the arguments that a result depends on; where it runs does
+    not count."""
     asked = {key: value for key, value in asdict(args).items() if key not in Cluster.__dataclass_fields__}
     digest = hashlib.sha256(json.dumps(asked, sort_keys=True).encode()).hexdigest()[:8]
     return f"{args.algo}-{args.env_id.rpartition('/')[2]}-{digest}"
 
 
 def _folder_name(trial: Any, varied: list[str]) -> str:
+    """Return the folder's name of a trial, at most 100 characters and its number."""
     text = ",".join(f"{key}={trial.config[key]}" for key in varied)
     number = trial.trial_id.rpartition("_")[2]
     return f"{number}-" + "".join(c if c.isalnum() or c in "=,.-_" else "_" for c in text)[:100]
@@ -183,7 +189,7 @@ def _folder_name(trial: Any, varied: list[str]) -> str:
 
 def start(args: Cluster) -> None:
     """Join the cluster at `args.address`, or make one of this machine's cores; `ParameterError` if Ray is not
-    installed, or no cluster at that address lets us in."""
+    installed, or the cluster cannot be reached."""
     if missing := [name for name in ("ray", "pandas") if not importlib.util.find_spec(name)]:
         raise ParameterError(
             f"expected ray[tune] to be installed, found no {', '.join(missing)}: "
@@ -213,6 +219,7 @@ def start(args: Cluster) -> None:
 
 
 def main(argv: list[str] | None = None) -> int:
+    """Run the trials and return the exit code."""
     import tyro
 
     return run_trials(tyro.cli(Trials, args=argv, prog="python -m agents.distribute", description=__doc__))

@@ -1,4 +1,4 @@
-"""What runs under Ray Tune: a training as a trial on a worker, and what is shown and kept of all trials."""
+"""Trials under Ray Tune: a training as a trial on a worker, and the progress and the table of all trials."""
 
 from __future__ import annotations
 
@@ -24,10 +24,12 @@ FIXED = ("train", "env_kwargs", "params", "report_every", "seed", "command")
 
 
 def train_trial(config: dict[str, Any]) -> None:
-    """Train as `config` says (`agents.distribute.prepare`); every `report_every` steps and at the end report
-    to Tune the score and, as a checkpoint, the run folder. A trial that is retried goes on from its last one.
-    One that diverges or whose settings do not fit would do so again: it ends with the reason as its figure
-    "failed"."""
+    """Train as `config` says (`agents.distribute.prepare`).
+
+    Every `report_every` steps and at the end it reports the score to Tune and, as a checkpoint, the run
+    folder. A trial that is retried goes on from its last checkpoint. One that diverges or has settings that
+    do not fit would do so again: it ends with the reason as its figure "failed".
+    """
     chosen = {key: value for key, value in config.items() if key not in FIXED}
     env_kwargs = config["env_kwargs"] | {
         k.removeprefix(ENV): v for k, v in chosen.items() if k.startswith(ENV)
@@ -59,9 +61,12 @@ def train_trial(config: dict[str, Any]) -> None:
 
 
 class Reporter(Scorer):
-    """Scores the policy, keeps a checkpoint and reports both to Tune. `last` is the last score: "return",
-    mean over the episodes of `CURVE_SEEDS`, "steps", and "train_s", seconds of training alone, also of
-    retried ones."""
+    """Scorer that keeps a checkpoint and reports it to Tune with the score.
+
+    Attributes:
+        last: the last score: "return", mean over the episodes of `CURVE_SEEDS`, "steps", and "train_s",
+            seconds of training alone, those of earlier tries included.
+    """
 
     def __init__(
         self, folder: Path, config: dict[str, Any], env_kwargs: dict[str, Any], last: dict[str, float]
@@ -85,6 +90,7 @@ class Reporter(Scorer):
             self._start_clock()
 
     def report(self) -> None:
+        """Report the last score with the run folder as its checkpoint."""
         checkpoint = tune.Checkpoint.from_directory(str(self.folder))
         checkpoint.set_metadata(self.last)
         tune.report(self.last, checkpoint=checkpoint)
@@ -94,8 +100,13 @@ FIGURES = ("return", "steps", "train_s")  # of a report
 
 
 class Progress(tune.Callback):
-    """A line for each score, and when a trial ends, when its worker died and when it goes on. `going` are the
-    ids of trials that had not ended at the last step; of the class, for Tune works with a copy."""
+    """Callback that prints a line for each score, and when a trial ends, when its worker died and when it
+    goes on.
+
+    Attributes:
+        going: ids of trials that had not ended at the last step; an attribute of the class, for Tune works
+            with a copy of the callback.
+    """
 
     going: ClassVar[set[str]] = set()
 
@@ -120,16 +131,19 @@ class Progress(tune.Callback):
 
 
 def write_line(trial: Any, what: str) -> None:
+    """Print a line about a trial."""
     print(f"trial {trial.trial_id.rpartition('_')[2]}: {what}", flush=True)
 
 
 def last_failure(trial: Any) -> str:
+    """Return the last failure of a trial in one line."""
     path = Path(trial.error_file or "")
     return reason(path.read_text() if path.is_file() else "")
 
 
 def reason(error: str) -> str:
-    """The last failure in one line: Ray puts the news first, but behind a traceback that of Python last."""
+    """Return the last failure in a line: Ray writes its message first, but after a traceback Python's is
+    last."""
     error = re.sub(r"\x1b\[[\d;]*m", "", error)
     lines = [line.strip() for line in error.rpartition("Failure #")[2].strip().splitlines()]
     lines = [line for line in lines if "(occurred at" not in line] or ["unknown."]
@@ -137,8 +151,8 @@ def reason(error: str) -> str:
 
 
 def write_table(results: Any, folder: str, varied: list[str]) -> int:
-    """Write `folder`/trials.csv where that is a path, print what came of the trials; returns the exit code:
-    0, 1 where a trial failed for good, 130 where one has not ended."""
+    """Write `folder`/trials.csv if that is a path, print the outcome of the trials, and return the exit code:
+    0, 1 if a trial failed for good, 130 if one has not ended."""
     rows = []
     reasons = []
     # Whether a trial is done stands in its status alone; but after Ctrl-C all look as if they were

@@ -49,6 +49,6 @@ def generations(
 
 
 def mean_costs(returns: Floats, starts: int) -> list[float]:
-    """Return minus the mean return of each candidate from its episodes, `starts` one after the other."""
+    """Return minus the mean return of each candidate; its episodes, from `starts` starts, are consecutive."""
     costs: list[float] = (-returns.reshape(-1, starts).mean(1)).tolist()
     return costs

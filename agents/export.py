@@ -4,8 +4,9 @@
 
 The file maps observations of the environment, shape (batch, k), to deterministic actions, (batch, n), float32
 both: the normalisation of observations and the limits of actions are inside. It is kept only if it gives the
-actions of the model it was made from. What it is for stands in its metadata (`hoof_env/saved_policy.py`).
-A .zip is a pickle and can run any code when it is loaded: give only files that you trust. ONNX is data.
+actions of the model it was made from. Its metadata describe the environment and the actions
+(`hoof_env/saved_policy.py`). A .zip is a pickle and can run any code when it is loaded: give only files that
+you trust. ONNX is data.
 """
 
 from __future__ import annotations
@@ -39,6 +40,8 @@ TOLERANCE = 1e-5  # by how much an action may differ, as a part of the half rang
 
 @dataclass(frozen=True)
 class Args:
+    """Arguments of the command."""
+
     model: Positional[Path]
     """run folder of agents.train, or a .zip of Stable-Baselines3"""
     out: Path
@@ -48,9 +51,15 @@ class Args:
 
 
 def export(model: Path, out: Path, env_id: str | None = None) -> float:
-    """Write the policy of a run folder or .zip to an .onnx, for `env_id` or what run.json says, and return
-    the largest difference of an action, as in `TOLERANCE`. `ParameterError`: another suffix, or no
-    environment known. `DataFileError`: no such model. Others as `write_policy`."""
+    """Write the policy of a run folder or .zip to an .onnx, for `env_id` or the id in run.json.
+
+    Returns:
+        The largest difference of an action, as in `TOLERANCE`.
+
+    Raises:
+        ParameterError: another suffix, or no environment known; others as `write_policy`.
+        DataFileError: there is no such model; others as `write_policy`.
+    """
     check_place(out, [".onnx"])
     saved = runs.SavedModel.find(model)
     env_id, kwargs = environment_of(saved.path, saved.record, env_id)
@@ -63,7 +72,8 @@ def export(model: Path, out: Path, env_id: str | None = None) -> float:
 
 
 def about(env: Any, env_id: str, env_kwargs: dict[str, Any], record: dict[str, Any]) -> dict[str, Any]:
-    """The metadata of a policy for an environment; `record` is the run.json of its training, or empty."""
+    """Return the metadata of a policy for an environment; `record` is the run.json of its training, or
+    empty."""
     known = {key: str(record[key]) for key in ("algo", "seed") if key in record}
     settings = record.get("settings") or settings_of(env)
     made_with = record.get("versions", {}).get("hoof-env", hoof_env.__version__)
@@ -72,9 +82,13 @@ def about(env: Any, env_id: str, env_kwargs: dict[str, Any], record: dict[str, A
 
 
 def write_policy(trained: runs.TrainedPolicy, out: Path, metadata: dict[str, Any]) -> float:
-    """Write a policy to `out`, an older file is replaced, and return the largest difference of an action.
-    `ParameterError`: it observes or does something else than vectors, or remembers. `DataFileError`: the file
-    does not act as the policy does; it is not kept. `HoofEnvError`: a package is missing."""
+    """Write a policy to `out`, replacing an older file, and return the largest difference of an action.
+
+    Raises:
+        ParameterError: it observes or does something else than vectors, or remembers.
+        DataFileError: the file does not act as the policy does; it is not kept.
+        HoofEnvError: a package is missing.
+    """
     observations = some_observations(trained.model.observation_space)
     module = module_of(trained)
     with staged(out.parent) as stage:
@@ -88,8 +102,8 @@ def write_policy(trained: runs.TrainedPolicy, out: Path, metadata: dict[str, Any
 
 
 def statistics_of(normalize: Any) -> tuple[Any, Any, float] | None:
-    """What the `normalize` of a `TrainedPolicy` does, None for nothing: observations minus a mean by a scale,
-    shape (k,), float64, then within a limit of 0."""
+    """Return the normalisation in the `normalize` of a `TrainedPolicy`, None if there is none: mean and
+    scale, shape (k,), float64, and the limit to which (observation - mean) / scale is clipped."""
     from stable_baselines3.common.vec_env import VecNormalize
 
     source = getattr(normalize, "__self__", normalize)  # it may be a method of `VecNormalize`
@@ -103,7 +117,8 @@ def statistics_of(normalize: Any) -> tuple[Any, Any, float] | None:
 
 
 class Deterministic(torch.nn.Module):
-    """From observations to the deterministic actions of a `TrainedPolicy`, as its `predict` computes them."""
+    """Module from observations to the deterministic actions of a `TrainedPolicy`, as its `predict` computes
+    them."""
 
     low: Any
     high: Any
@@ -124,6 +139,7 @@ class Deterministic(torch.nn.Module):
             self.register_buffer("scale", torch.as_tensor(scale))
 
     def forward(self, observation: Any) -> Any:
+        """Return actions, shape (batch, n), for observations, shape (batch, k)."""
         if self.clip is not None:
             scaled = (observation.double() - self.mean) / self.scale
             observation = scaled.clamp(-self.clip, self.clip).float()
@@ -134,8 +150,8 @@ class Deterministic(torch.nn.Module):
 
 
 def module_of(trained: runs.TrainedPolicy) -> Any:
-    """The policy as a torch module that is ready to be traced; `ParameterError` for a recurrent one, or
-    actions that are not vectors."""
+    """Return the policy as a torch module that is ready to be traced; `ParameterError` for a recurrent one,
+    or actions that are not vectors."""
     policy = trained.model.policy
     space = trained.model.action_space
     if not isinstance(space, gym.spaces.Box) or len(space.shape) != 1 or hasattr(policy, "lstm_actor"):
@@ -145,8 +161,8 @@ def module_of(trained: runs.TrainedPolicy) -> Any:
 
 
 def some_observations(space: gym.Space[Any]) -> Any:
-    """`TRIED` random observations, a few of them far outside of what is usual, shape (TRIED, k), float32;
-    `ParameterError` for a space that is not of vectors."""
+    """Return `TRIED` random observations, shape (TRIED, k), float32, a tenth of them far outside the usual
+    range; `ParameterError` for a space that is not of vectors."""
     if not isinstance(space, gym.spaces.Box) or len(space.shape) != 1:
         raise ParameterError(f"model: expected one that observes vectors, got {space}")
     space.seed(0)
@@ -157,7 +173,7 @@ def some_observations(space: gym.Space[Any]) -> Any:
 
 @contextmanager
 def _quietly() -> Iterator[None]:
-    """Without the exporter's notes and without the checks of distributions, which cannot be traced."""
+    """Suppress the exporter's notes, and torch's checks of distributions, which cannot be traced."""
     from torch.distributions import Distribution
 
     logger = logging.getLogger("torch.onnx")
@@ -202,7 +218,8 @@ def write_onnx(module: Any, example: Any, path: Path, metadata: dict[str, Any]) 
 
 
 def difference(trained: Any, predict: Any, observations: Any) -> float:
-    """The largest difference of an action, many observations at once and one alone, NaN if one is none."""
+    """Return the largest difference of an action in half ranges, many observations at once and one alone; NaN
+    if an action is NaN."""
     space = trained.model.action_space
     half = (space.high - space.low) / 2
     wanted, _ = trained.predict(observations)
@@ -212,6 +229,7 @@ def difference(trained: Any, predict: Any, observations: Any) -> float:
 
 
 def main(argv: list[str] | None = None) -> None:
+    """Export, and print the difference."""
     import tyro
 
     args = tyro.cli(Args, args=argv, prog="python -m agents.export", description=__doc__)

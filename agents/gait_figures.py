@@ -1,12 +1,13 @@
-"""What a policy on the horse does at a commanded speed: forces, stances, slip, lag, cost of transport.
+"""Figures of a policy on the horse at a commanded speed: forces, stances, slip, lag, cost of transport.
 
-Most figures are made of the engine's sums over all episodes that did not end early. Those that need forces at
-every substep are of such among the first `WATCHED`, whose substeps are run again: the lag, the force over a
-stance, and its peaks of braking and propulsion, the highest horizontal force backward and forward of each
-whole stance (0 where there is none), averaged over stances.
+Most figures come from the engine's sums over all episodes that did not end early. Those that need forces at
+every substep are of such episodes among the first `WATCHED`, for which a record is kept: the lag, the force
+over a stance, and its peaks of braking and propulsion, the highest horizontal force backward and forward of
+each whole stance (0 if there is none), averaged over stances.
 
-Left and right legs of a pair are interchangeable in the plane: the lag is how long after a hind hoof the next
-fore hoof lands, over the stride and within half of one, so that 0 is a trot or a pace and 0.25 a walk.
+Left and right legs of a pair are interchangeable in the plane: the lag is the time from the landing of a hind
+hoof to the next landing of a fore hoof, over the stride and within half of one, so that 0 is a trot or a pace
+and 0.25 a walk.
 """
 
 from __future__ import annotations
@@ -37,7 +38,15 @@ HORIZONTAL = ("braking", "propulsion")  # forces backward and forward
 
 @dataclass
 class Stance:
-    """One stance: hoof, times [s], normal force and horizontal one, forward, [N] at every substep."""
+    """Stance of one hoof.
+
+    Attributes:
+        leg: number of the leg, as in `LEGS`.
+        began: time of landing [s].
+        ended: time of the last load [s].
+        force: normal force at every substep [N].
+        push: horizontal force, positive forward, at every substep [N].
+    """
 
     leg: int
     began: float
@@ -47,8 +56,8 @@ class Stance:
 
     @property
     def is_two_peaked(self) -> bool:
-        """Whether the force, smoothed over a tenth of the stance, has two peaks, neither one nor three. A
-        peak is within the stance and `DIP` of the highest force above what is on either side of it."""
+        """True if the force, smoothed over a tenth of the stance, has two peaks, neither one nor three. A
+        peak is within the stance and `DIP` of the highest force above the dips on either side of it."""
         from scipy.signal import find_peaks
 
         width = max(len(self.force) // 10, 1)
@@ -69,15 +78,15 @@ class Stance:
 
 @dataclass
 class Played:
-    """What episodes were from `SETTLED` on, n of them.
+    """Sums over n episodes from `SETTLED` on.
 
     Attributes:
-        seconds: that they are about [s].
-        sums: of the engine over this time, each shape (4, n).
-        travelled: [m], shape (n,).
-        turns: of the cranks [-], shape (4, n).
-        upright: which did not end early, shape (n,).
-        watched: of the first `WATCHED`, what `forces_of` takes.
+        seconds: time that they cover [s].
+        sums: sums of the engine over this time, each shape (4, n).
+        travelled: distance [m], shape (n,).
+        turns: turns of the cranks [-], shape (4, n).
+        upright: True for episodes that did not end early, shape (n,).
+        watched: records of the first `WATCHED` episodes, as `forces_of` takes them.
     """
 
     seconds: float
@@ -89,7 +98,7 @@ class Played:
 
 
 def stances_of(time: Floats, forces: Floats, pushes: Floats, lift_off: float) -> list[Stance]:
-    """Whole stances in a record, normal and horizontal forces of shape (n, 4)."""
+    """Return the whole stances in a record; normal and horizontal forces have shape (n, 4)."""
     found = []
     for leg in range(forces.shape[1]):
         loaded = np.concatenate([[False], forces[:, leg] > lift_off, [False]])
@@ -103,7 +112,8 @@ def stances_of(time: Floats, forces: Floats, pushes: Floats, lift_off: float) ->
 
 
 def lag_of(stances: list[Stance], stride: float) -> float:
-    """From hind to fore hooves [strides], within half a stride, as a circular mean; NaN without any."""
+    """Return the lag from hind to fore hooves [strides], within half a stride, as a circular mean; NaN
+    without landings. `stride` is the duration of a stride [s]."""
     fore = np.array([one.began for one in stances if one.leg < 2])
     hind = np.array([one.began for one in stances if one.leg >= 2])
     if not len(fore) or not len(hind):
@@ -113,7 +123,7 @@ def lag_of(stances: list[Stance], stride: float) -> float:
 
 
 def watch(envs: Any, policy: Any, speed: float, gait: Floats | None = None) -> Played:
-    """Play episodes at one commanded speed [m/s], perhaps around a gait of one's own, shape (16,)."""
+    """Play episodes at one commanded speed [m/s]; `gait`, shape (16,), replaces the reference gait."""
     seeds = [3_000_000 + k for k in range(envs.num_envs)]
     around = {} if gait is None else {"gait": gait}
     seen, _ = envs.reset(seed=seeds, options={**start_of(policy), "target_speed": speed, **around})
@@ -147,13 +157,13 @@ def watch(envs: Any, policy: Any, speed: float, gait: Floats | None = None) -> P
 
 
 def _place(measured: Any) -> Floats:
-    """Place [m] and crank angles [rad], shape (5, n)."""
+    """Return position [m] and crank angles [rad], shape (5, n)."""
     return np.array([measured[name] for name in ("x", *(f"{leg}_theta" for leg in LEGS))])
 
 
 def play(envs: Any, policy: Any, speed: float, gait: Floats | None = None) -> dict[str, Any]:
-    """Episodes at one commanded speed [m/s]: figures of each pair of legs, means over the episodes that did
-    not end early; and stances of those that are watched."""
+    """Play episodes at one commanded speed [m/s] and return their figures: of each pair of legs, as means
+    over the episodes that did not end early, and stances of watched ones."""
     played = watch(envs, policy, speed, gait)
     height = envs.batch.body.height
     kilograms = float(envs.weight[0]) / GRAVITY
@@ -168,12 +178,13 @@ def play(envs: Any, policy: Any, speed: float, gait: Floats | None = None) -> di
 
 
 def froude_of(speed: float, height: float) -> float:
-    """Froude number [-] of a speed [m/s] at a height of the hips [m]."""
+    """Return the Froude number [-] of a speed [m/s] at a height of the hips [m]."""
     return speed**2 / (GRAVITY * height)
 
 
 def _from_sums(played: Played, kilograms: float, height: float) -> dict[str, float]:
-    """Figures that the engine's sums have, of upright episodes of an animal with its hips at a height [m]."""
+    """Return the figures that the engine's sums give, over upright episodes of an animal with its hips at
+    `height` [m] and a mass of `kilograms`."""
     upright = played.upright
     travelled = played.travelled[played.upright]
     found = stance_figures(played.sums, played.seconds, played.turns)
@@ -201,7 +212,8 @@ def _from_sums(played: Played, kilograms: float, height: float) -> dict[str, flo
 
 
 def _from_stances(played: Played, kilograms: float) -> dict[str, Any]:
-    """Figures that need the forces at every substep, of watched episodes that are upright; NaN if none is."""
+    """Return the figures that need the forces at every substep, over watched episodes that are upright; NaN
+    if there are none."""
     period = played.seconds / float(played.turns.mean(0)[played.upright].mean())
     lift_off = LIFT_OFF * kilograms * GRAVITY / len(LEGS)
     stances = []
@@ -228,11 +240,13 @@ def _from_stances(played: Played, kilograms: float) -> dict[str, Any]:
 
 
 def _mean(values: list[Any]) -> float:
+    """Return the mean, NaN without values."""
     return float(np.mean(values)) if values else float("nan")
 
 
 def footfall_of(stances: list[Stance], end: float, span: float) -> list[list[float]]:
-    """Leg, begin and end [s] of the stances in the last `span` [s] of a record that ends there."""
+    """Return leg, begin and end [s] of the stances in the last `span` [s] of a record that ends at `end`
+    [s]."""
     begin = end - span
     return [
         [one.leg, round(max(one.began - begin, 0.0), 4), round(one.ended - begin, 4)]
@@ -242,13 +256,13 @@ def footfall_of(stances: list[Stance], end: float, span: float) -> list[list[flo
 
 
 def mean_lag(lags: list[float]) -> float:
-    """Of lags within half a stride, which is a whole turn."""
+    """Return the circular mean of lags within half a stride, which counts as a whole turn."""
     return float(np.angle(np.nanmean(np.exp(4j * np.pi * np.array(lags)))) / (4 * np.pi) % 0.5)
 
 
 def forces_of(records: list[dict[str, Floats]]) -> tuple[Floats, Floats, Floats]:
-    """Times, shape (n,), and normal and horizontal forces of the legs, shape (n, 4), of records one after the
-    other."""
+    """Return times, shape (n,), and normal and horizontal forces of the legs, shape (n, 4), of consecutive
+    records."""
     time, toe, heel, toe_push, heel_push = (
         np.concatenate([record[name] for record in records]) for name in ("time", *FORCES)
     )
@@ -256,7 +270,7 @@ def forces_of(records: list[dict[str, Floats]]) -> tuple[Floats, Floats, Floats]
 
 
 def curve_of(stances: list[Stance], mass: float) -> list[float]:
-    """Mean normal force [N/kg] at each hundredth of a stance."""
+    """Return the mean normal force [N/kg] at each hundredth of a stance."""
     grid = np.linspace(0, 1, 101)
     curves = [np.interp(grid, np.linspace(0, 1, len(one.force)), one.force) for one in stances]
     return [round(float(x), 4) for x in np.mean(curves, 0) / mass] if curves else []

@@ -1,11 +1,11 @@
 """Reference gaits of the horse, found by CMA-ES: `python -m agents.horse_gaits`.
 
 The search plays zero actions on `hoof_env/Horse-v0` around gaits of its own and knows nothing but the return,
-with weights of its own.
-It begins from nothing at Froude number 0.25, and then asks for a little more speed every few generations, or
-for less, so that neighbours are alike: actions set offsets to what is between them. A second family,
-trot-like, has the weights of the task and is asked besides to land fore and hind hooves at once, and once a
-stride, as horses do in a trot or a pace. What was found already is not searched for again.
+with weights of its own. It begins from nothing at Froude number 0.25, and then commands a little more speed
+every few generations, or less, so that neighbours are alike: actions set offsets to gaits interpolated
+between them. A second family, trot-like, has the weights of the task and must also land fore and hind hooves
+at the same time, and once a stride, as horses do in a trot or a pace. Searches that are in the file are not
+made again.
 """
 
 from __future__ import annotations
@@ -57,7 +57,7 @@ TROT_FROUDE = 0.5  # where the trot-like family begins
 LAG = 600.0  # what a stride between the landings of hind and fore hooves costs a trot-like gait
 TROT = 0.05
 SLIP = 0.1
-"""Largest lag [strides] and slip of a stance [m] of what is shipped as trot-like: as for agents."""
+"""Largest lag [strides] and slip of a stance [m] of shipped trot-like gaits: as for agents."""
 
 WEIGHTS = {
     "alive": 11.0,
@@ -69,11 +69,12 @@ WEIGHTS = {
     "pitch": 4.0,
     "fall": 20.0,
 }
-"""Of the reward of the search for the reference gaits: a first reward of the task, which charges less for
-slip than that of today."""
+"""Reward weights of the search for the reference gaits: an early reward of the task, which charges less for
+slip than today's."""
 
 TROT_WEIGHTS = {"landing": 2.0}
-"""What the search for trot-like gaits changes of the task's: with less, hind hooves land twice a stride."""
+"""Reward weights of the search for trot-like gaits that differ from the task's: with a smaller one for
+landing, hind hooves land twice a stride."""
 
 CENTRE = (1.05, 0.45, -0.7, 0.0, 0.0)  # swing about which a search from nothing begins [rad]
 SPANS = (0.5, 0.4, 0.4, 0.3, 0.3)
@@ -83,22 +84,28 @@ PART = 0.6
 
 
 def decode(x: Floats) -> Floats:
-    """Gaits from points of the box [-1, 1], both of shape (n, 16)."""
+    """Convert points of the box [-1, 1] to gaits, both of shape (n, 16)."""
     low = [RATE[0], -0.5, *[-PART, -PART, *np.subtract(CENTRE, SPANS)] * len(PAIRS)]
     high = [RATE[1], 0.5, *[PART, PART, *np.add(CENTRE, SPANS)] * len(PAIRS)]
     return np.clip(low + (x + 1) / 2 * np.subtract(high, low), *bounds())
 
 
 def encode(gaits: Floats) -> Floats:
-    """Inverse of `decode`, within the box."""
+    """Convert gaits, shape (n, 16), to points within the box; the inverse of `decode`."""
     low = decode(-np.ones((1, gaits.shape[-1])))
     high = decode(np.ones((1, gaits.shape[-1])))
     return np.clip(2 * (gaits - low) / (high - low) - 1, -1, 1)
 
 
 class BatchRollout:
-    """Many horses that are asked for one speed [m/s], on ground of a stiffness [N/m^1.5] perhaps. Terms of
-    the reward that `weights` lacks have the task's."""
+    """Batch of horses with one commanded speed.
+
+    Args:
+        speed: commanded speed [m/s].
+        num_envs: horses.
+        weights: terms of the reward; those left out have the task's weights.
+        **settings: more arguments of the environment.
+    """
 
     def __init__(
         self, speed: float, num_envs: int, weights: Mapping[str, float] = WEIGHTS, **settings: Any
@@ -118,8 +125,13 @@ class BatchRollout:
     def play(
         self, gaits: Floats, seed: int, starts: int = STARTS
     ) -> tuple[Floats, list[dict[str, float]], Floats]:
-        """Returns of the first episodes of some gaits, shape (n, 16), their figures and lags [strides]. So
-        many after each other meet different starts, the same as the next ones."""
+        """Play the first episodes of gaits, shape (n, 16).
+
+        Consecutive gaits meet `starts` different starts, which then repeat.
+
+        Returns:
+            Returns, shape (n,), summaries of the episodes, and lags [strides], shape (n,).
+        """
         envs = self.envs
         n = len(gaits)
         envs.reset(seed=[seed + k % starts for k in range(n)], options={"gait": gaits})
@@ -146,9 +158,15 @@ class BatchRollout:
 
 
 def landings(gaits: Floats, theta: Floats) -> NDArray[np.complex128]:
-    """Where fore hooves land beside hind ones in gaits, shape (n, 16), whose hooves land at crank angles
-    [rad], shape (4, n): a mean of e^(4 pi i lag), with the time from hind to fore as the lag [strides]. Left
-    and right are half a stride apart, so half a stride is a whole turn of it."""
+    """Return the mean of e^(4 pi i lag) over hooves, shape (n,), where the lag [strides] is the time from
+    hind to fore.
+
+    Left and right are half a stride apart, so half a stride counts as a whole turn.
+
+    Args:
+        gaits: gaits, shape (n, 16).
+        theta: crank angles at which the hooves land [rad], shape (4, n).
+    """
     at = []
     for k, numbers in enumerate(gaits[:, 2:].reshape(len(gaits), len(PAIRS), -1).transpose(1, 2, 0)):
         stride = Stride(numbers[0], numbers[1])
@@ -161,15 +179,17 @@ def landings(gaits: Floats, theta: Floats) -> NDArray[np.complex128]:
 
 
 def _complex(pair: tuple[Floats, Floats]) -> NDArray[np.complex128]:
+    """Return a complex number from its real and imaginary part."""
     return pair[0] + 1j * pair[1]
 
 
 class Search:
-    """A CMA-ES whose commanded speed may change on the way.
+    """CMA-ES with a commanded speed that may change on the way.
 
     Args:
-        first: a gait to begin with, shape (16,); None is from nothing.
-        lag: what a stride between the landings of hind and fore hooves costs; with any, the weights are
+        seed: seed of the search and of its episodes.
+        first: gait to begin with, shape (16,); None begins from nothing.
+        lag: cost of a stride between the landings of hind and fore hooves; if not 0, the weights are
             `TROT_WEIGHTS`.
     """
 
@@ -183,11 +203,12 @@ class Search:
         self.strategy = make_strategy(start, spread, POPULATION, seed + 1)
 
     def gaits(self, points: Any) -> Floats:
-        """Of points of the box, shape (n, 16)."""
+        """Convert points of the box, shape (n, 16), to gaits."""
         return decode(np.clip(np.asarray(points), -1, 1))
 
     def run(self, speed: float, count: int, tick: Any) -> dict[str, Any]:
-        """Search on at a commanded speed [m/s]; what the mean of the distribution is worth there."""
+        """Search for `count` generations at a commanded speed [m/s]; return the gait at the mean of the
+        distribution and its figures."""
         course = BatchRollout(speed, POPULATION * STARTS, TROT_WEIGHTS if self.lag else WEIGHTS)
         highest = -np.inf
 
@@ -230,12 +251,12 @@ class Args:
 
 
 def speed_of(froude: float) -> float:
-    """[m/s], of a Froude number."""
+    """Return the speed [m/s] of a Froude number."""
     return float(np.sqrt(froude * GRAVITY * HIP_HEIGHT))
 
 
 class Finder:
-    """Finds what the file lacks, and writes it after every search."""
+    """Searches for what the file lacks; the file is written after every search."""
 
     def __init__(self, args: Args) -> None:
         self.args = args
@@ -244,7 +265,7 @@ class Finder:
             self.content = parse_json(args.out.read_text(encoding="utf-8"))
 
     def keep(self, name: str, look: Any) -> list[dict[str, Any]]:
-        """What a search found under this name, or finds now."""
+        """Return the steps that a search found under this name, or finds now."""
         from tqdm import tqdm
 
         if name not in self.content["searches"]:
@@ -269,7 +290,8 @@ class Finder:
     def ramp(
         self, search: Search, first: float, ratio: float, last: float, tick: Any
     ) -> list[dict[str, Any]]:
-        """Change the speed by a ratio until it is `last`, or the horse falls."""
+        """Change the speed by a ratio until it is `last`, or the horse falls; return the gait of each
+        step."""
         steps = []
         speed = first
         for _ in range(MOST):
@@ -282,7 +304,7 @@ class Finder:
         return steps
 
     def family(self, name: str, froude: float = FROUDE, lag: float = 0.0) -> None:
-        """A gait from nothing, and where more and less speed lead from there."""
+        """Find a gait from nothing, and gaits of higher and lower speeds from there."""
         args = self.args
         speed = speed_of(froude)
         begins = [
@@ -303,9 +325,12 @@ class Finder:
 
 
 def trunk_series(gait: list[float], speed: float) -> list[list[float]]:
-    """How the trunk moves in a gait that keeps a speed [m/s]: height over that of the hips [-], speed over
-    its mean [-] and pitch [rad], of each the mean, and cosine and sine coefficients of `HARMONICS` harmonics
-    of half a stride; what `reference.trunk_motion` reads."""
+    """Return the motion of the trunk in a gait that keeps a speed [m/s], as `reference.trunk_motion` reads
+    it.
+
+    These are height over that of the hips [-], speed over its mean [-] and pitch [rad]: of each the mean, and
+    cosine and sine coefficients of `HARMONICS` harmonics of half a stride.
+    """
     course = BatchRollout(speed, 64, episode_seconds=2 * SECONDS)
     envs = course.envs
     numbers = np.array(gait)
@@ -335,20 +360,23 @@ def trunk_series(gait: list[float], speed: float) -> list[list[float]]:
 
 
 def slip_at(gait: list[float], speed: float) -> float:
-    """How far the hooves of a gait slide in a stance once it goes at its speed [m/s]: the larger mean of fore
-    and hind hooves [m], infinite where more than a tenth of the horses fall."""
+    """Return the slip of a stance of a gait at its speed [m/s], once it is settled: the larger mean of fore
+    and hind hooves [m], infinite if more than a tenth of the horses fall."""
     envs: Any = make_rows("hoof_env/Horse-v0", 32)
     figures = gait_figures.play(envs, make_policy("reference", envs), speed, np.array(gait))
     return max(figures["slip_fore"], figures["slip_hind"]) if figures["fell"] < STABLE else np.inf
 
 
 def shipped(searches: dict[str, Any]) -> dict[str, Any]:
-    """What comes with the package, but for how the trunk moves. Gaits go by the speed that they have, not by
-    the one that was asked for; of those within `NEAR` of a knot it is the one that slips least. By name there
-    are the reference at Froude number 0.25, the fastest one of all, and the fastest that the task may command
-    of the trot-like ones that slip little."""
+    """Return the gaits that come with the package, without the motion of the trunk.
+
+    Gaits are filed under the speed that they reach, not the commanded one; of those within `NEAR` of a knot
+    it is the one that slips least. By name there are the reference at Froude number 0.25, the fastest one of
+    all, and the fastest that the task may command of the trot-like ones that slip little.
+    """
 
     def steps_of(family: str) -> list[dict[str, Any]]:
+        """Return the upright steps of a family: the best start, and the ramps from it."""
         begins = [found["steps"][0] for name, found in searches.items() if name[:-1] == f"{family} "]
         steps = sorted(begins, key=lambda step: float(step["return"]))[-1:]  # the others are another gait
         for way in ("faster", "slower"):
@@ -356,10 +384,12 @@ def shipped(searches: dict[str, Any]) -> dict[str, Any]:
         return [step for step in steps if step["failed"] < STABLE]
 
     def near(steps: list[dict[str, Any]], speed: float) -> dict[str, Any] | None:
+        """Return the step near a speed that slips least, None if there is none."""
         close = [step for step in steps if abs(step["speed_m_s"] / speed - 1) < NEAR]
         return min(close, key=lambda step: float(step["slip_m"])) if close else None
 
     def may_be_commanded(trot: dict[str, Any]) -> bool:
+        """True if the task commands the speed of a trot and the trot slips little."""
         speed = float(trot["speed_m_s"])
         return speed <= speed_of(HIGHEST) and slip_at(trot["gait"], speed) < SLIP
 

@@ -1,17 +1,17 @@
-"""What policies on the horse look like beside living horses.
+"""Policies on the horse compared with living horses.
 
     python -m agents.judge reference
     python -m agents.judge runs/ppo-Horse-v0-s0 runs/ppo-Horse-v0-s1 --out runs/judge
 
-A policy is what agents.score takes. It is asked for one speed after the other, each kept for a whole episode;
-the first two seconds do not count. `agents/judges.json` has the horse's figures, their sources and the bars;
+A policy is what agents.score takes. It is given one speed after the other, each kept for a whole episode; the
+first two seconds do not count. `agents/judges.json` has the horse's figures, their sources and the bars;
 nothing in it may enter a reward, a search or a choice of settings.
 
-A horse's figure at a Froude number stands beside that of the gait whose speed comes nearest. Ours counts only
-where the policy falls in a tenth of the episodes at most and keeps the commanded speed to 15 %, where the
-hooves slip less than 0.10 m a stance and land 0.95 to 1.05 times a turn of their crank, and where the Froude
-number of the speed that was reached is within 0.1 of the horse's. The last does not hold for the peaks of a
-trot: they stand beside the trot-like gait nearest Froude number 1, but not below 0.35, where horses walk.
+A horse's figure at a Froude number is compared with that of the gait at the nearest speed. Ours counts only
+if the policy falls in a tenth of the episodes at most and keeps the commanded speed to 15 %, the hooves slip
+less than 0.10 m a stance and land 0.95 to 1.05 times a turn of their crank, and the Froude number of the
+speed that was reached is within 0.1 of the horse's. The last does not hold for the peaks of a trot: they are
+compared with the trot-like gait nearest Froude number 1, but not below 0.35, a speed at which horses walk.
 
 Of several policies, as the seeds of an algorithm, there is a table of all, too: means with 95 % intervals.
 """
@@ -70,7 +70,7 @@ class Args:
 
 
 def rejection_reason(figures: dict[str, Any], pairs: Sequence[str]) -> str:
-    """Why the figures of these pairs of legs do not count at any speed; empty where they do."""
+    """Return why the figures of these pairs of legs do not count at any speed; an empty text if they do."""
     found = []
     if figures["fell"] > MOST_FALLS:
         found.append(f"fell in {100 * figures['fell']:.3g} % of episodes")
@@ -88,7 +88,7 @@ def rejection_reason(figures: dict[str, Any], pairs: Sequence[str]) -> str:
 
 
 def distance(figures: dict[str, Any], froude: float) -> float:
-    """Between the Froude number that was reached and another."""
+    """Return the distance between the Froude number that was reached and another."""
     return abs(float(figures["froude_reached"]) - froude)
 
 
@@ -97,14 +97,14 @@ def distance(figures: dict[str, Any], froude: float) -> float:
 
 @dataclass(frozen=True)
 class Gait:
-    """What a judge looks at: a gait at one speed, or why there is none, or why it is not comparable."""
+    """Gait at one speed that is judged, or why there is none, or why it is not comparable."""
 
     figures: dict[str, Any] | None
     flaw: str = ""
 
 
 def at_speed(froude: float, some: list[dict[str, Any]], what: str = "gait", near: float = NEAR) -> Gait:
-    """The gait whose speed comes nearest a Froude number; flawed where that is not near."""
+    """Return the gait with the speed nearest a Froude number; it has a flaw if that is not near."""
     if not some:
         return Gait(None, f"there is no {what}")
     one = min(some, key=lambda one: distance(one, froude))
@@ -112,12 +112,12 @@ def at_speed(froude: float, some: list[dict[str, Any]], what: str = "gait", near
 
 
 def trots_of(standing: list[dict[str, Any]]) -> list[dict[str, Any]]:
-    """Gaits whose lag is that of a trot or a pace."""
+    """Return the gaits with the lag of a trot or a pace."""
     return [one for one in standing if min(one["lag"], 0.5 - one["lag"]) < TROT]
 
 
 def pairs_of(name: str) -> Sequence[str]:
-    """The pairs of legs that a figure is about."""
+    """Return the pairs of legs that a figure is about."""
     if name == "two_peaked":
         return PAIRS[:1]
     own = name.rpartition("_")[2]
@@ -127,7 +127,7 @@ def pairs_of(name: str) -> Sequence[str]:
 def judged(
     title: str, gait: Gait, name: str, judge: dict[str, Any], bars: list[tuple[float, float]]
 ) -> tuple[str, ...]:
-    """A row of the table, of a figure by its name; without bars its distance is reported."""
+    """Return a row of the table for a figure; without bars its distance from the horse's is reported."""
     ours = float((gait.figures or {}).get(name, "nan"))
     known = bool(np.isfinite(ours))
     flaws = [gait.flaw, rejection_reason(gait.figures, pairs_of(name)) if gait.figures else ""]
@@ -151,8 +151,8 @@ def judged(
 
 
 def verdicts(figures: list[dict[str, Any]]) -> list[tuple[str, ...]]:
-    """Rows of the table: what is judged, at which Froude number, the horse's figure, the bar, ours, the
-    verdict or why there is none, and the source. Empty where the policy falls at every speed."""
+    """Return rows of the table: figure, Froude number, the horse's figure, the bar, ours, the verdict or why
+    there is none, and the source. Empty if the policy falls at every speed."""
     judges = read_judges()
     standing = [one for one in figures if "lag" in one]
     if not standing:
@@ -161,6 +161,7 @@ def verdicts(figures: list[dict[str, Any]]) -> list[tuple[str, ...]]:
 
 
 def _walk(judges: dict[str, Any], standing: list[dict[str, Any]]) -> Iterator[tuple[str, ...]]:
+    """Yield rows of the walk."""
     walk = at_speed(judges["walk"]["froude"], standing)
     for name in ("lag", "duty_fore", "duty_hind", "two_peaked", "peak_fore", "peak_hind"):
         judge = judges["walk"]["duty" if name.startswith("duty") else name]
@@ -168,6 +169,7 @@ def _walk(judges: dict[str, Any], standing: list[dict[str, Any]]) -> Iterator[tu
 
 
 def _trot(judges: dict[str, Any], standing: list[dict[str, Any]]) -> Iterator[tuple[str, ...]]:
+    """Yield rows of the trot: peaks, and duty factors at several speeds."""
     trots = trots_of(standing)
     lowest = judges["reported"]["walk_to_trot"]["horse"]
     quick = [one for one in trots if one["froude_reached"] >= lowest]  # where a horse trots, too
@@ -186,6 +188,7 @@ def _trot(judges: dict[str, Any], standing: list[dict[str, Any]]) -> Iterator[tu
 
 
 def _reported(judges: dict[str, Any], standing: list[dict[str, Any]]) -> Iterator[tuple[str, ...]]:
+    """Yield rows of figures that are reported without a bar."""
     for name, judge in judges["reported"].items():
         if "froude" in judge:
             yield judged(name, at_speed(judge["froude"], standing), name, judge, [])
@@ -228,8 +231,8 @@ SHOWN = (
 
 
 def pool(each: list[list[dict[str, Any]]]) -> list[dict[str, Any]]:
-    """Figures of several policies at each speed as one: means, and under "intervals" their 95 % intervals as
-    text. Policies that do not stand at a speed are left out there, but for "fell"."""
+    """Return figures of several policies at each speed as one: means, and under "intervals" their 95 %
+    intervals as text. Policies that do not stay up at a speed are left out there, except for "fell"."""
     found = []
     for same in zip(*each, strict=True):
         standing = [one for one in same if "lag" in one]
@@ -251,7 +254,7 @@ def pool(each: list[list[dict[str, Any]]]) -> list[dict[str, Any]]:
 
 
 def table_of(name: str, figures: list[dict[str, Any]]) -> str:
-    """Verdicts and all figures of a policy, Markdown."""
+    """Return verdicts and all figures of a policy, Markdown."""
     head = ("figure", *(f"Fr {one['froude']:.3g}, {one['speed']:.2f} m/s" for one in figures), "horse")
     reported = read_judges()["reported"]
     body = []

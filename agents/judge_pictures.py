@@ -1,4 +1,4 @@
-"""Pictures of the judges: force curves, footfall, and figures over speed beside those of horses."""
+"""Pictures of the judges: force curves, footfall, and figures over speed, with those of horses."""
 
 from __future__ import annotations
 
@@ -16,9 +16,12 @@ Figures = dict[str, list[dict[str, Any]]]
 
 
 def shape_of(froude: float, pair: str) -> Floats | None:
-    """Normal force of a horse over its stance [N/kg] in the form of Alexander & Jayes (1978, J. Zool.
-    185:27), cos x - q cos 3x, scaled to the published peak: with two peaks (q = 0.4) at a walk, half a sine
-    at a trot. None at other speeds."""
+    """Return the normal force of a horse over its stance [N/kg], shape (101,); None at other speeds than its
+    own.
+
+    It has the form of Alexander & Jayes (1978, J. Zool. 185:27), cos x - q cos 3x, scaled to the published
+    peak: with two peaks (q = 0.4) at a walk, half a sine at a trot.
+    """
     judges = read_judges()
     for gait, q in (("walk", 0.4), ("trot", 0.0)):
         if abs(froude - judges[gait]["froude"]) < 0.01:
@@ -29,7 +32,7 @@ def shape_of(froude: float, pair: str) -> Floats | None:
 
 
 def forces(figures: Figures, shown: list[dict[str, Any]]) -> Any:
-    """Normal force over the stance of all policies, at each speed that is shown."""
+    """Draw the normal force over the stance of all policies, at each speed that is shown."""
     from matplotlib.figure import Figure
 
     picture = Figure((3.0 * len(shown), 5.2), layout="constrained")
@@ -53,7 +56,7 @@ def forces(figures: Figures, shown: list[dict[str, Any]]) -> Any:
 
 
 def footfall(shown: list[dict[str, Any]]) -> Any:
-    """Which hooves bear load over two strides."""
+    """Draw the stances of each leg over two strides."""
     from matplotlib.figure import Figure
 
     picture = Figure((2.6 * len(shown), 1.9), layout="constrained")
@@ -68,7 +71,7 @@ def footfall(shown: list[dict[str, Any]]) -> Any:
 
 
 def speeds(figures: Figures) -> Any:
-    """Lag, duty factor and cost of transport over the Froude number reached."""
+    """Draw lag, duty factor and cost of transport over the Froude number reached."""
     from matplotlib.figure import Figure
 
     picture = Figure((10, 3.2), layout="constrained")
@@ -99,8 +102,8 @@ def speeds(figures: Figures) -> Any:
 
 
 def draw(figures: Figures, out: Path) -> None:
-    """Force curves at each speed where watched episodes of the first policy stay up, its footfall there, and
-    figures over speed; none where there is no such speed."""
+    """Draw force curves at each speed at which watched episodes of the first policy stay up, its footfall
+    there, and figures over speed; draw nothing if there is no such speed."""
     shown = [one for one in next(iter(figures.values())) if one.get("footfall")]
     if not shown:
         return print("no pictures: the first policy falls at every speed")

@@ -5,8 +5,8 @@
     python -m agents.evaluate --policy run runs/open_loop/HorseLeg-v0-constant.json
 
 Families: "constant", the paper's gaits, four gait parameters that are held; "clocked", each of the four with
-a first harmonic of one clock beside it, which starts with the episode, thirteen numbers. An episode starts in
-a gait of its own, and goes from there to the one that was found as fast as is allowed. The best of several
+a first harmonic of one clock as well, which starts with the episode, thirteen numbers. An episode starts in a
+gait of its own, and goes from there to the one that was found as fast as is allowed. The best of several
 searches is chosen by starts that none has met and scored with yet others, the episodes of agents.evaluate.
 The file is written after every search; searches that are in it are not made again. `agents.horse_gaits` finds
 the gaits of the horse.
@@ -53,7 +53,8 @@ FINALISTS = 4  # candidates of a search that meet more starts at its end
 
 STEP = 0.3
 HARMONIC = 0.3
-"""First standard deviation and largest first harmonic; the box of every number is 2 wide."""
+"""First standard deviation, and largest first harmonic of the screening; the box of every number is 2
+wide."""
 
 TEST_SEED = 1000
 SEARCH_SEED = 10_000_000
@@ -75,11 +76,13 @@ KEPT = (
     "stances",
     "failed",
 )
-"""Figures of an episode whose means are kept."""
+"""Figures of an episode that the file has the means of."""
 
 
 @dataclass(frozen=True)
 class Args:
+    """Arguments of the command."""
+
     env_id: str = "hoof_env/HorseLeg-v0"
     """registered environment of this package with many at once"""
     env_kwargs: tuple[str, ...] = ()
@@ -93,14 +96,14 @@ class Args:
     test_episodes: int = 512
     """of the final score, from seed 1000 on"""
     start: Path | None = None
-    """file of a gait whose constants every second search begins with"""
+    """file of a gait; every second search begins with its constants"""
     out: Path | None = None
     """file; otherwise runs/open_loop/ENV-FAMILY.json"""
 
 
 def decode(family: str, x: Floats) -> dict[str, Floats]:
-    """Parameters of `open_loop` for points of the box [-1, 1], shape (..., SIZES[family]): the box is the
-    range of the gait parameters, and the unit of a harmonic is half of it."""
+    """Convert points of the box [-1, 1], shape (..., SIZES[family]), to parameters of `open_loop`: the box is
+    the range of the gait parameters, and the unit of a harmonic is half of it."""
     constant = MIDDLE + HALF_RANGE * x[..., :4]
     if family == "constant":
         return {"constant": constant}
@@ -111,14 +114,22 @@ def decode(family: str, x: Floats) -> dict[str, Floats]:
 
 
 def encode(constant: Sequence[float]) -> Floats:
-    """Inverse of `decode` for a constant gait, shape (4,), within the box."""
+    """Convert a constant gait, shape (4,), to a point within the box; the inverse of `decode`."""
     return np.clip((np.asarray(constant, float) - MIDDLE) / HALF_RANGE, -1.0, 1.0)
 
 
 class Objective:
-    """Scores candidates of a family by episodes in the rows of one vector environment; `leg` is a single one
-    like them, `spent` counts episodes. `ParameterError`: no such environment, one without many at once, or
-    one that is not of one leg."""
+    """Costs of candidates of a family, from episodes in the rows of one vector environment.
+
+    Attributes:
+        leg: a single environment with the same settings.
+        envs: the vector environment.
+        spent: episodes so far.
+
+    Raises:
+        ParameterError: there is no such environment, it has no native vector environment, or it is not of one
+            leg.
+    """
 
     def __init__(self, env_id: str, env_kwargs: dict[str, Any], family: str) -> None:
         self.leg: Any = runs.make_env(env_id, **env_kwargs).unwrapped
@@ -132,12 +143,13 @@ class Objective:
         self.family = family
 
     def costs(self, x: Floats, seeds: Sequence[int]) -> list[float]:
-        """Minus the mean returns of candidates, shape (n, size), that meet the same starts; n * len(seeds) is
-        `ROWS`."""
+        """Return minus the mean returns of candidates, shape (n, size), that meet the same starts; n *
+        len(seeds) is `ROWS`."""
         episodes = self._play(decode(self.family, np.repeat(x, len(seeds), axis=0)), [*seeds] * len(x))
         return mean_costs(np.array([episode["return"] for episode in episodes]), len(seeds))
 
     def test(self, parameters: dict[str, Any], count: int) -> Episodes:
+        """Return `count` episodes of the final score."""
         episodes: Episodes = []
         while len(episodes) < count:
             first = TEST_SEED + len(episodes)
@@ -145,6 +157,7 @@ class Objective:
         return episodes[:count]
 
     def _play(self, parameters: dict[str, Any], seeds: Sequence[int]) -> Episodes:
+        """Play an episode for each seed."""
         self.spent += len(seeds)
         return play_rows(self.envs, open_loop(parameters, self.leg), seeds)
 
@@ -156,18 +169,29 @@ def search(
     tick: Callable[[int, float], Any],
     start: Sequence[float] | None = None,
 ) -> tuple[Floats, float, bool]:
-    """One CMA-ES from the best point of a random screening, or from the constant gait `start`, shape (4,).
+    """Search once by CMA-ES, from the best point of a random screening, or from the constant gait `start`.
 
     Candidates of a generation meet the same starts, those of the next and other searches others. At the end
-    the mean of the distribution, the luckiest candidate and the best of the last generation meet more. About
-    `episodes` are spent; `tick` is called with their number and the lowest cost in them. Returns the best
-    point, its cost over starts that the search had not met, and whether Ctrl-C ended it; `KeyboardInterrupt`:
-    it did before anything was found.
+    the mean of the distribution, the luckiest candidate and the best of the last generation meet more.
+
+    Args:
+        objective: costs of candidates.
+        seed: seed of the search and of its starts.
+        episodes: episodes that it takes, about.
+        tick: called with a number of episodes and the lowest cost in them.
+        start: constant gait, shape (4,).
+
+    Returns:
+        The best point, its cost over starts that the search had not met, and True if Ctrl-C ended it.
+
+    Raises:
+        KeyboardInterrupt: Ctrl-C came before anything was found.
     """
     generator = np.random.default_rng([seed, 6])
     fresh = SEARCH_SEED * (seed + 1)
 
     def costs(x: Any, starts: int) -> list[float]:
+        """Return the costs of candidates on starts that no other call meets."""
         nonlocal fresh
         values = objective.costs(np.array(x), range(fresh, fresh + starts))
         fresh += starts
@@ -201,9 +225,13 @@ def search(
 
 
 def optimise(args: Args) -> dict[str, Any]:
-    """Search, and write the file after every search; returns what it holds. `HoofEnvError`: no CMA-ES is
-    installed. `DataFileError`: the file is of something else. `KeyboardInterrupt`: what was found is in the
-    file."""
+    """Search, and write the file after every search; return its content.
+
+    Raises:
+        HoofEnvError: no CMA-ES is installed.
+        DataFileError: the file is of something else.
+        KeyboardInterrupt: Ctrl-C; the results so far are in the file.
+    """
     episodes = check(args)
     from tqdm import tqdm
 
@@ -234,7 +262,7 @@ def optimise(args: Args) -> dict[str, Any]:
 
 
 def check(args: Args) -> int:
-    """Refuse what does not fit; returns the episodes of a search."""
+    """Check the arguments and return the episodes of a search."""
     require("agents.open_loop", "cma", "tqdm")
     check_number("restarts", args.restarts, low=1, high=1000)
     check_number("test_episodes", args.test_episodes, low=2, high=1e6)
@@ -244,6 +272,7 @@ def check(args: Args) -> int:
 
 
 def search_once(objective: Objective, seed: int, about: dict[str, Any], bar: Any) -> dict[str, Any]:
+    """Search with one seed and return its entry of the file."""
     began = time.monotonic()
     used = time.process_time()
     objective.spent = 0
@@ -268,6 +297,7 @@ def search_once(objective: Objective, seed: int, about: dict[str, Any], bar: Any
 
 
 def means(episodes: Episodes) -> dict[str, float | None]:
+    """Return the means of `KEPT`, None for one that is infinite."""
     figures = {key: float(np.mean([one[key] for one in episodes])) for key in KEPT}
     return {key: value if math.isfinite(value) else None for key, value in figures.items()}
 
@@ -275,7 +305,7 @@ def means(episodes: Episodes) -> dict[str, float | None]:
 def write(
     path: Path, about: dict[str, Any], objective: Objective, restarts: list[dict[str, Any]]
 ) -> dict[str, Any]:
-    """Write the best of the searches, scored, and all of them; returns what the file holds."""
+    """Write the best of the searches, scored, and all of them; return the content of the file."""
     best = min(restarts, key=lambda one: one["cost"])
     episodes = objective.test(best["parameters"], about["test_episodes"])
     score: dict[str, Any] = {"first_seed": TEST_SEED, "mean": means(episodes), "interval95": {}}
@@ -299,8 +329,8 @@ def write(
 
 
 def earlier(path: Path, about: dict[str, Any]) -> list[dict[str, Any]]:
-    """The searches of a file that were not interrupted; none if there is no file. `DataFileError`: the file
-    is of something else."""
+    """Return the searches of a file that were not interrupted, an empty list if there is no file;
+    `DataFileError` if the file is of something else."""
     if not path.is_file():
         return []
     with suppress(OSError, ValueError, KeyError, TypeError, AttributeError):
@@ -311,11 +341,13 @@ def earlier(path: Path, about: dict[str, Any]) -> list[dict[str, Any]]:
 
 
 def place(args: Args) -> Path:
+    """Return the path of the file."""
     name = f"{args.env_id.rpartition('/')[2]}-{args.family}.json"
     return args.out or Path("runs/open_loop", name)
 
 
 def main(argv: list[str] | None = None) -> None:
+    """Search, and print the searches and the score."""
     import tyro
 
     args = tyro.cli(Args, args=argv, prog="python -m agents.open_loop", description=__doc__)

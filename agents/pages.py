@@ -21,8 +21,17 @@ BINS = 60  # of training episodes in the picture
 
 
 def draw_learning_curve(folder: Path, scores: Sequence[Score], path: Path, **options: Any) -> None:
-    """Draw the training episodes of a run folder, the scores on the way where it has a curve.csv, the trained
-    policy, which is the first of `scores`, and the means of the others; `options` are of `Figure.savefig`."""
+    """Draw the learning curve of a run folder.
+
+    It shows the training episodes, the scores on the way if there is a curve.csv, the trained policy, which
+    is the first of `scores`, and the means of the others.
+
+    Args:
+        folder: run folder of agents.train.
+        scores: the trained policy, then policies to compare with.
+        path: file of the picture.
+        **options: options of `Figure.savefig`.
+    """
     episodes = runs.read_episodes(folder)
     bins = [part for part in np.array_split(episodes, BINS) if len(part)]
     with matplotlib.rc_context({**STYLE, "font.size": 10}):
@@ -78,6 +87,7 @@ def render_template(file: str, /, **values: Any) -> str:
 
 
 def training_length(folder: Path) -> tuple[int, float]:
+    """Return the steps and the seconds of a training, up to its last episode if it is not finished."""
     if finished := runs.read_record(folder).get("finished"):
         return int(finished["steps"]), float(finished["seconds"])
     episodes = runs.read_episodes(folder)

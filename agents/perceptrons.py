@@ -19,14 +19,15 @@ from hoof_env.simd.compile import inline_llvm, kernel
 Floats = NDArray[np.float32]
 
 CHUNK = 1000
-"""Most steps of a batch whose gradient is computed at once, by one thread: their numbers stay in the cache.
-The gradients are added up in order, so any number of threads gives the same bits."""
+"""Most steps of a batch that one thread takes at once: their numbers stay in the cache. The gradients of
+chunks are added up in order, so any number of threads gives the same bits."""
 
 LOG_PROB = 0
 ADVANTAGE = 1
 TARGET = 2
 ACTIONS = 3
-"""Columns of what is learnt from, with the actions from the last one on."""
+"""Columns of a step: logarithm of the probability, advantage, target of the value, and the actions from the
+last column on."""
 
 ZERO, HALF, ONE, FAR = (np.float32(number) for number in (0.0, 0.5, 1.0, 100.0))
 C0, A1, A2, A3 = (np.float32(number) for number in (34459425, 4729725, 135135, 990))
@@ -35,8 +36,8 @@ B1, B2, B3, B4 = (np.float32(number) for number in (16216200, 945945, 13860, 45)
 
 @inline_llvm
 def tanh(x):  # type: ignore[no-untyped-def]
-    """Lambert's continued fraction, the first nine terms, within 8e-6: without a call, so that the compiler
-    does many at once."""
+    """Return tanh by the first nine terms of Lambert's continued fraction, within 8e-6: without a call, so
+    that the compiler can vectorise it."""
     x = min(max(x, -FAR), FAR)
     s = x * x
     above = x * (C0 + s * (A1 + s * (A2 + s * (A3 + s))))
@@ -46,7 +47,7 @@ def tanh(x):  # type: ignore[no-untyped-def]
 
 @inline_llvm
 def forward(x, matrices, biases, outputs):  # type: ignore[no-untyped-def]
-    """What each layer gives for rows of inputs, the hidden ones behind a tanh."""
+    """Compute the outputs of each layer for rows of inputs; hidden layers have a tanh."""
     for k in range(len(matrices)):
         y = outputs[k]
         bias = biases[k]
@@ -63,8 +64,8 @@ def forward(x, matrices, biases, outputs):  # type: ignore[no-untyped-def]
 
 @inline_llvm
 def backward(x, matrices, outputs, slopes, by_matrices, by_biases):  # type: ignore[no-untyped-def]
-    """The derivatives by matrices and biases from those by the last outputs, in the last of `slopes`; the
-    others are room for those by the hidden layers."""
+    """Compute the derivatives by matrices and biases from those by the last outputs, which the last of
+    `slopes` holds; the others are overwritten with those by the hidden layers."""
     for k in range(len(matrices) - 1, -1, -1):
         slope = slopes[k]
         by_bias = by_biases[k]
@@ -96,8 +97,11 @@ def loss_of(  # type: ignore[no-untyped-def]
     by_log_std,
     losses,
 ):
-    """The loss of Schulman et al. 2017 (Eq. 9) of some of `count` steps, and its derivatives. The columns of
-    `steps` are as `LOG_PROB` and so on say. The entropy is the sum of `log_std`, but for a constant."""
+    """Compute the loss of Schulman et al. 2017 (Eq. 9) of some of `count` steps, and its derivatives.
+
+    `LOG_PROB` and the names after it are the columns of `steps`. The entropy is the sum of `log_std`, up to a
+    constant.
+    """
     by_log_std[:] = -ent_coef * np.float32(len(steps)) / count
     losses[:] = ZERO
     for i in range(len(steps)):
@@ -135,9 +139,11 @@ def gradient_of(  # type: ignore[no-untyped-def]
     count,
     losses,
 ):
-    """The loss of these rows, some of the `count` of a batch, and its derivatives, into the rooms of `actor`
-    and `critic`: tuples of matrices, biases, outputs, slopes, and derivatives by matrices and biases.
-    Advantages are normalised by `scale`, their mean and deviation."""
+    """Compute the loss of these rows, some of the `count` of a batch, and its derivatives.
+
+    They are written into `actor` and `critic`: tuples of matrices, biases, outputs, slopes, and derivatives
+    by matrices and biases. Advantages are normalised by `scale`, their mean and deviation.
+    """
     for i in range(len(rows)):
         x[i] = observations[rows[i]]
         own[i] = steps[rows[i]]
@@ -163,7 +169,7 @@ def gradient_of(  # type: ignore[no-untyped-def]
 
 
 def outputs_of(x, matrices, biases, outputs):  # type: ignore[no-untyped-def]
-    """As `forward`."""
+    """Compute the outputs of each layer, as `forward`, as a kernel of its own."""
     forward(x, matrices, biases, outputs)
 
 
@@ -173,17 +179,17 @@ compiled_outputs: Any = kernel(outputs_of)
 
 @dataclass(frozen=True)
 class Network:
-    """Matrices and biases of a perceptron with tanh, views of a vector."""
+    """Perceptron with tanh; its matrices and biases are views of a vector."""
 
     matrices: tuple[Floats, ...]
     biases: tuple[Floats, ...]
 
     def room(self, rows: int) -> tuple[Floats, ...]:
-        """For what each layer gives."""
+        """Return arrays for the outputs of each layer."""
         return tuple(np.zeros((rows, len(bias)), np.float32) for bias in self.biases)
 
     def __call__(self, x: Floats) -> Floats:
-        """Outputs for rows of inputs, shape (..., inputs)."""
+        """Return outputs, shape (..., outputs), for rows of inputs, shape (..., inputs)."""
         rows = x.reshape(-1, x.shape[-1])
         outputs = []
         for begin in range(0, len(rows), CHUNK):
@@ -196,7 +202,7 @@ class Network:
 
 @dataclass(frozen=True)
 class Weights:
-    """All weights of a policy as one vector, and by name as views of it."""
+    """Weights of a policy as one vector, and by name as views of it."""
 
     vector: Floats
     actor: Network
@@ -205,7 +211,7 @@ class Weights:
 
     @classmethod
     def of(cls, policy: Any) -> Weights:
-        """Those of a policy, whose parameters are views of the vector from now on."""
+        """Return the weights of a policy; its parameters become views of the vector."""
         vector = parameters_to_vector(policy.parameters()).detach()
         vector_to_parameters(vector, policy.parameters())
 

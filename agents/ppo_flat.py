@@ -3,8 +3,8 @@
     python -m agents.train --algo ppo_flat
     python -m agents.train --algo ppo_flat --env-id hoof_env/HorseLegFixed-v0 --steps 100000
 
-Read `FlatPPO` first: it plays a rollout, estimates what its actions were worth, improves the networks. It is
-Stable-Baselines3's PPO with networks of tanh and without what they do not need; training loop, buffer,
+Read `FlatPPO` first: it plays a rollout, estimates the advantages of its actions, improves the networks. It
+is Stable-Baselines3's PPO with networks of tanh and without what they do not need; training loop, buffer,
 policy and files are that library's. The kernels of networks and gradient are in agents/perceptrons.py.
 
 Three things differ. Rewards are scaled by all returns up to the end of the rollout, not of the step. Among
@@ -39,7 +39,7 @@ BETA2 = 0.999
 EPSILON = 1e-5
 
 LARGEST = np.float32(10.0)
-"""Reward after `Scale`, as in Stable-Baselines3: one failure in a rollout is not to hide all else."""
+"""Largest reward after `Scale`, as in Stable-Baselines3: one failure in a rollout must not hide all else."""
 
 POLICY_KWARGS = {"net_arch", "activation_fn", "log_std_init", "ortho_init"}
 
@@ -48,12 +48,12 @@ POLICY_KWARGS = {"net_arch", "activation_fn", "log_std_init", "ortho_init"}
 
 
 def flat(observations: Any, kept: int = 1) -> Floats:
-    """Observations with all axes but the first ones as one."""
+    """Return observations with all axes but the first `kept` as one."""
     return np.asarray(observations, np.float32).reshape(*observations.shape[:kept], -1)
 
 
 class Scale:
-    """The standard deviation of discounted returns so far, from the first step of an episode to each."""
+    """Standard deviation of the discounted returns so far, from the first step of an episode to each."""
 
     def __init__(self, gamma: float) -> None:
         self.gamma = gamma
@@ -63,11 +63,11 @@ class Scale:
         self.restart()
 
     def restart(self) -> None:
-        """All episodes begin anew."""
+        """Begin all episodes anew."""
         self.returns = np.float32(0.0)
 
     def after(self, rewards: Floats, ended: NDArray[np.bool_]) -> np.float32:
-        """The scale when these steps are counted, too, shape (T, n) both."""
+        """Return the scale that includes these steps; `rewards` and `ended` have shape (T, n)."""
         returns = np.empty_like(rewards)
         goes_on = np.float32(self.gamma) * ~ended
         for t in range(len(rewards)):
@@ -85,8 +85,8 @@ class Scale:
 
 
 class UnusedAdam(torch.optim.Adam):
-    """Torch's Adam in name: `FlatPPO.descend` takes its steps. Making a real one loads torch's compiler, a
-    third of the time from the start of Python to the first step."""
+    """Torch's Adam in name only: `FlatPPO.descend` takes its steps. Making a real one loads torch's compiler,
+    a third of the time from the start of Python to the first step."""
 
     def __init__(self, params: Any, lr: float = 1e-3, **kwargs: Any) -> None:
         usual = inspect.signature(torch.optim.Adam.__init__).parameters
@@ -96,12 +96,12 @@ class UnusedAdam(torch.optim.Adam):
         self.param_groups = [{"params": list(params), **self.defaults}]
 
     def state_dict(self) -> dict[str, Any]:
-        """That of an Adam that has not taken a step."""
+        """Return the state of an Adam that has not taken a step."""
         (group,) = self.param_groups
         return {"state": {}, "param_groups": [{**group, "params": list(range(len(group["params"])))}]}
 
     def load_state_dict(self, state_dict: Any) -> None:
-        """Take nothing: there is nothing to go on with."""
+        """Ignore the state: there is nothing to go on with."""
 
 
 class FlatPolicy(ActorCriticPolicy):
@@ -112,7 +112,7 @@ class FlatPolicy(ActorCriticPolicy):
 
 
 class FlatPPO(OnPolicyAlgorithm):
-    """PPO; arguments as those of Stable-Baselines3's, which its policies are loaded as.
+    """PPO with the arguments of Stable-Baselines3's, as which its policies are loaded.
 
     Args:
         norm_reward: divide rewards by a `Scale`, as `VecNormalize` would.
@@ -216,8 +216,8 @@ class FlatPPO(OnPolicyAlgorithm):
     def collect_rollouts(
         self, env: Any, callback: BaseCallback, rollout_buffer: Any, n_rollout_steps: int
     ) -> bool:
-        """Go on from the last observation for so many steps and fill the buffer; False where the callback
-        ends the training."""
+        """Play `n_rollout_steps` steps from the last observation and fill the buffer; return False if the
+        callback ends the training."""
         box = self.action_space
         weights = self.weights
         buffer = rollout_buffer
@@ -264,7 +264,7 @@ class FlatPPO(OnPolicyAlgorithm):
         return True
 
     def train(self) -> None:
-        """Steps of Adam on shuffled batches."""
+        """Take steps of Adam on shuffled batches."""
         buffer = self.rollout_buffer
         progress = self._current_progress_remaining
         columns = (buffer.log_probs, buffer.advantages, buffer.returns)
@@ -286,14 +286,14 @@ class FlatPPO(OnPolicyAlgorithm):
         self.logger.record("train/learning_rate", rate)
 
     def batches(self, count: int) -> Iterator[NDArray[np.int64]]:
-        """All of `count` steps in a random order, `batch_size` at a time."""
+        """Yield all of `count` steps in a random order, `batch_size` at a time."""
         order = self.random.permutation(count)
         for begin in range(0, count, self.batch_size):
             if count - begin > 1:  # advantages are normalised over a batch
                 yield order[begin : begin + self.batch_size]
 
     def descend(self, gradient: Floats, rate: float) -> None:
-        """A step of Adam (Kingma & Ba 2015), the gradient scaled down to `max_grad_norm`."""
+        """Take a step of Adam (Kingma & Ba 2015), the gradient scaled down to `max_grad_norm`."""
         gradient *= min(1.0, self.max_grad_norm / (float(np.linalg.norm(gradient)) + 1e-6))
         self._n_updates += 1
         assert self.moments is not None
@@ -306,7 +306,11 @@ class FlatPPO(OnPolicyAlgorithm):
 
 
 class Gradient:
-    """The gradient of the loss over a batch, `vector`."""
+    """Gradient of the loss over a batch.
+
+    Attributes:
+        vector: the gradient, in the order of the weights' vector.
+    """
 
     def __init__(self, model: FlatPPO, clip_range: float) -> None:
         self.model = model
@@ -314,7 +318,7 @@ class Gradient:
         self.parts: dict[tuple[int, int], tuple[Any, ...]] = {}  # rooms, by chunk and its size
 
     def compute(self, observations: Floats, steps: Floats, chosen: NDArray[np.int64]) -> Floats:
-        """Compute it for the chosen rows; returns the losses of policy and value."""
+        """Compute the gradient for the chosen rows; return the losses of policy and value."""
         model = self.model
         log_std = self.model.weights.log_std
         advantages = steps[chosen, ADVANTAGE]
@@ -333,7 +337,7 @@ class Gradient:
         return np.sum([losses for *_, losses in parts], 0)
 
     def part(self, number: int, rows: int) -> tuple[Any, ...]:
-        """Room for a chunk of a batch: derivatives, what is between, losses."""
+        """Return the arrays of a chunk of a batch: derivatives, intermediate results, losses."""
         if (number, rows) not in self.parts:
             model = self.model
             own = Weights.of(copy.deepcopy(self.model.policy))

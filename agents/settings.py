@@ -19,7 +19,7 @@ Algorithm = Literal["ppo", "ppo_flat", "sac", "td3", "tqc"]  # `ALGORITHMS` and 
 
 
 def algorithm_class(name: str) -> Any:
-    """As `saved_policy.algorithm_class`, and `agents.ppo_flat`."""
+    """Return the class of an algorithm: those of `saved_policy.algorithm_class`, and `agents.ppo_flat`."""
     if name != "ppo_flat":
         return library_class(name)
     from agents.ppo_flat import FlatPPO
@@ -29,7 +29,7 @@ def algorithm_class(name: str) -> Any:
 
 @dataclass(frozen=True)
 class TrainingArgs:
-    """What every command that trains takes."""
+    """Arguments of every command that trains."""
 
     env_id: str = "hoof_env/HorseLeg-v0"
     """registered environment; module:id imports the module first"""
@@ -52,14 +52,18 @@ COUNTED = ("n_epochs", "n_steps", "batch_size", "buffer_size", "policy_delay")
 NORMALIZE = {"training": bool, "norm_obs": bool, "norm_reward": bool} | dict.fromkeys(
     ("clip_obs", "clip_reward", "gamma", "epsilon"), (int, float)
 )
-"""What the key `normalize` may hold: arguments of `VecNormalize` and their kinds."""
+"""Arguments of `VecNormalize` that the key `normalize` may hold, and their types."""
 SCHEDULED = ("learning_rate", "clip_range", "clip_range_vf")
 """Keys that may hold `lin_<x>`: falling linearly from x to zero over the training."""
 
 
 def load_settings(path: Path, env_id: str) -> dict[str, Any]:
-    """The entry of `env_id` in the YAML file at `path`, else its `default`, as plain data. `DataFileError`:
-    no such file, not YAML, or neither entry is a mapping with n_envs, n_timesteps and policy."""
+    """Return the entry of `env_id` in the YAML file at `path`, else its `default`, as plain data.
+
+    Raises:
+        DataFileError: there is no such file, it is not YAML, or neither entry is a mapping with n_envs,
+            n_timesteps and policy.
+    """
     try:
         entries = yaml.safe_load(path.read_text(encoding="utf-8"))
     except (OSError, UnicodeDecodeError, yaml.YAMLError, RecursionError) as error:
@@ -78,8 +82,12 @@ def load_settings(path: Path, env_id: str) -> dict[str, Any]:
 
 
 def model_arguments(settings: Mapping[str, Any], actions: int = 1) -> dict[str, Any]:
-    """The part of `settings` that the algorithm's constructor takes; schedules, noise on `actions` numbers
-    and network arguments are built. `DataFileError`: one of them, or a count, is not in the zoo's form."""
+    """Return the part of `settings` that the algorithm's constructor takes; schedules, noise on `actions`
+    numbers and network arguments are built.
+
+    Raises:
+        DataFileError: one of them, or a count, is not in the zoo's form.
+    """
     from stable_baselines3.common.utils import LinearSchedule
 
     arguments = {
@@ -128,6 +136,7 @@ def normalize_arguments(settings: Mapping[str, Any]) -> dict[str, Any] | None:
 
 
 def _action_noise(kind: Any, spread: Any, actions: int) -> Any:
+    """Return the noise on `actions` numbers; `DataFileError` if kind or spread is malformed."""
     from stable_baselines3.common.noise import NormalActionNoise, OrnsteinUhlenbeckActionNoise
 
     known = {"normal": NormalActionNoise, "ornstein-uhlenbeck": OrnsteinUhlenbeckActionNoise}

@@ -5,8 +5,8 @@
 
 The best of an id is that with the highest mean return in episodes on which nothing is reported. Its folder
 agents/policies/NAME, written whole or not at all, holds the exported policy and its weights as plain data,
-how it was trained, its returns beside those of gaits and how far other machines may be off, a model card, a
-curve and a film. agents/policies/README.md lists all that are there.
+how it was trained, its returns with those of gaits and how far other machines may be off, a model card, a
+curve and a film. agents/policies/README.md lists all shipped policies.
 """
 
 from __future__ import annotations
@@ -45,16 +45,17 @@ SHOWN = ("return", "distance_m", "stance_peak_n", "weight_share", "cost_of_trans
 """Columns of the card's table, keys of `METRICS`."""
 
 CHOOSING_SEEDS = range(500_000, 500_100)
-"""Episodes by which the best of several runs is chosen; no training and no reported score plays them."""
+"""Seeds of the episodes by which the best of several runs is chosen; no training and no reported score plays
+them."""
 
 CHECKED = 20
-"""Episodes, from the first of the score on, that are played again to check a shipped policy."""
+"""Number of episodes, from the first of the score on, that are played again to check a shipped policy."""
 
 GAITS = ("run", "walk", "carrying_walk", "reference", "open-loop")  # scored beside it, where an id has them
 
 LIMIT = 1_000_000
 FILM_LIMIT = 750_000
-"""Bytes of a folder and of the film in it, which is made shorter where it is larger."""
+"""Largest size of a folder and of the film in it [bytes]; a film that is larger is made shorter."""
 
 FILM_SECONDS = 4.0
 
@@ -63,6 +64,8 @@ COPIED = (WEIGHTS, ABOUT, runs.CONFIG)
 
 @dataclass(frozen=True)
 class Args:
+    """Arguments of the command."""
+
     runs: Positional[Path]
     """a run folder of agents.train, or a folder with several beneath it"""
     ids: tuple[str, ...] = ()
@@ -73,15 +76,19 @@ class Args:
 
 @dataclass(frozen=True)
 class Choice:
-    """A run, and of how many it is the best."""
+    """Run that is shipped, and the number of runs of which it is the best."""
 
     saved: runs.SavedModel
     among: int = 1
 
 
 def find_runs(folder: Path) -> dict[str, list[runs.SavedModel]]:
-    """The trained models in or beneath a folder by environment, those with arguments of it left out.
-    `DataFileError`: there is none, or one lacks a file."""
+    """Return the trained models in or beneath a folder by environment, without those that have arguments of
+    it.
+
+    Raises:
+        DataFileError: there is none, or one lacks a file.
+    """
     models: dict[str, list[runs.SavedModel]] = {}
     is_run = (folder / runs.RECORD).is_file()
     for path in [folder] if is_run else sorted(record.parent for record in folder.rglob(runs.RECORD)):
@@ -101,7 +108,7 @@ def find_runs(folder: Path) -> dict[str, list[runs.SavedModel]]:
 
 
 def choose(saved: Sequence[runs.SavedModel], env_id: str) -> Choice:
-    """The run whose policy has the highest mean return in `CHOOSING_SEEDS`."""
+    """Return the run with the highest mean return in `CHOOSING_SEEDS`."""
     from tqdm import tqdm
 
     if len(saved) == 1:
@@ -115,8 +122,13 @@ def choose(saved: Sequence[runs.SavedModel], env_id: str) -> Choice:
 
 
 def ship(choice: Choice, env_id: str, out: Path) -> dict[str, Any]:
-    """Write the folder of one policy beneath `out`, for its own id or one that `STANDS_FOR` it; returns its
-    score.json. `DataFileError`: the model does not fit. `OutputError`: the folder gets too large."""
+    """Write the folder of one policy beneath `out`, for its own id or one that `STANDS_FOR` it; return its
+    score.json.
+
+    Raises:
+        DataFileError: the model does not fit.
+        OutputError: the folder gets too large.
+    """
     saved = choice.saved
     trained_on = own_id(choice.saved.record["env_id"])
     if not len(runs.read_episodes(saved.path.parent)):
@@ -152,7 +164,7 @@ def ship(choice: Choice, env_id: str, out: Path) -> dict[str, Any]:
 
 
 def film(folder: Path, env_id: str) -> None:
-    """Write film.gif of the policy in `folder`, shorter where it would be larger than `FILM_LIMIT`."""
+    """Write film.gif of the policy in `folder`, shorter if it would be larger than `FILM_LIMIT`."""
     path = folder / "film.gif"
     policy = str(folder / FILE)
     seconds = FILM_SECONDS
@@ -163,6 +175,7 @@ def film(folder: Path, env_id: str) -> None:
 
 @cache
 def gaits(env_id: str) -> list[Score]:
+    """Score the gaits that an id has, on the episodes of the score."""
     scores = []
     for name in GAITS:
         with suppress(ParameterError, DataFileError):  # it has no such gait
@@ -171,7 +184,8 @@ def gaits(env_id: str) -> list[Score]:
 
 
 def score_record(policy: Any, scores: Sequence[Score], env_id: str, played_on: str) -> dict[str, Any]:
-    """What score.json holds: means and intervals of all, and the returns of the first, the policy."""
+    """Return the content of score.json: means and intervals of all, and the returns of the first, the
+    policy."""
     data = to_json(scores)["policies"]
     for one in data.values():
         del one["episodes"]
@@ -189,27 +203,28 @@ def score_record(policy: Any, scores: Sequence[Score], env_id: str, played_on: s
 
 
 class NoisyPolicy:
-    """A policy whose actions are off by a millionth: another machine's arithmetic, exaggerated."""
+    """Policy with actions that are off by a millionth: another machine's arithmetic, exaggerated."""
 
     def __init__(self, policy: Any) -> None:
         self._policy = policy
         self._generator = np.random.default_rng(0)
 
     def predict(self, observation: Any, *args: Any, **kwargs: Any) -> tuple[Any, Any]:
+        """Return the policy's actions with noise."""
         actions, state = self._policy.predict(observation, *args, **kwargs)
         return actions + self._generator.uniform(-1e-6, 1e-6, actions.shape).astype(np.float32), state
 
 
 def tolerance(policy: Any, env_id: str, returns: Sequence[float]) -> float:
-    """By how much the mean return of the first `CHECKED` episodes may differ on another machine: four
-    standard errors of what a `NoisyPolicy` policy changes, and 1 % of the mean."""
+    """Return the largest difference of the mean return of the first `CHECKED` episodes on another machine:
+    four standard errors of what a `NoisyPolicy` changes, and 1 % of the mean."""
     again = score_vector(NoisyPolicy(policy), env_id, SCORE_SEEDS[:CHECKED])
     off = np.array([episode["return"] for episode in again]) - returns[: len(again)]
     return float(4 * np.sqrt(np.mean(off**2) / len(off)) + 0.01 * abs(np.mean(returns)))
 
 
 def shown_command(command: str) -> str:
-    """A command without --out and without folders of this machine."""
+    """Return a command without --out and without folders of this machine."""
     words = shlex.split(command)
     while "--out" in words:
         del words[words.index("--out") : words.index("--out") + 2]
@@ -225,6 +240,7 @@ def write_card(
     scores: Sequence[Score],
     choice: Choice,
 ) -> None:
+    """Write card.md, the model card of a policy."""
     keys = [key for key in SHOWN if key in scores[0].estimates]
     with runs.make_env(env_id) as env:
         is_suspended = surroundings(env).trunk == "suspended"
@@ -275,6 +291,7 @@ def write_index(folder: Path) -> None:
 
 
 def main(argv: list[str] | None = None) -> None:
+    """Choose and ship the policy of each id."""
     import tyro
 
     args = tyro.cli(Args, args=argv, prog="python -m agents.ship", description=__doc__)

@@ -7,8 +7,8 @@
 PPO, SAC and TD3 are Stable-Baselines3's, TQC is sb3-contrib's, made as `PPO("MlpPolicy", env)` makes them. A
 policy is scored without its noise on 100 starts that no training meets. A training is one set of rows in
 curves.csv, written when it is through: after an interruption the same command goes on with those that are
-missing. Beside the curves stand what needs no learning: the zero action, which keeps the gait that an episode
-starts in, the scripted gait, and the best gait of `agents.open_loop`.
+missing. The curves are compared with policies that need no learning: the zero action, which keeps the gait
+that an episode starts in, the scripted gait, and the best gait of `agents.open_loop`.
 """
 
 from __future__ import annotations
@@ -32,11 +32,13 @@ from hoof_env.errors import ParameterError, check_choice, check_number
 from hoof_env.saved_policy import ALGORITHMS, algorithm_class
 
 OUT = Path(__file__).parents[1] / "docs" / "evidence" / "stock"
-"""Where the published curves are."""
+"""Folder of the published curves."""
 
 
 @dataclass(frozen=True)
 class Args:
+    """Arguments of the command."""
+
     env_id: str | None = None
     """only this id"""
     algo: str | None = None
@@ -55,19 +57,19 @@ class Args:
 
 @dataclass(frozen=True)
 class Job:
-    """One training."""
+    """Training of one algorithm on one id with one seed."""
 
     curves: Curves
     seed: int
 
     @property
     def key(self) -> tuple[str, str, int]:
-        """By which its rows are found."""
+        """Key of its rows in curves.csv."""
         return self.curves.env_id, self.curves.algo, self.seed
 
 
 def jobs(args: Args) -> list[Job]:
-    """The trainings that some arguments ask for.
+    """Return the trainings that the arguments select.
 
     Raises:
         ParameterError: an unknown id or algorithm, or a count out of range.
@@ -92,7 +94,7 @@ def jobs(args: Args) -> list[Job]:
 
 
 def train(job: Job) -> list[dict[str, Any]]:
-    """Train as a newcomer would; returns the rows of its curve."""
+    """Train with the library's defaults, or `TUNED` with its own settings; return the rows of the curve."""
     import torch
     from stable_baselines3.common.callbacks import BaseCallback
 
@@ -103,7 +105,7 @@ def train(job: Job) -> list[dict[str, Any]]:
     commit = runs.versions().get("commit", "")
 
     class Curve(BaseCallback):
-        """Scores the policy every so many steps."""
+        """Callback that scores the policy every `curves.every` steps and at the end."""
 
         began = 0.0
         scored = 0.0  # seconds that scores took
@@ -120,6 +122,7 @@ def train(job: Job) -> list[dict[str, Any]]:
             return True
 
     def add(model: Any, steps: int, seconds: float) -> None:
+        """Score a model and append the row."""
         figures = (steps, round(stock_page.mean_return(model, envs), 2), round(seconds, 1), commit)
         rows.append(dict(zip(COLUMNS, (*job.key, *figures), strict=True)))
 
@@ -131,13 +134,13 @@ def train(job: Job) -> list[dict[str, Any]]:
 
 
 def stock_model(job: Job) -> Any:
-    """The learner as its library makes it."""
+    """Return the learner as its library makes it."""
     env = runs.make_env(job.curves.env_id)
     return algorithm_class(job.curves.algo)("MlpPolicy", env, seed=job.seed, device="cpu")
 
 
 def tuned_model(job: Job) -> Any:
-    """The learner with the settings of agents/hyperparams, for as many steps."""
+    """Return the learner with the settings of agents/hyperparams, for as many steps."""
     curves = job.curves
     settings = load_settings(FOLDER / f"{curves.algo}.yml", curves.env_id) | {"n_timesteps": curves.steps}
     many = runs.make_vec_env(curves.env_id, settings["n_envs"])
@@ -145,7 +148,7 @@ def tuned_model(job: Job) -> Any:
 
 
 def trained(pending: Sequence[Job], workers: int) -> Iterator[list[dict[str, Any]]]:
-    """The rows of each training as it is through."""
+    """Yield the rows of each training when it is through."""
     if workers == 1:
         yield from map(train, pending)
         return
@@ -154,13 +157,13 @@ def trained(pending: Sequence[Job], workers: int) -> Iterator[list[dict[str, Any
 
 
 def has_run(rows: Sequence[dict[str, Any]], job: Job) -> bool:
-    """Say if a training's rows are there, up to its last step."""
+    """True if a training's rows are there, up to its last step."""
     steps = [row["steps"] for row in rows if (row["env_id"], row["algo"], row["seed"]) == job.key]
     return max(steps, default=-1) >= job.curves.steps
 
 
 def stock(args: Args) -> list[dict[str, Any]]:
-    """Train what is missing, then write table and picture; returns all rows.
+    """Train what is missing, then write table and picture; return all rows.
 
     Raises:
         ParameterError: an unknown id or algorithm, or a count out of range.
@@ -186,6 +189,7 @@ def stock(args: Args) -> list[dict[str, Any]]:
 
 
 def main(argv: list[str] | None = None) -> None:
+    """Train and write the page."""
     import tyro
 
     args = tyro.cli(Args, args=argv, prog="python -m agents.stock", description=__doc__)

@@ -1,5 +1,5 @@
-"""The page of `agents.stock`: learning curves as tables and as a picture, and the returns of what needs no
-learning."""
+"""Page of `agents.stock`: learning curves as tables and as a picture, and the returns of policies that need
+no learning."""
 
 from __future__ import annotations
 
@@ -19,22 +19,22 @@ from hoof_env._output import markdown_table, staged
 BEST = "best open loop"
 
 ANCHORS = ("zero action", "scripted gait", BEST)
-"""What stands beside the curves."""
+"""Policies that need no learning, which the curves are compared with."""
 
 
 def mean_return(policy: Any, envs: Any) -> float:
-    """Mean return of a policy on the starts of the final scores."""
+    """Return the mean return of a policy on the starts of the final scores."""
     return float(np.mean([one["return"] for one in play_rows(envs, policy, FINAL_SEEDS)]))
 
 
 def anchors(env_id: str) -> dict[str, float]:
-    """Returns of what needs no learning, by name, those that an id has."""
+    """Return the mean returns of policies that need no learning, by name, those that an id has."""
     envs = make_rows(env_id, len(FINAL_SEEDS))
     assert envs is not None
     zero = np.zeros((len(FINAL_SEEDS), *(envs.single_action_space.shape or ())), np.float32)
 
     class Zero:
-        """The zero action."""
+        """Policy of zero actions."""
 
         def predict(self, *args: Any, **kwargs: Any) -> tuple[NDArray[np.float32], None]:
             return zero, None
@@ -49,11 +49,11 @@ def anchors(env_id: str) -> dict[str, float]:
 
 AT_STEPS = (20_480, 61_440, 204_800, 400_000, 3_000_000)
 AT_SECONDS = (5.0, 20.0, 60.0, 180.0, 600.0)
-"""Where learners of HorseLeg-v0 are compared."""
+"""Steps and seconds [s] at which learners of HorseLeg-v0 are compared."""
 
 
 def at(rows: Sequence[dict[str, Any]], steps: int) -> list[float]:
-    """The returns of all seeds at the last score up to so many steps."""
+    """Return the returns of all seeds at the last score up to `steps`."""
     latest: dict[int, dict[str, Any]] = {}
     for row in rows:
         if row["steps"] <= steps and row["steps"] >= latest.get(row["seed"], row)["steps"]:
@@ -62,8 +62,8 @@ def at(rows: Sequence[dict[str, Any]], steps: int) -> list[float]:
 
 
 def table(rows: Sequence[dict[str, Any]], beside: dict[str, dict[str, float]]) -> str:
-    """A line for each algorithm and id: interquartile mean, lowest and highest seed in the middle and at the
-    end, and what needs no learning."""
+    """Return a line for each algorithm and id: interquartile mean, lowest and highest seed in the middle and
+    at the end, and the returns of policies that need no learning."""
     lines = []
     for curves in PLAN:
         own = [row for row in rows if (row["env_id"], row["algo"]) == (curves.env_id, curves.algo)]
@@ -100,8 +100,8 @@ def table(rows: Sequence[dict[str, Any]], beside: dict[str, dict[str, float]]) -
 
 
 def compared(rows: Sequence[dict[str, Any]], column: str, places: Sequence[float]) -> str:
-    """A line for each learner of HorseLeg-v0: the interquartile mean of its last returns up to so many steps,
-    or so many seconds of learning; nothing where its trainings do not go so far."""
+    """Return a line for each learner of HorseLeg-v0: the interquartile mean of its last returns up to each
+    place of `column`, steps or seconds of learning; an empty cell if its trainings do not go so far."""
     lines = []
     for algo in dict.fromkeys(curves.algo for curves in PLAN if curves.env_id == LEG):
         own = [row for row in rows if (row["env_id"], row["algo"]) == (LEG, algo)]
@@ -124,13 +124,13 @@ def compared(rows: Sequence[dict[str, Any]], column: str, places: Sequence[float
 
 
 def title(algo: str) -> str:
-    """Name of a learner for people, with what its settings are."""
+    """Return the name of a learner with the kind of its settings."""
     return "ppo_flat, tuned, 16 environments" if algo == TUNED else f"{algo.upper()}, stock"
 
 
 def draw(rows: Sequence[dict[str, Any]], beside: dict[str, dict[str, float]], path: Path) -> None:
-    """A panel for each id: the median of all seeds and their range against steps, and lines for what needs no
-    learning."""
+    """Draw a panel for each id: the median of all seeds and their range over steps, and lines for policies
+    that need no learning."""
     import matplotlib
     from matplotlib.figure import Figure
     from matplotlib.ticker import EngFormatter

@@ -38,6 +38,8 @@ from hoof_env.saved_policy import WEIGHTS
 
 @dataclass(frozen=True)
 class Args(TrainingArgs):
+    """Arguments of the command."""
+
     seed: int = 0
     """of the environments, the network and the sampling"""
     n_envs: int | None = None
@@ -61,6 +63,8 @@ class Args(TrainingArgs):
 
 @dataclass(frozen=True)
 class Trained:
+    """Result of a training; `stopped_by` is the number of the signal that ended it, None if it is through."""
+
     folder: Path
     steps: int
     seconds: float
@@ -68,6 +72,7 @@ class Trained:
 
     @property
     def rate(self) -> float:
+        """Steps per second."""
         return self.steps / max(self.seconds, 1e-9)
 
     def __str__(self) -> str:
@@ -76,11 +81,18 @@ class Trained:
 
 
 def train(args: Args, *also: Any) -> Trained:
-    """Train as `args` say and fill the run folder; SIGINT, SIGTERM and the time limit end it early. `also`
-    are more callbacks of Stable-Baselines3; on a resume they begin anew. `ParameterError`, `DataFileError`:
-    something does not fit, or not the run to go on with. `OutputError`: the folder cannot be written, holds a
-    run already, or another process trains there. `DivergedError`: a loss or the policy is not finite any
-    more."""
+    """Train as `args` say and fill the run folder; SIGINT, SIGTERM and the time limit end it early.
+
+    Args:
+        args: the arguments of the command.
+        *also: more callbacks of Stable-Baselines3; on a resume they begin anew.
+
+    Raises:
+        ParameterError: something does not fit, or it is not the run to go on with.
+        DataFileError: a file of settings or a checkpoint cannot be read.
+        OutputError: the folder cannot be written, holds a run already, or another process trains there.
+        DivergedError: a loss or the policy is not finite any more.
+    """
     env_kwargs, settings = checked(args)
     check_threads(args.torch_threads)
     name = args.env_id.rpartition("/")[2]
@@ -103,7 +115,7 @@ def _train(
     settings: dict[str, Any],
     also: tuple[Any, ...],
 ) -> Trained:
-    """`train` in a folder that nobody else works in."""
+    """Train as `train` does, in a folder that is locked."""
     earlier = find_earlier(args, folder, record, settings)
     if finished := earlier.get("finished"):
         checkpoints.tidy(folder, keep=0)  # of a process that was killed before it did so
@@ -148,6 +160,7 @@ def learn(
     resumed: checkpoints.Resumed | None,
     also: tuple[Any, ...],
 ) -> Trained:
+    """Train the model until it is through or asked to end, and save it."""
     from stable_baselines3.common.callbacks import CallbackList
 
     from agents.watch import EndedError, Watch, check_divergence, diverged, stop_on_signals
@@ -179,7 +192,8 @@ def learn(
 
 
 def checked(args: Args) -> tuple[dict[str, Any], dict[str, Any]]:
-    """Arguments of the environment, and settings; all checked before anything slow starts or is written."""
+    """Return arguments of the environment and settings; all are checked before anything slow starts or is
+    written."""
     env_kwargs = parse_pairs("--env-kwargs", args.env_kwargs)
     settings = load_settings(args.hyperparams or FOLDER / f"{args.algo}.yml", args.env_id)
     settings |= parse_pairs("--params", args.params)
@@ -198,6 +212,8 @@ def checked(args: Args) -> tuple[dict[str, Any], dict[str, Any]]:
 
 
 def make_record(args: Args, env_kwargs: dict[str, Any]) -> dict[str, Any]:
+    """Return the content of run.json, without "finished"; `ParameterError` if the environment cannot be
+    trained on."""
     with runs.make_env(args.env_id, **env_kwargs) as env:
         if hasattr(env.unwrapped, "reward_space"):
             raise ParameterError(
@@ -225,8 +241,12 @@ def make_record(args: Args, env_kwargs: dict[str, Any]) -> dict[str, Any]:
 def find_earlier(
     args: Args, folder: Path, record: dict[str, Any], settings: dict[str, Any]
 ) -> dict[str, Any]:
-    """The record of the run in `folder` to go on with, empty if there is none. `OutputError`: there is a run,
-    but none to go on with. `ParameterError`: it was begun otherwise."""
+    """Return the record of the run in `folder` to go on with, empty if there is none.
+
+    Raises:
+        OutputError: there is a run, but none to go on with.
+        ParameterError: it was begun otherwise.
+    """
     earlier = runs.read_record(folder)
     there = [name for name in (*runs.FILES, runs.STATISTICS, runs.CHECKPOINTS) if (folder / name).exists()]
     if there and not earlier:
@@ -257,7 +277,7 @@ def find_earlier(
 
 
 def warn_of_bits(folder: Path, earlier: dict[str, Any], record: dict[str, Any]) -> None:
-    """Warn of what does not forbid to go on with a run, but the same bits."""
+    """Warn of differences under which a run may go on, but not with the same bits."""
     keys = ("python", "platform", *runs.PACKAGES, "torch_threads", "device")
     there, here = ({**one.get("versions", {}), **one.get("args", {})} for one in (earlier, record))
     pairs = {key: (there[key], here.get(key)) for key in keys if key in there}
@@ -267,7 +287,8 @@ def warn_of_bits(folder: Path, earlier: dict[str, Any], record: dict[str, Any]) 
 
 
 def make_model(args: Args, settings: dict[str, Any], many: Any) -> Any:
-    """The algorithm as `settings` build it, on environments with a `VecMonitor` that writes nothing yet."""
+    """Return the algorithm as `settings` build it, on environments with a `VecMonitor` that writes nothing
+    yet."""
     from stable_baselines3.common.vec_env import VecEnv, VecMonitor, VecNormalize
 
     envs: VecEnv = VecMonitor(many)
@@ -286,7 +307,8 @@ def make_model(args: Args, settings: dict[str, Any], many: Any) -> Any:
 
 
 def make_logger(folder: Path, hidden: int) -> Any:
-    """A logger for TensorBoard; of what an earlier process logged, steps from `hidden` on are not shown."""
+    """Return a logger for TensorBoard; of what an earlier process logged, steps from `hidden` on are not
+    shown."""
     from stable_baselines3.common.logger import Logger, TensorBoardOutputFormat
     from torch.utils.tensorboard import SummaryWriter
 
@@ -297,6 +319,7 @@ def make_logger(folder: Path, hidden: int) -> Any:
 
 
 def main(argv: list[str] | None = None) -> int:
+    """Train, and return the exit code."""
     import tyro
 
     trained = train(tyro.cli(Args, args=argv, prog="python -m agents.train", description=__doc__))

@@ -37,6 +37,8 @@ SEEDS = range(1000, 1064)  # scored episodes; trainings start theirs from other 
 
 @dataclass(frozen=True)
 class Args(TrainingArgs):
+    """Arguments of the command."""
+
     trials: int = 20
     """that the study has in the end, those of earlier starts counted"""
     scores: int = 10
@@ -50,9 +52,12 @@ class Args(TrainingArgs):
 
 
 def load_space(path: Path, algo: str) -> dict[str, Any]:
-    """The ranges of `algo` in a file like agents/studies/spaces.yml: key to a list, or to a mapping with
-    "uniform" or "log" [low, high] and perhaps "lin". `DataFileError`: not such a file, or a range that is
-    none."""
+    """Return the ranges of `algo` in a file like agents/studies/spaces.yml: key to a list, or to a mapping
+    with "uniform" or "log" [low, high] and perhaps "lin".
+
+    Raises:
+        DataFileError: it is not such a file, or a range is malformed.
+    """
     try:
         space = yaml.safe_load(path.read_text(encoding="utf-8"))[algo]
         for key, how in space.items():
@@ -77,7 +82,8 @@ def load_space(path: Path, algo: str) -> dict[str, Any]:
 
 
 def draw(trial: Any, space: Mapping[str, Any], base: Mapping[str, Any]) -> dict[str, Any]:
-    """Settings for an Optuna trial: drawn from `space`, the others of the same setting as in `base`."""
+    """Draw settings for an Optuna trial from `space`; the other arguments of a nested setting are those in
+    `base`."""
     chosen: dict[str, Any] = {}
     for key, how in space.items():
         value: Any
@@ -95,8 +101,19 @@ def draw(trial: Any, space: Mapping[str, Any], base: Mapping[str, Any]) -> dict[
 
 
 class TrialScorer(Scorer):
-    """Keeps the mean returns in `curve`, rows of (steps, mean return); `report(steps, score)` may say after
-    each but the last that the training is to end, which is then pruned."""
+    """Scorer that keeps the mean returns and may prune the training.
+
+    Args:
+        env_id: id of the environment.
+        env_kwargs: its arguments.
+        every: steps between two scores.
+        report: called as `report(steps, score)` after each score but the last; True ends the training, which
+            is then pruned.
+
+    Attributes:
+        curve: rows of (steps, mean return).
+        is_pruned: True if `report` ended the training.
+    """
 
     def __init__(
         self,
@@ -123,9 +140,13 @@ class TrialScorer(Scorer):
 
 
 def tune(args: Args) -> Any:
-    """Run the study of `args` until it has all trials; returns the Optuna study. `ParameterError`,
-    `DataFileError`: what was given does not fit, or the study in the folder was begun with others.
-    `KeyboardInterrupt`: Ctrl-C; finished trials stay."""
+    """Run the study of `args` until it has all trials; return the Optuna study.
+
+    Raises:
+        ParameterError: an argument does not fit, or the study in the folder was begun with others.
+        DataFileError: a file does not fit.
+        KeyboardInterrupt: Ctrl-C; finished trials stay.
+    """
     check_number("trials", args.trials, low=1)
     check_number("scores", args.scores, low=1)
     kwargs = parse_pairs("--env-kwargs", args.env_kwargs)
@@ -158,7 +179,7 @@ def tune(args: Args) -> Any:
 def run_trial(
     trial: Any, args: Args, folder: Path, env_kwargs: dict[str, Any], settings: dict[str, Any]
 ) -> float:
-    """The last score of a training with `settings`; Optuna's `TrialPruned` for a bad one."""
+    """Return the last score of a training with `settings`; raise Optuna's `TrialPruned` for a bad one."""
     import optuna
 
     def report(steps: int, score: float) -> bool:
@@ -192,13 +213,18 @@ def run_trial(
 
 
 def finished(study: Any) -> list[Any]:
+    """Return the trials that are through or pruned."""
     return [trial for trial in study.trials if trial.state.name in ("COMPLETE", "PRUNED")]
 
 
 def open_study(args: Args, folder: Path, about: dict[str, Any]) -> Any:
-    """The study in `folder`, made if need be; a trial that was killed is queued to be run again.
-    `ParameterError`: Optuna is missing, the settings do not fit the algorithm, or the study was begun with
-    others. `DataFileError`: study.db is not a study."""
+    """Return the study in `folder`, made if need be; a trial that was killed is queued to be run again.
+
+    Raises:
+        ParameterError: Optuna is missing, the settings do not fit the algorithm, or the study was begun with
+            others.
+        DataFileError: study.db is not a study.
+    """
     try:
         import optuna
         from sqlalchemy.exc import SQLAlchemyError
@@ -238,7 +264,7 @@ def open_study(args: Args, folder: Path, about: dict[str, Any]) -> Any:
 
 
 def check_space(args: Args, about: dict[str, Any]) -> None:
-    """Build a model with settings that are drawn once, which refuses a key that is none."""
+    """Build a model with settings that are drawn once, which refuses a key that is unknown."""
     import optuna
 
     drawn = about["base"] | draw(optuna.create_study().ask(), about["space"], about["base"])
@@ -249,6 +275,7 @@ def check_space(args: Args, about: dict[str, Any]) -> None:
 
 
 def write_best(study: Any, folder: Path, env_id: str) -> None:
+    """Write best.yml, the settings of the best trial that is through."""
     complete = [trial for trial in study.trials if trial.state.name == "COMPLETE"]
     if complete:
         best = max(complete, key=lambda trial: trial.value)
@@ -258,6 +285,7 @@ def write_best(study: Any, folder: Path, env_id: str) -> None:
 
 
 def main(argv: list[str] | None = None) -> None:
+    """Search, and print the number of trials."""
     import tyro
 
     args = tyro.cli(Args, args=argv, prog="python -m agents.tune", description=__doc__)

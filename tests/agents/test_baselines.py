@@ -16,14 +16,7 @@ import yaml
 
 import hoof_env  # noqa: F401  registers the ids
 from agents import baselines, baselines_report, baselines_run, statistics
-from agents.baselines_report import (
-    LOWER,
-    compare,
-    dominates,
-    dominates_with_confidence,
-    following,
-    settled_speeds,
-)
+from agents.baselines_report import following, settled_speeds
 from agents.baselines_run import (
     CURVE,
     FINAL,
@@ -42,7 +35,17 @@ from agents.baselines_run import (
 )
 from agents.score import CURVE_SEEDS, FINAL_SEEDS, score_vector
 from agents.settings import FOLDER, load_settings
-from agents.statistics import Interval, Scored, iqm, mean_figures, over_episodes
+from agents.statistics import (
+    LOWER,
+    Interval,
+    Scored,
+    compare,
+    dominates,
+    dominates_with_confidence,
+    iqm,
+    mean_figures,
+    over_episodes,
+)
 from hoof_env.envs.policies import open_loop
 from hoof_env.errors import DataFileError, ParameterError
 from tests.agents.conftest import SHORT, TINY
