@@ -75,12 +75,15 @@ def work_off(chosen: Sequence[Run], folder: Path, workers: int) -> list[Run]:
     ) as bar:
         try:
             while waiting or running:
+                # Free places are filled at once, so that a long training holds up no other
                 while waiting and len(running) < workers:
                     one = waiting.pop(0)
                     running[one] = start(one, folder)
+                # Trainings take minutes: half a second between looks costs nothing
                 time.sleep(0.5)
                 for one in [one for one, process in running.items() if process.poll() is not None]:
                     running.pop(one)
+                    # Whatever the exit code says, a training is done if it has its final score
                     if not is_done(one, folder):
                         failed.append(one)
                         tqdm.write(f"{one.name} failed: {last_line(folder / one.name)}")
@@ -102,7 +105,9 @@ def is_done(one: Run, folder: Path) -> bool:
 
 def start(one: Run, folder: Path) -> subprocess.Popen[bytes]:
     """Begin a training, or go on with it, in a process that Ctrl-C does not reach."""
+    # The log needs the folder before the training makes it
     (folder / one.name).mkdir(parents=True, exist_ok=True)
+    # One thread each: several trainings share the cores
     threads = dict.fromkeys(("OMP_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS"), "1")
     with (folder / one.name / "log.txt").open("ab") as log:
         return subprocess.Popen(
@@ -125,6 +130,7 @@ def main(argv: list[str] | None = None) -> int:
     """Train all, write the page and return the exit code."""
     import tyro
 
+    # SIGTERM ends the trainings as Ctrl-C does, each with a checkpoint
     def interrupt(*_: Any) -> None:
         raise KeyboardInterrupt
 

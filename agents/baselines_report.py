@@ -75,6 +75,7 @@ def references(env_id: str) -> dict[str, Scored]:
     for name in (*GAITS, OPEN_LOOP):
         try:
             known[name] = reference(name, name, env_id)
+        # Not every id has an open-loop gait; the paper's gaits must be found
         except HoofEnvError:
             if name in GAITS:
                 raise
@@ -115,6 +116,7 @@ def following(title: str, speeds: Mapping[int, Sequence[float]]) -> Scored:
 def settled_speed(policy: str, command: float) -> float:
     """Return the mean speed [m/s] after the first `SETTLED` seconds under one command."""
     kwargs: dict[str, Any] = {"target_speed": [command, command]}
+    # Twice the same episodes, whole and cut off: the difference is the settled part
     with_start = score_vector(policy, SPEED, FINAL_SEEDS, **kwargs)
     start = score_vector(policy, SPEED, FINAL_SEEDS, **kwargs, episode_seconds=SETTLED)
     distance = np.mean([one["distance_m"] for one in with_start]) - np.mean(
@@ -205,6 +207,7 @@ def pace_table(rows: Sequence[Row], known: Mapping[str, Scored]) -> str:
         times.append({one.final["seed"]: seconds_to(level, one) for one in row.results})
     lines = []
     for row, rate, time in zip(rows, rates, times, strict=True):
+        # Only seeds that both rows have are paired
         both = [seed for seed in rate if seed in rates[0]]
         faster = [rate[seed] / rates[0][seed] for seed in both]
         parts = [time[seed] / times[0][seed] for seed in both if np.isfinite(time[seed] + times[0][seed])]
@@ -257,6 +260,7 @@ def draw_frontier(rows: Sequence[Row], known: Mapping[str, Scored], path: Path) 
         for row, marker in zip(rows, cycle("osD^vP*X")):
             rate = np.median([one.final["steps"] / one.final["wall_s"] for one in row.results])
             of = row.scored.intervals["return"]
+            # A single seed has no interval
             bars = np.nan_to_num([[of.mean - of.low], [of.high - of.mean]])
             axes.errorbar(
                 [rate],
@@ -336,6 +340,7 @@ def over_time(row: Row, key: str) -> tuple[Floats, Floats]:
     "wall_s"."""
     curves = [one.curve for one in row.results]
     last = min(curve[-1][key] for curve in curves)
+    # From the second score on: the first is of the untrained policy, at 0, which no logarithm shows
     first = min(max(curve[1][key] for curve in curves), last)
     x = np.geomspace(first, last, POINTS)
     each = [np.interp(x, [p[key] for p in curve], [p["return"] for p in curve]) for curve in curves]
@@ -372,6 +377,7 @@ def draw_curves(rows: Sequence[Row], known: Mapping[str, Scored], path: Path) ->
             axes.set_xlabel(label)
             axes.grid(axis="y", color=GREY, alpha=0.15)
         panels[0].set_ylabel("return: IQM, 95 % interval")
+        # One failed policy must not flatten all curves
         panels[0].set_ylim(bottom=max(lowest - 2, -25))
         panels[0].set_title(rows[0].entry.env_id, loc="left")
         handles, labels = panels[0].get_legend_handles_labels()
@@ -399,6 +405,7 @@ def report(args: Args) -> Path:
     write_data(rows, beside)
     parts += ["## What the gaits are like", figures_table(rows, gaits)]
     if LEG in gaits:
+        # The run is what the others are compared with
         others = [one for name, one in gaits[LEG].items() if name != "run"]
         agents = others + [row.scored for row in of_id(rows, LEG)]
         parts += ["## Beside the paper's run", compare(agents, gaits[LEG]["run"])]

@@ -116,6 +116,7 @@ def load_plan(name: str) -> tuple[Entry, ...]:
 
 def runs_of(plan: Sequence[Entry]) -> Iterator[Run]:
     """Yield all trainings of a plan, first seeds first: a table of whatever is done is fair at any time."""
+    # One seed of every entry, then the next seed; entries with fewer seeds are padded with None
     for row in zip_longest(*([Run(entry, seed) for seed in range(entry.seeds)] for entry in plan)):
         yield from filter(None, row)
 
@@ -139,9 +140,11 @@ def train_one(args: Args) -> bool:
     """Train, or go on training, and score; return False if it was interrupted. Errors are those of
     `train`."""
     check_number("points", args.points, low=1)
+    # Episodes of a training start at its seed: they must not reach the scored ones
     check_number("seed", args.seed, low=0, high=CURVE_SEEDS[0] // 2)
     name = args.env_id.rpartition("/")[2]
     folder = args.out or Path("runs/baselines", f"{args.algo}-{name}-s{args.seed}")
+    # final.json is written last, so a training that has it is complete
     if (folder / FINAL).is_file():
         return True
     env_kwargs = parse_pairs("--env-kwargs", args.env_kwargs)
@@ -190,6 +193,7 @@ class CurveScorer(Scorer):
         steps = self.num_timesteps
         self.rows = [row for row in read_curve(self.path) if row["steps"] <= steps] if steps else []
         self.starter = os.getppid()
+        # A new curve begins with the untrained policy
         if not self.rows:
             self.score()
             return
@@ -201,6 +205,7 @@ class CurveScorer(Scorer):
         )
 
     def _on_step(self) -> bool:
+        # An orphan would train on unseen; SIGTERM leaves a checkpoint
         if os.getppid() != self.starter:
             os.kill(os.getpid(), signal.SIGTERM)
             self.starter = os.getppid()
@@ -293,6 +298,7 @@ def read_result(entry: Entry, folder: Path) -> Result:
         (result.final["env_kwargs"], entry.env_kwargs),
         (config, expected_settings(entry)),
     ):
+        # A table must not mix results of different settings
         keys = sorted(key for key in {**used, **expected} if used.get(key) != expected.get(key))
         if keys:
             here, there = ({key: some.get(key) for key in keys} for some in (expected, used))
@@ -311,9 +317,11 @@ def expected_settings(entry: Entry) -> dict[str, Any]:
 def seconds_to(level: float, result: Result) -> float:
     """Return the wall time of training [s] until the learning curve first reaches a return; infinite if it
     does not. The curve is linear between two scores."""
+    # The first row is the untrained policy
     before, *later = result.curve
     for row in later:
         if row["return"] >= level:
+            # Linear between two scores, but not before the earlier one
             part = (level - before["return"]) / (row["return"] - before["return"])
             return before["wall_s"] + max(part, 0.0) * (row["wall_s"] - before["wall_s"])
         before = row

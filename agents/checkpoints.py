@@ -48,6 +48,7 @@ def whole(folder: Path) -> Iterator[Path]:
         stage = Path(tempfile.mkdtemp(prefix=UNFINISHED, dir=folder.parent))
         try:
             yield stage
+            # The files reach the disk before the name does: a crash leaves no checkpoint with holes
             for path in (*stage.iterdir(), stage):
                 _flush(path)
             stage.rename(folder)
@@ -68,6 +69,7 @@ def tidy(run: Path, keep: int = KEPT) -> None:
     """Remove all checkpoints but the last `keep`, and what killed processes left; no checkpoint is ever seen
     half-removed."""
     for path in checkpoints(run)[keep:]:
+        # Renaming is atomic, removing a folder is not: a reader never finds half a checkpoint
         path.rename(path.with_name(f"{UNFINISHED}{path.name}"))
     for folder in (run, run / runs.CHECKPOINTS):
         for path in folder.glob(f"{UNFINISHED}*"):
@@ -139,6 +141,7 @@ class Resumed:
             self._state = pickle.loads((checkpoint / STATE).read_bytes())
             self.seconds: float = self._state["seconds"]
             monitor = VecMonitor(many)
+            # As `make_model` wraps them: the monitor inside, the normalisation outside
             envs: Any = monitor
             if (checkpoint / runs.STATISTICS).exists():
                 envs = VecNormalize.load(str(checkpoint / runs.STATISTICS), monitor)
@@ -164,6 +167,7 @@ class Resumed:
         model = self.model
         if states is None:
             model._last_obs = None  # the training resets them
+            # New episodes, but not those that the first start played
             many.seed((model.seed or 0) + model.num_timesteps)
             return
         many.reset()
@@ -184,6 +188,7 @@ class Resumed:
 
     def start(self) -> None:
         """Restore what setting up a training resets; call it when the training starts."""
+        # `learn` resets the action noise, whose state is part of the checkpoint
         if self._noise is not None:
             self.model.action_noise = self._noise
 
@@ -192,6 +197,7 @@ class Resumed:
         starts."""
         import torch
 
+        # Not in `start`: setting up a training draws from these generators
         generators = self._state["generators"]
         random.setstate(generators["python"])
         np.random.set_state(generators["numpy"])  # noqa: NPY002

@@ -26,6 +26,7 @@ def run(command: Callable[[], int | None]) -> NoReturn:
     An error of this package or of the system, as a full disk, is one line and code 2; Ctrl-C is one line and
     code 130; a warning is one line, too.
     """
+    # Other threads' errors keep their tracebacks
     hook = threading.excepthook  # TensorBoard's thread fails on a full disk; its caller reports that, too
     bear_any_output()
     threading.excepthook = lambda args: None if isinstance(args.exc_value, OSError) else hook(args)
@@ -37,6 +38,7 @@ def run(command: Callable[[], int | None]) -> NoReturn:
         flush_or_drop()
         print(f"error: {error}", file=sys.stderr)
         code = 2
+    # JSON and YAML parsers recurse once a level
     except RecursionError:
         print("error: a file or an argument is nested too deep", file=sys.stderr)
         code = 2

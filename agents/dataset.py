@@ -88,6 +88,7 @@ def write(args: Args) -> Path:
         import minari.data_collector  # which asks for more than reading does
     except ImportError:
         raise MissingExtraError('agents.dataset needs Minari: pip install "hoof-env[minari]"') from None
+    # All arguments are checked before Minari makes a folder
     _check_policies(args.policies)
     episodes = count("episodes", args.episodes)
     dataset_id = check_id(args.dataset_id or default_id(args.env_id, args.policies))
@@ -96,6 +97,7 @@ def write(args: Args) -> Path:
         raise OutputError(f"{folder}: expected no dataset there; choose another --dataset-id or --out")
     args.out.mkdir(parents=True, exist_ok=True)
     kwargs = parse_pairs("--env-kwargs", args.env_kwargs)
+    # Minari finds its folder by the environment alone
     before = os.environ.get(ROOT)
     with tempfile.TemporaryDirectory(dir=args.out, prefix=".making-") as making:
         os.environ[ROOT] = making
@@ -125,6 +127,7 @@ def load(dataset_id: str) -> Any:
     except ImportError:
         raise MissingExtraError('agents.dataset needs Minari: pip install "hoof-env[minari]"') from None
     dataset = minari.load_dataset(dataset_id)
+    # Before `recover_environment`, which imports what the dataset names
     check_environment(dataset)
     with dataset.recover_environment() as env:
         check_actions(dataset, env)
@@ -138,6 +141,7 @@ def check_environment(dataset: Any) -> None:
     known = gym.registry.get(spec.id)
     task = str(spec.kwargs.get("task", ""))
     registered = known.kwargs.get("task") if known else None
+    # The id alone proves nothing: an entry point or a wrapper in the dataset may be any code
     same = known is not None and spec.entry_point == known.entry_point and not spec.additional_wrappers
     if not same or (":" in task and task != registered):
         raise DataFileError(
@@ -219,6 +223,7 @@ def _collect(minari: Any, env: Any, args: Args, episodes: int, dataset_id: str) 
         for name, policy in policies.items():
             totals = []
             options = plain_start(policy)
+            # One environment for all episodes, so that a seed alone decides how an episode goes
             for k in range(episodes):
                 observation, _ = collector.reset(seed=args.seed + k, options=options)
                 total = 0.0

@@ -92,6 +92,7 @@ def demo(args: Args) -> Path:
             print_counts(reproduction)
 
         with announced(2, f"scripted policies in {ENV_ID}, {budget.episodes} episodes each"):
+            # The same episodes for all policies, the agent included
             playing = evaluate.Args(policy=SCRIPTED, episodes=budget.episodes, seed=FIRST_SEED, env_id=ENV_ID)
             scores, _ = evaluate.evaluate(playing)
             evaluate.print_table(scores)
@@ -142,9 +143,11 @@ def train_agent(args: Args, budget: Budget, stage: Path) -> train.Trained:
             checkpoint_every=0,
         )
     )
+    # A report about half a training would mislead
     if trained.stopped_by:
         raise KeyboardInterrupt
     for name in filter(lambda name: (folder / name).is_file(), (*runs.FILES, runs.STATISTICS)):
+        # Into the report's folder, so that agents.evaluate can play it as a run
         os.replace(folder / name, stage / name)
     shutil.rmtree(folder)  # TensorBoard's curves are in monitor.csv too
     return trained
@@ -160,6 +163,7 @@ def film_all(scores: Sequence[evaluate.Score], budget: Budget, stage: Path) -> l
         policy = str(stage / runs.MODEL) if name == TRAINED else name
         path = stage / f"{name.replace(' ', '-')}.mp4"
         render_episode(path, policy, ENV_ID, seed=FIRST_SEED, seconds=budget.film_seconds, size=size)
+        # The film shows the first scored episode: its caption has the figures of that
         first = first_episodes[name]
         way = "forward" if first["distance_m"] >= 0 else "backward"
         caption = (

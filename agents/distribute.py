@@ -85,6 +85,7 @@ def parse_space(items: Sequence[str]) -> dict[str, list[Any]]:
         values = parse_pairs("--space", [f"values={text}"])["values"]
         if not (key and values and isinstance(values, list)):
             raise ParameterError(f"--space: expected key=[JSON, ...], got {item!r}; agents.tune searches")
+        # The later one would replace the earlier silently
         if key in space:
             raise ParameterError(f"--space: {key} is given twice")
         space[key] = values
@@ -94,6 +95,7 @@ def parse_space(items: Sequence[str]) -> dict[str, list[Any]]:
 def check_keys(keys: Iterable[str], algo: str, settings: Iterable[str]) -> None:
     """Refuse keys that are neither hyperparameters of `algo`, nor in its `settings`, nor an environment's."""
     known = {*inspect.signature(algorithm_class(algo)).parameters, *settings, "normalize", "n_envs"}
+    # Arguments that the command itself sets
     known -= {"env", "seed", "device", "_init_setup_model", "verbose", "tensorboard_log", "n_timesteps"}
     for key in keys:
         if key not in known and not key.startswith(ENV):
@@ -114,8 +116,10 @@ def prepare(args: Trials) -> dict[str, Any]:
     space = parse_space(args.space)
     check_keys(space, args.algo, settings)
     with runs.make_env(args.env_id, **env_kwargs) as env:
+        # Once here, not in every worker at the same time
         runs.warm_up(env)  # kernels are compiled before workers want them
     for key, values in space.items():
+        # A value that no environment takes fails here, not in a worker
         for value in values if key.startswith(ENV) else ():
             runs.make_env(args.env_id, **env_kwargs | {key.removeprefix(ENV): value}).close()
     return {
@@ -176,6 +180,7 @@ def experiment_name(args: Trials) -> str:
     """Return the folder's name, with a digest of the arguments that a result depends on; where it runs does
     not count."""
     asked = {key: value for key, value in asdict(args).items() if key not in Cluster.__dataclass_fields__}
+    # The same arguments find the same folder again, other ones never
     digest = hashlib.sha256(json.dumps(asked, sort_keys=True).encode()).hexdigest()[:8]
     return f"{args.algo}-{args.env_id.rpartition('/')[2]}-{digest}"
 
@@ -196,6 +201,7 @@ def start(args: Cluster) -> None:
             "pip install 'hoof-env[distribute]'"
         )
     check_number("retries", args.retries, low=0)
+    # None is all cores, by Ray's own count
     if args.cpus is not None:
         check_number("cpus", args.cpus, low=1)
     os.environ.setdefault("RAY_AIR_NEW_OUTPUT", "0")

@@ -51,6 +51,7 @@ def train_trial(config: dict[str, Any]) -> None:
         env_kwargs=(json.dumps(env_kwargs),),
         params=(json.dumps(params),),
     )
+    # run.json shall name the user's command, not that of Ray's worker
     sys.orig_argv = shlex.split(config["command"])
     try:
         train(args, reporter)
@@ -85,6 +86,7 @@ class Reporter(Scorer):
         super()._on_rollout_start()
         if self.scored_at > before:
             checkpoints.save(self.model, self.folder, self.wall_s)
+            # Each report uploads the folder: one checkpoint is enough
             checkpoints.tidy(self.folder, keep=1)
             self.report()
             self._start_clock()
@@ -144,6 +146,7 @@ def last_failure(trial: Any) -> str:
 def reason(error: str) -> str:
     """Return the last failure in a line: Ray writes its message first, but after a traceback Python's is
     last."""
+    # Ray colours its messages
     error = re.sub(r"\x1b\[[\d;]*m", "", error)
     lines = [line.strip() for line in error.rpartition("Failure #")[2].strip().splitlines()]
     lines = [line for line in lines if "(occurred at" not in line] or ["unknown."]
@@ -160,6 +163,7 @@ def write_table(results: Any, folder: str, varied: list[str]) -> int:
     for result, trial in sorted(pairs, key=lambda pair: Path(pair[0].path).name):
         report = result.metrics or {}
         config = result.config or {}
+        # A trial that failed at once has no checkpoint
         kept = result.checkpoint.path if result.checkpoint else ""
         why = reason(str(result.error)) if result.error else report.get("failed")
         is_done = trial.status == "TERMINATED" and trial.trial_id not in Progress.going

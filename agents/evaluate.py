@@ -79,6 +79,7 @@ def film_paths(video: Path, names: Sequence[str]) -> dict[str, Path]:
         raise ParameterError(f"--video: expected a file that ends in .mp4, got {str(video)!r}")
     paths: dict[str, Path] = {}
     for name in dict.fromkeys(names):
+        # Every model has this file name; its run folder tells them apart
         short = Path(name).parent.name if name.endswith("model.zip") else Path(name).stem
         suffix = f"-{short}" if len(set(names)) > 1 else ""
         path = video.with_name(f"{video.stem}{suffix}{video.suffix or '.mp4'}")
@@ -120,6 +121,7 @@ def evaluate(args: Args) -> tuple[list[Score], dict[str, Any]]:
     from tqdm import tqdm
 
     _check(args)
+    # Before anything is played: two policies may ask for one file
     films = film_paths(args.video, args.policy) if args.video else {}
     env_id, env_kwargs = _environment(args)
     scores = []

@@ -42,6 +42,8 @@ def generations(
 ) -> Iterator[tuple[list[Floats], list[float]]]:
     """Improve a strategy for `count` generations; yield the points of each and their costs."""
     for _ in range(count):
+        # Ask, score, tell: whatever the caller does to the strategy between generations counts from the next
+        # on
         points = strategy.ask()
         costs = costs_of(points)
         strategy.tell(points, costs)

@@ -94,6 +94,7 @@ def write_policy(trained: runs.TrainedPolicy, out: Path, metadata: dict[str, Any
     with staged(out.parent) as stage:
         write_onnx(module, observations[:2], stage / out.name, metadata)
         off = difference(trained, OnnxPolicy(stage / out.name).predict, observations)
+        # Written so that NaN is refused as well
         if not off <= TOLERANCE:
             raise DataFileError(
                 f"{out}: expected actions within {TOLERANCE:g} of the model's, got {off:.2g}; not kept"
@@ -143,6 +144,7 @@ class Deterministic(torch.nn.Module):
         if self.clip is not None:
             scaled = (observation.double() - self.mean) / self.scale
             observation = scaled.clamp(-self.clip, self.clip).float()
+        # From here on as `BasePolicy.predict`: squashed actions are scaled, others clipped
         action = self.policy._predict(observation, deterministic=True)
         if self.policy.squash_output:  # in [-1, 1]: to the limits of the space
             return self.low + 0.5 * (action + 1.0) * (self.high - self.low)
@@ -167,6 +169,7 @@ def some_observations(space: gym.Space[Any]) -> Any:
         raise ParameterError(f"model: expected one that observes vectors, got {space}")
     space.seed(0)
     rows = np.stack([space.sample() for _ in range(TRIED)]).astype(np.float32)
+    # Far outside, to test the limits of normalisation and actions
     rows[::10] *= 100
     return rows
 
@@ -178,6 +181,7 @@ def _quietly() -> Iterator[None]:
 
     logger = logging.getLogger("torch.onnx")
     level = logger.level
+    # Torch has no getter; the setter changes this attribute of the class
     checked = Distribution._validate_args
     logger.setLevel(logging.ERROR)
     Distribution.set_default_validate_args(False)
@@ -223,6 +227,7 @@ def difference(trained: Any, predict: Any, observations: Any) -> float:
     space = trained.model.action_space
     half = (space.high - space.low) / 2
     wanted, _ = trained.predict(observations)
+    # A policy must act on one observation as on many: batch sizes are dynamic
     alone = [predict(row)[0].reshape(-1) for row in observations[:20]]
     both = (predict(observations)[0], np.array(alone))
     return float(max(np.max(np.abs(one - wanted[: len(one)]) / half) for one in both))

@@ -105,6 +105,7 @@ def stances_of(time: Floats, forces: Floats, pushes: Floats, lift_off: float) ->
         begins = np.flatnonzero(np.diff(loaded.astype(int)) == 1)
         ends = np.flatnonzero(np.diff(loaded.astype(int)) == -1)
         for begin, end in zip(begins, ends, strict=True):
+            # A stance cut off by the record's ends has no duration; a short one is a bounce
             if begin > 0 and end < len(time) and time[end - 1] - time[begin] > SHORTEST:
                 when = slice(begin, end)
                 found.append(Stance(leg, time[begin], time[end - 1], forces[when, leg], pushes[when, leg]))
@@ -118,6 +119,7 @@ def lag_of(stances: list[Stance], stride: float) -> float:
     hind = np.array([one.began for one in stances if one.leg >= 2])
     if not len(fore) or not len(hind):
         return float("nan")
+    # The next landing of either fore hoof: left and right are interchangeable
     gaps = [(fore[fore >= landed].min() - landed) / stride for landed in hind if (fore >= landed).any()]
     return mean_lag(gaps)
 
@@ -138,6 +140,7 @@ def watch(envs: Any, policy: Any, speed: float, gait: Floats | None = None) -> P
     settled = round(SETTLED / dt)
     steps = round(SECONDS / dt)
     for k in range(steps):
+        # All rows are asked together; a failed one plays on, but is not counted
         actions, state = policy.predict(seen, state, episode_start=start, deterministic=True)
         seen, _, failed, _, infos = envs.step(np.asarray(actions, np.float32))
         start = np.zeros(n, bool)
@@ -193,6 +196,7 @@ def _from_sums(played: Played, kilograms: float, height: float) -> dict[str, flo
         for name, values in found.items()
     }
     result: dict[str, float] = {}
+    # Forces by the mass of the animal, which makes sizes comparable
     for k, pair in enumerate(PAIRS):
         for name, of in (("peak", "peak"), ("mean", "mean"), *((f"mean_{x}", x) for x in HORIZONTAL)):
             result[f"{name}_{pair}"] = float(pairs[of][k]) / kilograms
@@ -214,6 +218,7 @@ def _from_sums(played: Played, kilograms: float, height: float) -> dict[str, flo
 def _from_stances(played: Played, kilograms: float) -> dict[str, Any]:
     """Return the figures that need the forces at every substep, over watched episodes that are upright; NaN
     if there are none."""
+    # Mean duration of a stride: turns of the cranks are strides
     period = played.seconds / float(played.turns.mean(0)[played.upright].mean())
     lift_off = LIFT_OFF * kilograms * GRAVITY / len(LEGS)
     stances = []
@@ -224,6 +229,7 @@ def _from_stances(played: Played, kilograms: float) -> dict[str, Any]:
         own = stances_of(time, forces, pushes, lift_off)
         stances += own
         lags.append(lag_of(own, period))
+        # Of the first upright episode
         footfall = footfall or footfall_of(own, time[-1], 2 * period)
     of_pairs = {pair: [one for one in stances if one.leg // 2 == k] for k, pair in enumerate(PAIRS)}
     result: dict[str, Any] = {

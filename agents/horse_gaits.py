@@ -87,6 +87,7 @@ def decode(x: Floats) -> Floats:
     """Convert points of the box [-1, 1] to gaits, both of shape (n, 16)."""
     low = [RATE[0], -0.5, *[-PART, -PART, *np.subtract(CENTRE, SPANS)] * len(PAIRS)]
     high = [RATE[1], 0.5, *[PART, PART, *np.add(CENTRE, SPANS)] * len(PAIRS)]
+    # The box is wider than what a gait may be at some points
     return np.clip(low + (x + 1) / 2 * np.subtract(high, low), *bounds())
 
 
@@ -151,6 +152,7 @@ class BatchRollout:
             ended |= terminated | truncated
             if ended.all():
                 break
+            # Only stances in the gait itself count, not those of the start
             if step > self.steps // 3:  # hooves have landed in the gait
                 m = infos["measured"]
                 lags += ~ended * landings(gaits, np.array([m[f"{leg}_stance_began"] for leg in LEGS]))
@@ -173,6 +175,7 @@ def landings(gaits: Floats, theta: Floats) -> NDArray[np.complex128]:
         lead = gaits[:, 1] * (k == 0)
         begin = _complex(stride.phase(np.ones(len(gaits)), np.zeros(len(gaits))))
         phases = [_complex(stride.phase(np.cos(each), np.sin(each))) for each in theta[2 * k : 2 * k + 2]]
+        # Relative to the phase at crank angle 0; the square makes half a stride a whole turn
         at.append((np.array(phases) / (begin * np.exp(2j * np.pi * lead))) ** 2)
     found: NDArray[np.complex128] = at[0].mean(0) * at[1].mean(0).conj()
     return found
@@ -222,8 +225,10 @@ class Search:
             return mean_costs(returns, STARTS)
 
         for _ in generations(self.strategy, costs_of, count):
+            # The speed will change: a search that has converged could not follow
             self.strategy.sigma = max(self.strategy.sigma, NEXT)
             tick(speed, highest)
+        # The mean of the distribution, not its luckiest candidate; other starts than the search's
         gait = self.gaits(self.strategy.result.xfavorite[None])[0].round(5)
         returns, summaries, lags = course.play(
             np.tile(gait, (POPULATION * STARTS, 1)), 10**6, POPULATION * STARTS
@@ -296,6 +301,7 @@ class Finder:
         speed = first
         for _ in range(MOST):
             speed = speed * ratio
+            # Beyond the last speed, upward or downward
             if (speed - last) * (ratio - 1) > 0:
                 break
             steps.append(search.run(speed, self.args.each, tick))
@@ -314,6 +320,7 @@ class Finder:
             )[0]
             for seed in range(args.restarts)
         ]
+        # Restarts end in different gaits: the ramps go on from the best one
         best = np.array(max(begins, key=lambda one: float(one["return"]))["gait"])
         for way, ratio, last in (("faster", STEP, 8.0), ("slower", 1 / STEP, speed_of(LOWEST) / STEP)):
             self.keep(
@@ -342,6 +349,7 @@ def trunk_series(gait: list[float], speed: float) -> list[list[float]]:
     for k in range(course.steps - 1):
         _, _, terminated, _, infos = envs.step(np.zeros((envs.num_envs, 16), np.float32))
         upright &= ~terminated
+        # The first half is the way into the gait
         if k >= course.steps // 2:
             m = infos["measured"]
             rows.append([m[name].copy() for name in ("left_hind_theta", "y", "vx", "pitch")])
@@ -350,7 +358,9 @@ def trunk_series(gait: list[float], speed: float) -> list[list[float]]:
     zero = np.zeros(1)
     begin = stride.phase(one, zero)
     now = stride.phase(np.cos(theta), np.sin(theta))
+    # From crank angle 0, as in `landings`
     phase = np.arctan2(now[1], now[0]) - np.arctan2(begin[1], begin[0])
+    # Even harmonics of the stride: the trunk moves twice a stride
     order = 2 * np.arange(1, HARMONICS + 1)
     waves = [wave(n * phase) for n in order for wave in (np.cos, np.sin)]
     terms = np.stack([np.ones_like(phase), *waves], 1)

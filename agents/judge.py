@@ -74,6 +74,7 @@ def rejection_reason(figures: dict[str, Any], pairs: Sequence[str]) -> str:
     found = []
     if figures["fell"] > MOST_FALLS:
         found.append(f"fell in {100 * figures['fell']:.3g} % of episodes")
+    # Written so that NaN is a reason, too
     kept = figures["reached"] / figures["speed"]
     if not abs(kept - 1) <= MOST_OFF:
         found.append(f"{kept:.2f} of the commanded speed")
@@ -121,6 +122,7 @@ def pairs_of(name: str) -> Sequence[str]:
     if name == "two_peaked":
         return PAIRS[:1]
     own = name.rpartition("_")[2]
+    # The share of the impulse is about both pairs, whatever its name ends in
     return [own] if own in PAIRS and name != "impulse_fore" else PAIRS
 
 
@@ -132,6 +134,7 @@ def judged(
     known = bool(np.isfinite(ours))
     flaws = [gait.flaw, rejection_reason(gait.figures, pairs_of(name)) if gait.figures else ""]
     why = ", ".join(filter(None, flaws))
+    # A reason comes before a missing figure: a gait that falls has no figures
     if not known:
         verdict = why or "not measured"
     elif bars:
@@ -172,6 +175,7 @@ def _trot(judges: dict[str, Any], standing: list[dict[str, Any]]) -> Iterator[tu
     """Yield rows of the trot: peaks, and duty factors at several speeds."""
     trots = trots_of(standing)
     lowest = judges["reported"]["walk_to_trot"]["horse"]
+    # Slower ones would be compared with peaks that no horse has at a walk's speed
     quick = [one for one in trots if one["froude_reached"] >= lowest]  # where a horse trots, too
     what = f"trot-like gait from Froude number {lowest:g} on"
     trot = at_speed(judges["trot"]["froude"], quick, what, near=np.inf)
@@ -181,6 +185,7 @@ def _trot(judges: dict[str, Any], standing: list[dict[str, Any]]) -> Iterator[tu
     source = judges["duty"]["source"]
     for froude, judge in of_speeds(judges["duty"]):
         gait = at_speed(froude, trots, "trot-like gait")
+        # Published mean of each source, plus and minus the spread
         bars = [(x - judge["bar"], x + judge["bar"]) for x in judge["horse"]]
         for pair in PAIRS:
             title = f"trot-like at {froude}: duty_{pair}"
@@ -243,6 +248,7 @@ def pool(each: list[list[dict[str, Any]]]) -> list[dict[str, Any]]:
             values = [other[name] for other in who if np.isfinite(other[name])]
             if not values:  # none that was watched stayed up
                 continue
+            # An arithmetic mean of 0.01 and 0.49 would be a walk
             if name == "lag":  # a trot may be just before 0 or just after
                 middle = mean_lag(values)
                 values = [middle + (x - middle + 0.25) % 0.5 - 0.25 for x in values]
@@ -291,6 +297,7 @@ def main(argv: list[str] | None = None) -> None:
             f"episode_seconds: expected {SECONDS:g} or more, for that long is judged, got"
             f" {envs.batch.episode_seconds:g}"
         )
+    # An animal of another size reaches a Froude number at another speed
     pace = envs.batch.body.height / HIP_HEIGHT  # Froude numbers are of the animal's own hips
     with runs.make_env(ENV_ID, **env_kwargs) as env:
         for name in args.policies:

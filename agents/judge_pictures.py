@@ -40,6 +40,7 @@ def forces(figures: Figures, shown: list[dict[str, Any]]) -> Any:
     for column, one in enumerate(shown):
         for row, pair in enumerate(PAIRS):
             for other in figures.values():
+                # A policy that falls at this speed has no curves
                 same = next((o for o in other if o["speed"] == one["speed"] and "curves" in o), None)
                 if same and same["curves"][pair]:
                     axes[row, column].plot(same["curves"][pair], lw=1.2, color=f"C{row}", alpha=0.8)
@@ -62,6 +63,7 @@ def footfall(shown: list[dict[str, Any]]) -> Any:
     picture = Figure((2.6 * len(shown), 1.9), layout="constrained")
     for axis, one in zip(picture.subplots(1, len(shown), squeeze=False)[0], shown, strict=True):
         for leg, began, ended in one["footfall"]:
+            # The first leg on top, as the labels are
             axis.barh(len(LEGS) - leg, ended - began, left=began, height=0.6, color=f"C{leg // 2}")
         axis.set_yticks(range(len(LEGS), 0, -1), [name.replace("_", " ") for name in LEGS], fontsize=8)
         axis.set_ylim(0.4, len(LEGS) + 0.6)

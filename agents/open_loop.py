@@ -202,8 +202,10 @@ def search(
     step = STEP
     if start is not None:
         first = np.array([*encode(start), *[0.0] * (size - len(start))])
+        # A start that was found before needs a search around it only
         step = STEP / 3
     else:
+        # A quarter of the starts for each point: many poor points are told from good ones by few episodes
         screened = generator.uniform(-1, 1, (ROWS // 4, size))
         screened[:, 4:12] *= HARMONIC
         first = screened[np.argmin(costs(screened, 4))]
@@ -219,6 +221,7 @@ def search(
                 break
     except KeyboardInterrupt:
         interrupted = True
+    # Rounded before the last score, so that the score is that of the numbers in the file
     finalists = np.clip(np.round((best * FINALISTS)[:FINALISTS], 5), -1.0, 1.0)
     final = costs(finalists, ROWS // FINALISTS)
     return finalists[np.argmin(final)], min(final), interrupted
@@ -281,6 +284,7 @@ def search_once(objective: Objective, seed: int, about: dict[str, Any], bar: Any
         bar.update(count)
         bar.set_postfix(cost=f"{lowest:.3f}")
 
+    # Every second one: a start may lie in a valley without the best gait
     start = about["start"] if seed % 2 else None
     x, cost, interrupted = search(objective, seed, about["episodes_of_a_search"], tick, start)
     parameters = {key: value.tolist() for key, value in decode(objective.family, x).items()}

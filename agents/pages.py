@@ -33,6 +33,7 @@ def draw_learning_curve(folder: Path, scores: Sequence[Score], path: Path, **opt
         **options: options of `Figure.savefig`.
     """
     episodes = runs.read_episodes(folder)
+    # Equal numbers of episodes: short trainings have fewer bins
     bins = [part for part in np.array_split(episodes, BINS) if len(part)]
     with matplotlib.rc_context({**STYLE, "font.size": 10}):
         figure = Figure(figsize=(7, 3.6), layout="constrained")
@@ -54,6 +55,7 @@ def draw_learning_curve(folder: Path, scores: Sequence[Score], path: Path, **opt
             axes.axhline(level, color=ORANGE, lw=1, ls="--")
         height = 0.065 * np.ptp(axes.get_ylim())  # of a line of text
         below = -np.inf
+        # From the lowest up, each label at least a line above the one before
         for name, level in sorted(others, key=lambda one: one[1]):
             below = max(level, below + height)
             axes.annotate(

@@ -38,6 +38,7 @@ B1, B2, B3, B4 = (np.float32(number) for number in (16216200, 945945, 13860, 45)
 def tanh(x):  # type: ignore[no-untyped-def]
     """Return tanh by the first nine terms of Lambert's continued fraction, within 8e-6: without a call, so
     that the compiler can vectorise it."""
+    # Beyond, the fraction would overflow; tanh is 1 to the last bit long before
     x = min(max(x, -FAR), FAR)
     s = x * x
     above = x * (C0 + s * (A1 + s * (A2 + s * (A3 + s))))
@@ -66,12 +67,14 @@ def forward(x, matrices, biases, outputs):  # type: ignore[no-untyped-def]
 def backward(x, matrices, outputs, slopes, by_matrices, by_biases):  # type: ignore[no-untyped-def]
     """Compute the derivatives by matrices and biases from those by the last outputs, which the last of
     `slopes` holds; the others are overwritten with those by the hidden layers."""
+    # From the last layer to the first, each from the slopes of the next one
     for k in range(len(matrices) - 1, -1, -1):
         slope = slopes[k]
         by_bias = by_biases[k]
         if k < len(matrices) - 1:
             np.dot(slopes[k + 1], matrices[k + 1], slope)
             y = outputs[k]
+            # Slope of tanh by its own value: 1 - tanh^2
             for i in range(slope.shape[0]):
                 for j in range(slope.shape[1]):
                     slope[i, j] *= ONE - y[i, j] * y[i, j]
@@ -102,6 +105,7 @@ def loss_of(  # type: ignore[no-untyped-def]
     `LOG_PROB` and the names after it are the columns of `steps`. The entropy is the sum of `log_std`, up to a
     constant.
     """
+    # Of the entropy, which grows with every logarithm by 1
     by_log_std[:] = -ent_coef * np.float32(len(steps)) / count
     losses[:] = ZERO
     for i in range(len(steps)):
@@ -111,6 +115,7 @@ def loss_of(  # type: ignore[no-untyped-def]
             log_prob -= HALF * z * z + log_std[k - ACTIONS]
         ratio = np.exp(log_prob - steps[i, LOG_PROB])
         advantage = steps[i, ADVANTAGE]
+        # Clipped surrogate (Eq. 7): its slope is 0 where the clipped ratio is the smaller one
         held = min(max(ratio, ONE - clip_range), ONE + clip_range)
         losses[0] -= min(ratio * advantage, held * advantage) / count
         weight = -ratio * advantage / count if ratio * advantage <= held * advantage else ZERO
@@ -120,6 +125,7 @@ def loss_of(  # type: ignore[no-untyped-def]
             by_log_std[k] += weight * (z * z - ONE)
         error = values[i, 0] - steps[i, TARGET]
         losses[1] += error * error / count
+        # Twice the coefficient: the derivative of a square
         by_values[i, 0] = (vf_coef + vf_coef) * error / count
 
 
@@ -213,6 +219,7 @@ class Weights:
     def of(cls, policy: Any) -> Weights:
         """Return the weights of a policy; its parameters become views of the vector."""
         vector = parameters_to_vector(policy.parameters()).detach()
+        # From here on the optimiser changes one vector, and torch sees it
         vector_to_parameters(vector, policy.parameters())
 
         def network(hidden: nn.Sequential, last: nn.Linear) -> Network:

@@ -69,6 +69,7 @@ class Scale:
     def after(self, rewards: Floats, ended: NDArray[np.bool_]) -> np.float32:
         """Return the scale that includes these steps; `rewards` and `ended` have shape (T, n)."""
         returns = np.empty_like(rewards)
+        # An episode that has ended contributes nothing to the next return
         goes_on = np.float32(self.gamma) * ~ended
         for t in range(len(rewards)):
             returns[t] = self.returns + rewards[t]
@@ -77,6 +78,7 @@ class Scale:
         mean = float(returns.mean(dtype=np.float64))
         gap = mean - self.mean
         own = float(returns.var(dtype=np.float64))
+        # Chan et al.: variances of two samples, pooled with the gap of their means
         between = gap**2 * self.count * returns.size / count
         self.square = (self.square * self.count + own * returns.size + between) / count
         self.mean = self.mean + gap * returns.size / count
@@ -148,6 +150,7 @@ class FlatPPO(OnPolicyAlgorithm):
         num_threads: int | None = None,
         _init_setup_model: bool = True,
     ) -> None:
+        # The default of Stable-Baselines3's policy, too; other activations have no kernel
         kwargs = {"activation_fn": nn.Tanh, **(policy_kwargs or {})}
         if kwargs["activation_fn"] is not nn.Tanh or str(device) not in ("cpu", "auto"):
             raise ParameterError(
@@ -158,6 +161,7 @@ class FlatPPO(OnPolicyAlgorithm):
             raise ParameterError(f"policy_kwargs: expected some of {known}, got {', '.join(unknown)}")
         if batch_size < 2:
             raise ParameterError(f"batch_size: expected 2 or more, for its advantages, got {batch_size!r}")
+        # A reward scaled twice would have the wrong size
         if norm_reward and isinstance(env, VecNormalize) and env.norm_reward:
             raise ParameterError("norm_reward: expected False where `normalize` does it, got both")
         self.batch_size = batch_size
@@ -226,6 +230,7 @@ class FlatPPO(OnPolicyAlgorithm):
         callback.on_rollout_start()
         ended = np.zeros(buffer.rewards.shape, bool)
         cut_off = []  # by a time limit: step, environment and its last observation
+        # All of a rollout at once, which is one call instead of one a step
         noise = self.random.standard_normal(buffer.actions.shape, np.float32)
         buffer.log_probs[:] = -0.5 * np.square(noise).sum(-1) - weights.log_std.sum()
         noise *= np.exp(weights.log_std)
@@ -255,8 +260,10 @@ class FlatPPO(OnPolicyAlgorithm):
             scale = self.scale.after(buffer.rewards, ended)
             buffer.rewards[:] = np.clip(buffer.rewards / scale, -LARGEST, LARGEST)
         if cut_off:
+            # Bootstrap of episodes that a time limit cut off, as Stable-Baselines3 does it
             times, envs, last = zip(*cut_off, strict=True)
             buffer.rewards[[*times], [*envs]] += np.float32(self.gamma) * critic(flat(np.array(last)))[:, 0]
+        # All at once, after the rollout: a call for each step would cost more than its product
         buffer.values[:] = critic(flat(buffer.observations, 2))[..., 0]
         buffer.compute_returns_and_advantage(torch.from_numpy(critic(flat(new_obs))), dones)
         callback.update_locals(locals())
@@ -294,6 +301,7 @@ class FlatPPO(OnPolicyAlgorithm):
 
     def descend(self, gradient: Floats, rate: float) -> None:
         """Take a step of Adam (Kingma & Ba 2015), the gradient scaled down to `max_grad_norm`."""
+        # As torch's clip_grad_norm_
         gradient *= min(1.0, self.max_grad_norm / (float(np.linalg.norm(gradient)) + 1e-6))
         self._n_updates += 1
         assert self.moments is not None
@@ -325,6 +333,7 @@ class Gradient:
         scale = np.array([advantages.mean(), advantages.std(ddof=1) + 1e-8], np.float32)
         numbers = (self.clip_range, model.vf_coef, model.ent_coef, len(chosen))
         constants = [np.float32(number) for number in numbers]
+        # The number of chunks depends on the batch alone, never on threads
         chunks = np.array_split(chosen, -(-len(chosen) // CHUNK))
         parts = [self.part(k, len(rows)) for k, rows in enumerate(chunks)]
         calls = [
@@ -333,6 +342,7 @@ class Gradient:
         ]
         threads = limit_threads(model.num_threads or torch.get_num_threads())
         run_together(compiled_gradient, calls, threads)
+        # In the order of the chunks, whichever thread was first: the same bits on any number of threads
         self.vector = np.sum([own.vector for own, _, _ in parts], 0)
         return np.sum([losses for *_, losses in parts], 0)
 
@@ -340,6 +350,7 @@ class Gradient:
         """Return the arrays of a chunk of a batch: derivatives, intermediate results, losses."""
         if (number, rows) not in self.parts:
             model = self.model
+            # A copy of the policy has the layout of its derivatives
             own = Weights.of(copy.deepcopy(self.model.policy))
             widths = model.weights.actor.matrices[0].shape[1], ACTIONS + model.weights.log_std.size
             room: list[Any] = [np.zeros((rows, width), np.float32) for width in widths]

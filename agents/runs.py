@@ -59,6 +59,7 @@ def alone(folder: Path) -> Iterator[None]:
     behind."""
     from filelock import FileLock, Timeout
 
+    # What does not exist yet, deepest first: exactly this is removed again if nothing comes of it
     made = [path for path in (folder / ".lock", folder, *folder.parents) if not path.exists()]
     check_folder(folder)
     folder.mkdir(parents=True, exist_ok=True)
@@ -106,6 +107,7 @@ def make_vec_env(env_id: str, n_envs: int, num_threads: int = 1, **kwargs: Any) 
         return many
     from stable_baselines3.common.vec_env import DummyVecEnv
 
+    # Checks are for a first look at an environment, and slow
     return DummyVecEnv([lambda: make_env(env_id, disable_env_checker=True, **kwargs)] * n_envs)
 
 
@@ -164,6 +166,7 @@ def read_episodes(folder: Path) -> NDArray[np.float64]:
         next(file)  # a comment
         rows = [(float(row["l"]), float(row["r"]), float(row["t"])) for row in csv.DictReader(file)]
     episodes = np.array(rows, dtype=float).reshape(-1, 3)
+    # Lengths to steps of the training
     episodes[:, 0] = episodes[:, 0].cumsum()
     return episodes
 

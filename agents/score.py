@@ -98,6 +98,7 @@ def score_vector(policy: Any, env_id: str, seeds: Sequence[int], **env_kwargs: A
         envs = None
         for first in range(0, len(seeds), ROWS):
             batch = list(seeds[first : first + ROWS])
+            # The last batch may be smaller
             if envs is None or envs.num_envs != len(batch):
                 envs = make_rows(env_id, len(batch), **env_kwargs)
             episodes += play(env, policy, batch) if envs is None else play_rows(envs, policy, batch)
@@ -132,6 +133,7 @@ def play_rows(envs: HorseLegVectorEnv, policy: Any, seeds: Sequence[int]) -> lis
             summary = {key: float(x[row]) for key, x in columns.items() if not key.startswith("_")}
             episodes[row] = {"return": float(total[row]), **_with_stance_peak(summary)}
         going &= ~ended
+        # A row that has ended begins a new episode, which a policy with a memory must know
         start = terminated | truncated
     return episodes
 
@@ -232,6 +234,7 @@ def is_function(name: str) -> bool:
 def find_function(name: str, actions: int) -> Function:
     """Return the function MODULE:NAME, of this folder or installed; `ParameterError` if there is none."""
     module, _, function = name.partition(":")
+    # MODULE may lie in the working folder, which not every interpreter searches
     if "" not in sys.path:
         sys.path.insert(0, "")
     try:
@@ -248,6 +251,7 @@ def find_same(name: str, env: gym.Env[Any, Any], env_id: str) -> Any:
     for another id, leg, setting or version."""
     if is_function(name):
         return find_function(name, gym.spaces.flatdim(env.action_space))
+    # What is a warning for a player is an error for a score
     with warnings.catch_warnings():
         warnings.filterwarnings("error", ".*(trained with|found for)", UserWarning)
         try:
@@ -291,6 +295,7 @@ def lines(scored: Sequence[tuple[str, list[dict[str, float]]]]) -> str:
     the interquartile mean over these with its interval."""
     rows = [Scored(name, over_episodes(episodes)) for name, episodes in scored]
     trained = [mean_figures(episodes) for name, episodes in scored if is_model(name)]
+    # Scripted policies and gaits are no seeds of an algorithm
     if len(trained) > 1:
         rows.append(Scored(f"IQM of {len(trained)}", over_seeds(trained), trained))
     titles = ["policy", "return", *(title for title, *_ in TABLE.values())]

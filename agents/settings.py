@@ -105,6 +105,7 @@ def model_arguments(settings: Mapping[str, Any], actions: int = 1) -> dict[str, 
         arguments["action_noise"] = _action_noise(kind, spread, actions)
     for key in SCHEDULED:
         value = arguments.get(key)
+        # Numbers are constant, texts are schedules
         if isinstance(value, str):
             try:
                 kind, start = value.split("_")
@@ -153,6 +154,7 @@ def _dict_call(text: str) -> dict[str, Any]:
     from torch import nn
 
     def value(node: ast.expr) -> Any:
+        # Literals and nn.<Module> only: nothing of a file is called
         match node:
             case ast.Call(func=ast.Name(id="dict"), args=[], keywords=keywords):
                 return {str(item.arg): value(item.value) for item in keywords}

@@ -95,10 +95,12 @@ def find_runs(folder: Path) -> dict[str, list[runs.SavedModel]]:
         if not any((path / name).is_file() for name in (runs.MODEL, ABOUT)):
             print(f"passed over {path}: it is not through")
             continue
+        # A folder that is half copied must not be shipped
         needed = [runs.CONFIG, runs.MONITOR, *([WEIGHTS] if (path / ABOUT).is_file() else [])]
         if missing := [name for name in needed if not (path / name).is_file()]:
             raise DataFileError(f"run {path}: expected all of a training, found no {missing[-1]}")
         saved = runs.SavedModel.find(path)
+        # A policy for other arguments would play under the plain id
         if not saved.record.get("env_kwargs"):
             env_id, _ = environment_of(saved.path, saved.record)
             models.setdefault(str(env_id), []).append(saved)
@@ -170,6 +172,7 @@ def film(folder: Path, env_id: str) -> None:
     seconds = FILM_SECONDS
     while not path.is_file() or path.stat().st_size > FILM_LIMIT:
         render_episode(path, policy, env_id, seed=SCORE_SEEDS[0], seconds=seconds, fps=20, size=(480, 270))
+        # The size is known only after the film is made
         seconds *= 0.75
 
 
@@ -218,6 +221,7 @@ class NoisyPolicy:
 def tolerance(policy: Any, env_id: str, returns: Sequence[float]) -> float:
     """Return the largest difference of the mean return of the first `CHECKED` episodes on another machine:
     four standard errors of what a `NoisyPolicy` changes, and 1 % of the mean."""
+    # Arithmetic differs in its last bits between processors; chaos makes more of it
     again = score_vector(NoisyPolicy(policy), env_id, SCORE_SEEDS[:CHECKED])
     off = np.array([episode["return"] for episode in again]) - returns[: len(again)]
     return float(4 * np.sqrt(np.mean(off**2) / len(off)) + 0.01 * abs(np.mean(returns)))
@@ -226,6 +230,7 @@ def tolerance(policy: Any, env_id: str, returns: Sequence[float]) -> float:
 def shown_command(command: str) -> str:
     """Return a command without --out and without folders of this machine."""
     words = shlex.split(command)
+    # It may stand twice
     while "--out" in words:
         del words[words.index("--out") : words.index("--out") + 2]
     shown = [word.removeprefix(f"{Path.cwd()}/") for word in words]
@@ -297,6 +302,7 @@ def main(argv: list[str] | None = None) -> None:
     args = tyro.cli(Args, args=argv, prog="python -m agents.ship", description=__doc__)
     models = find_runs(args.runs)
     sources = {env_id: env_id for env_id in models}
+    # An id without a training of its own may be played by another's policy
     sources |= {one: other for one, other in STANDS_FOR.items() if one not in models and other in models}
     ids = [check_choice("ids", env_id, sources) for env_id in args.ids] or list(sources)
     check_folder(args.out)

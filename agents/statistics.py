@@ -95,6 +95,7 @@ def mean_figures(episodes: Sequence[Mapping[str, float]]) -> dict[str, float]:
     means = {name: float(np.mean([one[name] for one in episodes])) for name in FIGURES if name in episodes[0]}
     if "cost_of_transport" in means:
         distance, work, force, share = (sum(one[name] for one in episodes) for name in TRANSPORT)
+        # Without progress the cost is not defined
         moved = share and distance > 0
         means["cost_of_transport"] = work * share / (force * distance) if moved else float("nan")
     return means
@@ -156,6 +157,7 @@ def iqm(scores: ArrayLike) -> Floats:
         return np.asarray(trim_mean(some, 0.25, axis=axis))
 
     values = np.asarray(scores, np.float64)
+    # trim_mean cuts a quarter of the seeds at either end
     mean = middle(values, axis=0)
     if len(values) < 2:
         return np.stack([mean, *[np.full_like(mean, np.nan)] * 2])
@@ -188,6 +190,7 @@ def dominates(figures: Mapping[str, float], run: Mapping[str, float]) -> bool:
     """True if means dominate those of the run: `LOWER`, a share of the weight between the run's and 1, a
     higher speed."""
     lower = all(figures[key] <= part * run[key] for key, part in LOWER.items())
+    # Neither softer by bearing less, nor pulled down by the suspension
     bears = run["weight_share"] <= figures["weight_share"] <= 1.0
     return lower and bears and figures["speed_m_s"] > run["speed_m_s"]
 

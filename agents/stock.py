@@ -88,6 +88,7 @@ def jobs(args: Args) -> list[Job]:
     found = []
     for curves in chosen:
         steps = args.steps or curves.steps
+        # Steps of the command's choice keep the distance of scores where they can
         own = Curves(curves.env_id, curves.algo, args.seeds or curves.seeds, steps, min(curves.every, steps))
         found += [Job(own, seed) for seed in range(own.seeds)]
     return found
@@ -98,6 +99,7 @@ def train(job: Job) -> list[dict[str, Any]]:
     import torch
     from stable_baselines3.common.callbacks import BaseCallback
 
+    # Trainings share the cores; seconds are comparable only on one thread
     torch.set_num_threads(1)
     curves = job.curves
     envs = make_rows(curves.env_id, len(FINAL_SEEDS))
@@ -115,6 +117,7 @@ def train(job: Job) -> list[dict[str, Any]]:
 
         def _on_step(self) -> bool:
             if self.num_timesteps % curves.every == 0 or self.num_timesteps == curves.steps:
+                # The clock of learning stops while the policy is scored
                 here = time.process_time()
                 spent = here - self.began - self.scored
                 add(self.model, self.num_timesteps, spent)
@@ -152,6 +155,7 @@ def trained(pending: Sequence[Job], workers: int) -> Iterator[list[dict[str, Any
     if workers == 1:
         yield from map(train, pending)
         return
+    # A fresh process for each training: torch and numba keep nothing of the last one
     with multiprocessing.get_context("spawn").Pool(workers, maxtasksperchild=1) as pool:
         yield from pool.imap_unordered(train, pending)
 
@@ -177,6 +181,7 @@ def stock(args: Args) -> list[dict[str, Any]]:
     pending = [] if args.draw else [job for job in wanted if not has_run(rows, job)]
     for done, new in enumerate(trained(pending, args.workers), 1):
         key = tuple(new[0][name] for name in ("env_id", "algo", "seed"))
+        # A longer training replaces a shorter one of the same seed
         rows = [row for row in rows if (row["env_id"], row["algo"], row["seed"]) != key] + new
         rows.sort(key=lambda row: (row["env_id"], row["algo"], row["seed"], row["steps"]))
         runs.write_csv(args.out / "curves.csv", COLUMNS, rows)

@@ -31,6 +31,7 @@ def anchors(env_id: str) -> dict[str, float]:
     """Return the mean returns of policies that need no learning, by name, those that an id has."""
     envs = make_rows(env_id, len(FINAL_SEEDS))
     assert envs is not None
+    # One action for each row
     zero = np.zeros((len(FINAL_SEEDS), *(envs.single_action_space.shape or ())), np.float32)
 
     class Zero:
@@ -56,6 +57,7 @@ def at(rows: Sequence[dict[str, Any]], steps: int) -> list[float]:
     """Return the returns of all seeds at the last score up to `steps`."""
     latest: dict[int, dict[str, Any]] = {}
     for row in rows:
+        # Rows need not be in order
         if row["steps"] <= steps and row["steps"] >= latest.get(row["seed"], row)["steps"]:
             latest[row["seed"]] = row
     return [row["return"] for row in latest.values()]
@@ -116,6 +118,7 @@ def compared(rows: Sequence[dict[str, Any]], column: str, places: Sequence[float
             for row in own:
                 if row[column] <= place and row["steps"] >= latest.get(row["seed"], row)["steps"]:
                     latest[row["seed"]] = row
+            # A training that ended before would be compared at its end
             is_reached = all(end >= 0.9 * place for end in ends.values())
             values = [row["return"] for row in latest.values()]
             cells.append(f"{float(iqm(values)[0]):.1f}" if is_reached else "")
@@ -167,6 +170,7 @@ def draw(rows: Sequence[dict[str, Any]], beside: dict[str, dict[str, float]], pa
             panel.set_xlabel("environment steps")
             panel.set_ylabel("return")
             panel.xaxis.set_major_formatter(EngFormatter(sep=""))
+        # The grid may have more panels than ids
         for panel in panels[len(ids) :]:
             panel.set_axis_off()
         panels[0].legend(loc="lower right")

@@ -101,6 +101,7 @@ def train(args: Args, *also: Any) -> Trained:
     try:
         with runs.alone(folder):
             return _train(args, folder, record, env_kwargs, settings, also)
+    # An OutputError is an OSError, too, and says more than the one below
     except HoofEnvError:
         raise
     except OSError as error:  # as of monitor.csv on a full disk
@@ -117,6 +118,7 @@ def _train(
 ) -> Trained:
     """Train as `train` does, in a folder that is locked."""
     earlier = find_earlier(args, folder, record, settings)
+    # The same command again: nothing to do
     if finished := earlier.get("finished"):
         checkpoints.tidy(folder, keep=0)  # of a process that was killed before it did so
         return Trained(folder, finished["steps"], finished["seconds"], None)
@@ -145,6 +147,7 @@ def _train(
         runs.write_text(folder / runs.CONFIG, config)
         if not resumed:
             checkpoints.write_episodes(envs, folder / runs.MONITOR)
+        # Curves of steps that are trained again are hidden
         model.set_logger(make_logger(folder / "tensorboard", model.num_timesteps + 1 if resumed else 0))
         return learn(args, folder, record, settings["n_timesteps"], model, resumed, also)
     finally:
@@ -262,14 +265,17 @@ def find_earlier(
         )
     if not args.resume or not held:
         return {}
+    # Everything that decides what is learnt
     keys = ("env_id", "env_kwargs", "settings", "observation_space", "action_space", "algo", "seed")
     pairs = {key: (earlier.get(key), record.get(key)) for key in keys}
+    # Another version may have other rewards or observations
     pairs["hoof-env"] = earlier.get("versions", {}).get("hoof-env"), record["versions"].get("hoof-env")
     used = load_settings(folder / runs.CONFIG, args.env_id)
     pairs |= {key: (used.get(key), settings.get(key)) for key in {**used, **settings}}
     unlike = [f"{key}: {there!r} there, {now!r} here" for key, (there, now) in pairs.items() if there != now]
     if unlike:
         raise ParameterError(f"--resume: expected what {folder} was begun with; {'; '.join(unlike)}")
+    # A model without checkpoints cannot go on
     kept = earlier.get("finished") or checkpoints.checkpoints(folder)
     if not kept and earlier.get("args", {}).get("checkpoint_every") == 0:  # it would be lost
         raise OutputError(f"--resume: {folder} holds a model, but no checkpoint to go on from")
@@ -295,6 +301,7 @@ def make_model(args: Args, settings: dict[str, Any], many: Any) -> Any:
     normalize = normalize_arguments(settings)
     arguments = model_arguments(settings, int(np.prod(envs.action_space.shape or 1)))
     try:
+        # Outside of the monitor, which must see the rewards as they are
         envs = envs if normalize is None else VecNormalize(envs, **normalize)
         if "buffer_size" in arguments:  # more would stand empty in every checkpoint
             most = settings["n_timesteps"] + settings["n_envs"]

@@ -93,6 +93,7 @@ def draw(trial: Any, space: Mapping[str, Any], base: Mapping[str, Any]) -> dict[
                 value = parse_json(value)
         else:
             low, high = how["log"] if "log" in how else how["uniform"]
+            # Three digits are enough, and can be read in a table
             value = float(f"{trial.suggest_float(key, low, high, log='log' in how):.3g}")
             value = f"lin_{value:g}" if how.get("lin") else value
         name, _, inner = key.partition(".")
@@ -134,6 +135,7 @@ class TrialScorer(Scorer):
     def _on_rollout_start(self) -> None:
         before = len(self.curve)
         super()._on_rollout_start()
+        # At the end there is nothing left to prune
         if len(self.curve) > before and self.report(*self.curve[-1]):
             self.is_pruned = True
             raise EndedError
@@ -166,6 +168,7 @@ def tune(args: Args) -> Any:
 
     with runs.alone(folder):
         study = open_study(args, folder, {"env_kwargs": kwargs, "base": base, "space": space})
+        # Trials that failed do not count, so one call may not be enough
         while (left := args.trials - len(finished(study))) > 0:
             study.optimize(
                 lambda trial: run_trial(trial, args, folder, kwargs, base | draw(trial, space, base)),
@@ -187,6 +190,7 @@ def run_trial(
         return bool(trial.should_prune())
 
     out = folder / "trials" / str(trial.number)
+    # A trial that was killed left a run of other settings
     shutil.rmtree(out, ignore_errors=True)
     trial.set_user_attr("settings", settings)
     scorer = TrialScorer(args.env_id, env_kwargs, -(-settings["n_timesteps"] // args.scores), report)
@@ -255,6 +259,7 @@ def open_study(args: Args, folder: Path, about: dict[str, Any]) -> Any:
         raise ParameterError(
             f"{folder} holds a study with other {', '.join(unlike)}; choose another folder by --out"
         )
+    # No other process works on the study: a running trial was killed
     for trial in study.get_trials(states=[optuna.trial.TrialState.RUNNING]):
         study.tell(trial.number, state=optuna.trial.TrialState.FAIL)
         study.enqueue_trial(trial.params)

@@ -102,9 +102,11 @@ class Watch(BaseCallback):
 
     def _on_rollout_start(self) -> None:
         is_first = self.num_timesteps == self.model._num_timesteps_at_start
+        # The library has drawn from the generators while it set up
         if self.resumed and is_first:
             self.resumed.start_rollout()
         check_divergence(self.model, self.folder)
+        # Only here, between two rollouts, is a checkpoint complete
         end = self.stopped_by is not None or time.monotonic() - self.started >= self.max_seconds
         due = end or time.monotonic() - self.last_kept >= self.checkpoint_every
         if self.checkpoint_every and due and not is_first:
@@ -149,6 +151,7 @@ def stop_on_signals(watch: Watch) -> Iterator[None]:
         for number, handler in previous.items():
             signal.signal(number, handler)
 
+    # Python sets handlers in the main thread only
     if threading.current_thread() is threading.main_thread():
         for number in (signal.SIGINT, signal.SIGTERM):
             previous[number] = signal.signal(number, stop)
