@@ -57,7 +57,11 @@ def train_all(args: Args) -> list[Run]:
     check_number("workers", args.workers, low=1)
     folder = args.out or FOLDERS[args.subset]
     names = args.only or ("",)
-    chosen = [one for one in runs_of(load_plan(args.subset)) if any(text in one.name for text in names)]
+    chosen = [
+        training
+        for training in runs_of(load_plan(args.subset))
+        if any(text in training.name for text in names)
+    ]
     if not chosen:
         raise ParameterError(f"only: expected a part of a training's name, got {args.only!r}")
     check_folder(folder)
@@ -66,7 +70,7 @@ def train_all(args: Args) -> list[Run]:
 
 def work_off(chosen: Sequence[Run], folder: Path, workers: int) -> list[Run]:
     """Train `workers` at a time until all are done; return those that failed."""
-    waiting = [one for one in chosen if not is_done(one, folder)]
+    waiting = [training for training in chosen if not is_done(training, folder)]
     running: dict[Run, subprocess.Popen[bytes]] = {}
     failed: list[Run] = []
     interval = 1.0 if sys.stderr.isatty() else 60.0  # seconds between two lines, where each is kept
@@ -77,18 +81,20 @@ def work_off(chosen: Sequence[Run], folder: Path, workers: int) -> list[Run]:
             while waiting or running:
                 # Free places are filled at once, so that a long training holds up no other
                 while waiting and len(running) < workers:
-                    one = waiting.pop(0)
-                    running[one] = start(one, folder)
+                    training = waiting.pop(0)
+                    running[training] = start(training, folder)
                 # Trainings take minutes: half a second between looks costs nothing
                 time.sleep(0.5)
-                for one in [one for one, process in running.items() if process.poll() is not None]:
-                    running.pop(one)
+                for training in [
+                    training for training, process in running.items() if process.poll() is not None
+                ]:
+                    running.pop(training)
                     # Whatever the exit code says, a training is done if it has its final score
-                    if not is_done(one, folder):
-                        failed.append(one)
-                        tqdm.write(f"{one.name} failed: {last_line(folder / one.name)}")
+                    if not is_done(training, folder):
+                        failed.append(training)
+                        tqdm.write(f"{training.name} failed: {last_line(folder / training.name)}")
                 bar.n = len(chosen) - len(waiting) - len(running) - len(failed)
-                bar.set_postfix_str(", ".join(one.name for one in running), refresh=False)
+                bar.set_postfix_str(", ".join(training.name for training in running), refresh=False)
                 bar.update(0)
         finally:
             for process in running.values():  # each ends in good order, with a checkpoint
@@ -139,8 +145,8 @@ def main(argv: list[str] | None = None) -> int:
     failed = train_all(args)
     if args.report:
         print(f"written: {baselines_report.report(baselines_report.Args(args.subset, args.out))}")
-    for one in failed:
-        print(f"failed: {one.name}", file=sys.stderr)
+    for training in failed:
+        print(f"failed: {training.name}", file=sys.stderr)
     return 1 if failed else 0
 
 

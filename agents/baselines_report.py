@@ -90,14 +90,14 @@ def reference(name: str, policy: Any, env_id: str) -> Scored:
 def settled_speeds(row: Row) -> dict[int, list[float]]:
     """Return, by seed, `settled_speed` under each of `following_commands`, for agents of `SPEED` with stored
     policies."""
-    found = {}
+    speeds_of = {}
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", UserWarning)  # they were trained with other commands, which is meant
-        for one in row.results:
-            if (one.folder / ABOUT).is_file():
-                speeds = [settled_speed(str(one.folder), command) for command in following_commands()]
-                found[one.final["seed"]] = speeds
-    return found
+        for result in row.results:
+            if (result.folder / ABOUT).is_file():
+                speeds = [settled_speed(str(result.folder), command) for command in following_commands()]
+                speeds_of[result.final["seed"]] = speeds
+    return speeds_of
 
 
 def following_commands() -> list[float]:
@@ -109,7 +109,9 @@ def following_commands() -> list[float]:
 def following(title: str, speeds: Mapping[int, Sequence[float]]) -> Scored:
     """Estimate the change of the settled speed over the change of command: the slope of a line through
     them."""
-    slopes = [{"follows": float(np.polyfit(following_commands(), one, 1)[0])} for one in speeds.values()]
+    slopes = [
+        {"follows": float(np.polyfit(following_commands(), settled, 1)[0])} for settled in speeds.values()
+    ]
     return Scored(title, over_seeds(slopes), slopes)
 
 
@@ -117,12 +119,12 @@ def settled_speed(policy: str, command: float) -> float:
     """Return the mean speed [m/s] after the first `SETTLED` seconds under one command."""
     kwargs: dict[str, Any] = {"target_speed": [command, command]}
     # Twice the same episodes, whole and cut off: the difference is the settled part
-    with_start = score_vector(policy, SPEED, FINAL_SEEDS, **kwargs)
+    whole = score_vector(policy, SPEED, FINAL_SEEDS, **kwargs)
     start = score_vector(policy, SPEED, FINAL_SEEDS, **kwargs, episode_seconds=SETTLED)
-    distance = np.mean([one["distance_m"] for one in with_start]) - np.mean(
-        [one["distance_m"] for one in start]
+    distance = np.mean([episode["distance_m"] for episode in whole]) - np.mean(
+        [episode["distance_m"] for episode in start]
     )
-    return float(distance / (with_start[0]["seconds"] - SETTLED))
+    return float(distance / (whole[0]["seconds"] - SETTLED))
 
 
 # Tables and pictures
@@ -151,8 +153,8 @@ def results_table(rows: Sequence[Row], gaits: References) -> str:
     lines = []
     for env_id, known in gaits.items():
         lines += [
-            [f"`{env_id}`", one.name, "", "", "", "", one.intervals["return"].text()]
-            for one in known.values()
+            [f"`{env_id}`", policy.name, "", "", "", "", policy.intervals["return"].text()]
+            for policy in known.values()
         ]
         lines += [[f"`{env_id}`", row.title, *row_cells(row, known)] for row in of_id(rows, env_id)]
     return markdown_table(titles, lines)
@@ -161,9 +163,9 @@ def results_table(rows: Sequence[Row], gaits: References) -> str:
 def row_cells(row: Row, known: Mapping[str, Scored]) -> list[str]:
     """Return the cells of an agent in the table of returns; `known` are the policies without learning."""
     count = len(row.results)
-    returns = np.array([one.figures["return"] for one in row.results])
+    returns = np.array([result.figures["return"] for result in row.results])
     steps, wall, cpu = (
-        np.median([one.final[key] for one in row.results]) for key in ("steps", "wall_s", "cpu_s")
+        np.median([result.final[key] for result in row.results]) for key in ("steps", "wall_s", "cpu_s")
     )
 
     def above(name: str) -> str:
@@ -187,9 +189,9 @@ def row_cells(row: Row, known: Mapping[str, Scored]) -> list[str]:
 def figures_table(rows: Sequence[Row], gaits: References) -> str:
     """Return the table of gait figures: policies without learning and agents, by id."""
     lines = [
-        [f"`{env_id}`", one.name, *cells(one)]
+        [f"`{env_id}`", policy.name, *cells(policy)]
         for env_id, known in gaits.items()
-        for one in (*known.values(), *(row.scored for row in of_id(rows, env_id)))
+        for policy in (*known.values(), *(row.scored for row in of_id(rows, env_id)))
     ]
     return markdown_table(["id", "policy", *(title for title, *_ in TABLE.values())], lines)
 
@@ -202,29 +204,29 @@ def pace_table(rows: Sequence[Row], known: Mapping[str, Scored]) -> str:
     rates = []
     times = []
     for row in rows:
-        ends = [one.final for one in row.results]
+        ends = [result.final for result in row.results]
         rates.append({end["seed"]: end["steps"] / end["wall_s"] for end in ends})
-        times.append({one.final["seed"]: seconds_to(level, one) for one in row.results})
+        times.append({result.final["seed"]: seconds_to(level, result) for result in row.results})
     lines = []
     for row, rate, time in zip(rows, rates, times, strict=True):
         # Only seeds that both rows have are paired
-        both = [seed for seed in rate if seed in rates[0]]
-        faster = [rate[seed] / rates[0][seed] for seed in both]
-        parts = [time[seed] / times[0][seed] for seed in both if np.isfinite(time[seed] + times[0][seed])]
-        ours = row.scored.intervals["return"]
-        theirs = first.scored.intervals["return"]
+        paired = [seed for seed in rate if seed in rates[0]]
+        faster = [rate[seed] / rates[0][seed] for seed in paired]
+        parts = [time[seed] / times[0][seed] for seed in paired if np.isfinite(time[seed] + times[0][seed])]
+        returns = row.scored.intervals["return"]
+        first_returns = first.scored.intervals["return"]
         lines.append(
             [
                 row.title,
                 str(len(rate)),
                 span(rate.values(), 0),
                 span(faster, 2),
-                ours.text(),
-                "no" if ours.mean < theirs.low else "yes",
+                returns.text(),
+                "no" if returns.mean < first_returns.low else "yes",
                 span(time.values(), 0),
                 f"{np.isfinite([*time.values()]).sum()}/{len(time)}",
                 span(parts, 2),
-                f"{np.sum(np.array(parts) <= SOON)}/{len(both)}",
+                f"{np.sum(np.array(parts) <= SOON)}/{len(paired)}",
             ]
         )
     titles = (
@@ -258,13 +260,13 @@ def draw_frontier(rows: Sequence[Row], known: Mapping[str, Scored], path: Path) 
         figure = Figure(figsize=(8, 3.6), layout="constrained")
         axes = figure.subplots()
         for row, marker in zip(rows, cycle("osD^vP*X")):
-            rate = np.median([one.final["steps"] / one.final["wall_s"] for one in row.results])
-            of = row.scored.intervals["return"]
+            rate = np.median([result.final["steps"] / result.final["wall_s"] for result in row.results])
+            returns = row.scored.intervals["return"]
             # A single seed has no interval
-            bars = np.nan_to_num([[of.mean - of.low], [of.high - of.mean]])
+            bars = np.nan_to_num([[returns.mean - returns.low], [returns.high - returns.mean]])
             axes.errorbar(
                 [rate],
-                [of.mean],
+                [returns.mean],
                 bars,
                 fmt=marker,
                 capsize=3,
@@ -283,9 +285,9 @@ def following_table(settled: Mapping[str, Mapping[int, Sequence[float]]]) -> str
     """Return a table of how commands are followed, from settled speeds by row's title and seed."""
     lines = []
     for title, speeds in settled.items():
-        one = following(title, speeds)
-        each = ", ".join(f"{seed['follows']:.2f}" for seed in one.seeds)
-        lines.append([title, one.intervals["follows"].text(2), each])
+        slopes = following(title, speeds)
+        of_seeds = ", ".join(f"{seed['follows']:.2f}" for seed in slopes.seeds)
+        lines.append([title, slopes.intervals["follows"].text(2), of_seeds])
     return markdown_table(["", "change of settled speed / change of command", "each seed"], lines)
 
 
@@ -294,8 +296,8 @@ def write_settled(settled: Mapping[str, Mapping[int, Sequence[float]]], path: Pa
     lines = [
         {"policy": title, "seed": seed, "command_m_s": command, "settled_m_s": round(speed, 4)}
         for title, speeds in settled.items()
-        for seed, each in speeds.items()
-        for command, speed in zip(following_commands(), each, strict=True)
+        for seed, settled_at in speeds.items()
+        for command, speed in zip(following_commands(), settled_at, strict=True)
     ]
     runs.write_csv(path, ("policy", "seed", "command_m_s", "settled_m_s"), lines)
 
@@ -314,14 +316,14 @@ def write_data(rows: Sequence[Row], folder: Path) -> None:
     ends = []
     episodes = []
     for row in rows:
-        for one in row.results:
-            about = {"policy": row.title, "env_id": row.entry.env_id, "seed": one.final["seed"]}
-            curves += [about | line for line in one.curve]
-            played = zip(FINAL_SEEDS, one.final["episodes"], strict=True)
+        for result in row.results:
+            about = {"policy": row.title, "env_id": row.entry.env_id, "seed": result.final["seed"]}
+            curves += [about | line for line in result.curve]
+            played = zip(FINAL_SEEDS, result.final["episodes"], strict=True)
             episodes += [about | {"episode": seed} | short(episode) for seed, episode in played]
-            clock = {key: one.final[key] for key in ("steps", "wall_s", "cpu_s")}
-            numbers = {key: round(value, 4) for key, value in (clock | one.figures).items()}
-            settings = load_settings(one.folder / runs.CONFIG, row.entry.env_id)
+            clock = {key: result.final[key] for key in ("steps", "wall_s", "cpu_s")}
+            numbers = {key: round(value, 4) for key, value in (clock | result.figures).items()}
+            settings = load_settings(result.folder / runs.CONFIG, row.entry.env_id)
             ends.append(about | numbers | {"config": json.dumps(settings)})
     columns = ("policy", "env_id", "seed", *COLUMNS)
     runs.write_csv(folder / "curves.csv", columns, curves)
@@ -338,13 +340,13 @@ def over_time(row: Row, key: str) -> tuple[Floats, Floats]:
     """Return steps or seconds, shape (`POINTS`,), and IQM and interval of the return there, shape (3,
     `POINTS`), from the first score of a trained policy to the last that all seeds have; `key` is "steps" or
     "wall_s"."""
-    curves = [one.curve for one in row.results]
+    curves = [result.curve for result in row.results]
     last = min(curve[-1][key] for curve in curves)
     # From the second score on: the first is of the untrained policy, at 0, which no logarithm shows
     first = min(max(curve[1][key] for curve in curves), last)
     x = np.geomspace(first, last, POINTS)
-    each = [np.interp(x, [p[key] for p in curve], [p["return"] for p in curve]) for curve in curves]
-    return x, iqm(each)
+    returns = [np.interp(x, [p[key] for p in curve], [p["return"] for p in curve]) for curve in curves]
+    return x, iqm(returns)
 
 
 def most(rows: Sequence[Row]) -> list[Row]:
@@ -394,29 +396,29 @@ def report(args: Args) -> Path:
     folder = args.runs or FOLDERS[args.subset]
     rows = read_results(load_plan(args.subset), folder)
     page = folder / "report.md"
-    beside = folder / "report"
-    beside.mkdir(parents=True, exist_ok=True)
+    pictures = folder / "report"
+    pictures.mkdir(parents=True, exist_ok=True)
     gaits = {row.entry.env_id: references(row.entry.env_id) for row in rows}
     parts = [f"# Baselines: the {args.subset} plan", "## Returns", results_table(rows, gaits)]
     for env_id, known in gaits.items():
         name = env_id.rpartition("/")[2]
-        draw_curves(of_id(rows, env_id), known, beside / f"{name}.png")
-        parts.append(f"![{name}]({beside.name}/{name}.png)")
-    write_data(rows, beside)
+        draw_curves(of_id(rows, env_id), known, pictures / f"{name}.png")
+        parts.append(f"![{name}]({pictures.name}/{name}.png)")
+    write_data(rows, pictures)
     parts += ["## What the gaits are like", figures_table(rows, gaits)]
     if LEG in gaits:
         # The run is what the others are compared with
-        others = [one for name, one in gaits[LEG].items() if name != "run"]
+        others = [policy for name, policy in gaits[LEG].items() if name != "run"]
         agents = others + [row.scored for row in of_id(rows, LEG)]
         parts += ["## Beside the paper's run", compare(agents, gaits[LEG]["run"])]
         if OPEN_LOOP in gaits[LEG]:
             parts += ["## How fast they train", pace_table(of_id(rows, LEG), gaits[LEG])]
-            draw_frontier(of_id(rows, LEG), gaits[LEG], beside / "frontier.png")
-            parts.append(f"![Return over steps a second]({beside.name}/frontier.png)")
+            draw_frontier(of_id(rows, LEG), gaits[LEG], pictures / "frontier.png")
+            parts.append(f"![Return over steps a second]({pictures.name}/frontier.png)")
     settled = {row.title: settled_speeds(row) for row in of_id(rows, SPEED)}
     if any(settled.values()):  # else there are results without policies
         parts += ["## How a command is followed", following_table(settled)]
-        write_settled(settled, beside / "settled.csv")
+        write_settled(settled, pictures / "settled.csv")
     parts += ["## How it was made", made_text(rows)]
     runs.write_text(page, "\n\n".join(parts) + "\n")
     return page

@@ -99,8 +99,8 @@ class Run:
         words += ["--seed", str(self.seed), "--points", str(entry.points)]
         words += ["--out", str(folder / self.name)] if folder else []
         words += ["--steps", str(entry.steps)] if entry.steps is not None else []
-        for option, given in (("--env-kwargs", entry.env_kwargs), ("--params", entry.params)):
-            pairs = [f"{key}={json.dumps(value)}" for key, value in given.items()]
+        for option, values in (("--env-kwargs", entry.env_kwargs), ("--params", entry.params)):
+            pairs = [f"{key}={json.dumps(value)}" for key, value in values.items()]
             words += [option, *pairs] if pairs else []
         return words
 
@@ -261,7 +261,7 @@ class Row:
     @cached_property
     def scored(self) -> Scored:
         """Figures over the seeds, with intervals, and those of each seed."""
-        seeds = [one.figures for one in self.results]
+        seeds = [result.figures for result in self.results]
         return Scored(self.title, over_seeds(seeds), seeds)
 
     @property
@@ -279,7 +279,7 @@ def read_results(plan: Sequence[Entry], folder: Path) -> list[Row]:
     rows = []
     for entry in plan:
         folders = [folder / Run(entry, seed).name for seed in range(entry.seeds)]
-        results = tuple(read_result(entry, one) for one in folders if (one / FINAL).is_file())
+        results = tuple(read_result(entry, path) for path in folders if (path / FINAL).is_file())
         if results:
             rows.append(Row(entry, results))
     if not rows:
@@ -301,9 +301,9 @@ def read_result(entry: Entry, folder: Path) -> Result:
         # A table must not mix results of different settings
         keys = sorted(key for key in {**used, **expected} if used.get(key) != expected.get(key))
         if keys:
-            here, there = ({key: some.get(key) for key in keys} for some in (expected, used))
+            asked, used_here = ({key: settings.get(key) for key in keys} for settings in (expected, used))
             raise DataFileError(
-                f"{folder}: expected a training with {here}, got {there}; remove what is outdated"
+                f"{folder}: expected a training with {asked}, got {used_here}; remove what is outdated"
             )
     return result
 
@@ -331,8 +331,8 @@ def seconds_to(level: float, result: Result) -> float:
 def versions_of(rows: Sequence[Row]) -> dict[str, str]:
     """Return the versions that the trainings were made with; several of one package are listed together."""
     versions: dict[str, set[str]] = {}
-    for one in (one for row in rows for one in row.results):
-        for name, value in runs.read_record(one.folder)["versions"].items():
+    for result in (result for row in rows for result in row.results):
+        for name, value in runs.read_record(result.folder)["versions"].items():
             versions.setdefault(name, set()).add(value)
     return {name: ", ".join(sorted(values)) for name, values in versions.items()}
 

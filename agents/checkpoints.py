@@ -181,10 +181,10 @@ class Resumed:
     def _continue_monitor(self, monitor: Any, path: Path) -> None:
         """Drop the rows of episodes after the checkpoint, which are played again, and continue its clock."""
         monitor.t_start = time.time() - self.seconds
-        there = path.exists()
-        if there:
+        is_there = path.exists()
+        if is_there:
             os.truncate(path, min(path.stat().st_size, self._state["monitor_bytes"]))
-        write_episodes(monitor, path, go_on=there)
+        write_episodes(monitor, path, go_on=is_there)
 
     def start(self) -> None:
         """Restore what setting up a training resets; call it when the training starts."""

@@ -108,10 +108,10 @@ def write(args: Args) -> Path:
             os.environ.pop(ROOT)
             if before is not None:
                 os.environ[ROOT] = before
-        made = Path(making, dataset_id)
-        _write_manifest(made, args, returns)
+        finished = Path(making, dataset_id)
+        _write_manifest(finished, args, returns)
         folder.parent.mkdir(parents=True, exist_ok=True)
-        made.rename(folder)
+        finished.rename(folder)
     return folder
 
 
@@ -142,8 +142,10 @@ def check_environment(dataset: Any) -> None:
     task = str(spec.kwargs.get("task", ""))
     registered = known.kwargs.get("task") if known else None
     # The id alone proves nothing: an entry point or a wrapper in the dataset may be any code
-    same = known is not None and spec.entry_point == known.entry_point and not spec.additional_wrappers
-    if not same or (":" in task and task != registered):
+    is_registered = (
+        known is not None and spec.entry_point == known.entry_point and not spec.additional_wrappers
+    )
+    if not is_registered or (":" in task and task != registered):
         raise DataFileError(
             f"dataset {dataset.spec.dataset_id}: expected the id of an environment that is registered here, "
             f"got {spec.id!r} at {spec.entry_point!r}; a dataset must not import a module: import yours first"
@@ -153,13 +155,13 @@ def check_environment(dataset: Any) -> None:
 def check_actions(dataset: Any, env: Any) -> None:
     """Refuse a dataset, to read it or to add to it, if its actions are not of the form that the environment
     takes: `DataFileError`."""
-    here = describe_actions(env)
-    there = dataset.storage.metadata.get(ACTIONS)
-    if there != here.get(ACTIONS):
-        form = "actions of an older form (positions in a box)" if there is None else f"actions {there}"
+    expected = describe_actions(env)
+    stored = dataset.storage.metadata.get(ACTIONS)
+    if stored != expected.get(ACTIONS):
+        form = "actions of an older form (positions in a box)" if stored is None else f"actions {stored}"
         raise DataFileError(
-            f"dataset {dataset.spec.dataset_id}: expected actions {here.get(ACTIONS)}, got {form}; make it"
-            " again by agents.dataset"
+            f"dataset {dataset.spec.dataset_id}: expected actions {expected.get(ACTIONS)}, got {form}; make "
+            "it again by agents.dataset"
         )
 
 
@@ -198,9 +200,11 @@ def policy_files(name: str) -> list[Path]:
         return [path]
     if not (is_model(name) or path.is_dir()):
         return []
-    found = find_saved(path).path
-    beside = () if found.suffix == ".onnx" else (ABOUT, WEIGHTS, STATISTICS)
-    return [file for file in (found, *(found.with_name(one) for one in beside)) if file.is_file()]
+    model = find_saved(path).path
+    neighbours = () if model.suffix == ".onnx" else (ABOUT, WEIGHTS, STATISTICS)
+    return [
+        file for file in (model, *(model.with_name(neighbour) for neighbour in neighbours)) if file.is_file()
+    ]
 
 
 def plain_start(policy: Any) -> dict[str, Any]:

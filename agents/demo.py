@@ -205,8 +205,8 @@ def render(
     *others, agent = scores
     episodes = len(agent.episodes)
     gaits = [score for score in others if score.policy in GAITS]
-    beside = [*gaits, *(score for score in others if score.policy == OPEN_LOOP)]
-    draw_learning_curve(folder, [agent, *beside], folder / "curve.svg", metadata={"Date": None})
+    references = [*gaits, *(score for score in others if score.policy == OPEN_LOOP)]
+    draw_learning_curve(folder, [agent, *references], folder / "curve.svg", metadata={"Date": None})
     return render_template(
         "report.html.j2",
         quick=args.quick,

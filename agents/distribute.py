@@ -111,8 +111,8 @@ def prepare(args: Trials) -> dict[str, Any]:
         check_number(name, getattr(args, name), low=1)
     algorithm_class(args.algo)
     fixed: dict[str, Any] = {"env_id": args.env_id, "algo": args.algo, "torch_threads": args.cpus_per_trial}
-    one = TrainArgs(**fixed, steps=args.steps, env_kwargs=args.env_kwargs, params=args.params)
-    env_kwargs, settings = checked(one)
+    training = TrainArgs(**fixed, steps=args.steps, env_kwargs=args.env_kwargs, params=args.params)
+    env_kwargs, settings = checked(training)
     space = parse_space(args.space)
     check_keys(space, args.algo, settings)
     with runs.make_env(args.env_id, **env_kwargs) as env:

@@ -37,10 +37,10 @@ def train_trial(config: dict[str, Any]) -> None:
     params = config["params"] | {k: v for k, v in chosen.items() if not k.startswith(ENV)}
     folder = Path("run").absolute()  # in the trial's own folder on the worker
     shutil.rmtree(folder, ignore_errors=True)  # of a worker that died here
-    kept = tune.get_checkpoint()
-    if kept:
-        kept.to_directory(str(folder))
-    reporter = Reporter(folder, config, env_kwargs, kept.get_metadata() if kept else {})
+    checkpoint = tune.get_checkpoint()
+    if checkpoint:
+        checkpoint.to_directory(str(folder))
+    reporter = Reporter(folder, config, env_kwargs, checkpoint.get_metadata() if checkpoint else {})
     # The reporter keeps the checkpoints: two of the same step would not go into one folder
     args = Args(
         **config["train"],
@@ -78,7 +78,7 @@ class Reporter(Scorer):
         self.wall_s = self.last.get("train_s", 0.0)
 
     def keep(self, episodes: list[dict[str, float]]) -> None:
-        mean = sum(one["return"] for one in episodes) / len(episodes)
+        mean = sum(episode["return"] for episode in episodes) / len(episodes)
         self.last = {"return": mean, "steps": self.num_timesteps, "train_s": self.wall_s}
 
     def _on_rollout_start(self) -> None:
@@ -121,8 +121,8 @@ class Progress(tune.Callback):
         write_line(trial, f"{result.get('steps', 0):,.0f} steps, return {result['return']:.2f}")
 
     def on_trial_recover(self, iteration: int, trials: list[Any], trial: Any, **info: Any) -> None:
-        kept = trial.latest_checkpoint_result
-        steps = kept.metrics["steps"] if kept else 0
+        report = trial.latest_checkpoint_result
+        steps = report.metrics["steps"] if report else 0
         write_line(trial, f"{last_failure(trial)} Retry {trial.num_failures}, from step {steps:,.0f}")
 
     def on_trial_error(self, iteration: int, trials: list[Any], trial: Any, **info: Any) -> None:
@@ -164,13 +164,13 @@ def write_table(results: Any, folder: str, varied: list[str]) -> int:
         report = result.metrics or {}
         config = result.config or {}
         # A trial that failed at once has no checkpoint
-        kept = result.checkpoint.path if result.checkpoint else ""
+        run = result.checkpoint.path if result.checkpoint else ""
         why = reason(str(result.error)) if result.error else report.get("failed")
         is_done = trial.status == "TERMINATED" and trial.trial_id not in Progress.going
         state = "failed" if why else "done" if is_done else "unfinished"
-        reasons += [f"  {kept or 'a trial'}: {why}"] if why else []
+        reasons += [f"  {run or 'a trial'}: {why}"] if why else []
         row = {key: config.get(key) for key in varied} | {key: report.get(key) for key in FIGURES}
-        rows.append(row | {"state": state, "run": str(kept).removeprefix(f"{folder}/")})
+        rows.append(row | {"state": state, "run": str(run).removeprefix(f"{folder}/")})
     if "://" not in folder and rows:
         runs.write_csv(Path(folder, "trials.csv"), list(rows[0]), rows)
     counts = {state: sum(row["state"] == state for row in rows) for state in ("done", "failed", "unfinished")}

@@ -158,9 +158,9 @@ def _environment(args: Args) -> tuple[str, dict[str, Any]]:
     """Return id and arguments of the environment: those of the command, else those of the first policy with a
     file."""
     records_of = {name: read_policy_record(name) for name in args.policy}
-    name, record = next(((name, one) for name, one in records_of.items() if one), ("", {}))
-    env_id, own = environment_of(name, record, args.env_id)
-    return env_id or runs.DEFAULT_ENV, parse_pairs("--env-kwargs", args.env_kwargs) or own
+    name, record = next(((name, record_of) for name, record_of in records_of.items() if record_of), ("", {}))
+    env_id, env_kwargs = environment_of(name, record, args.env_id)
+    return env_id or runs.DEFAULT_ENV, parse_pairs("--env-kwargs", args.env_kwargs) or env_kwargs
 
 
 def film(env: Any, policy: Any, path: Path, seed: int) -> None:
@@ -212,7 +212,9 @@ def to_json(scores: Sequence[Score], **about: Any) -> dict[str, Any]:
             score.policy: {
                 "mean": {key: finite(value.mean) for key, value in score.estimates.items()},
                 "interval95": {key: [finite(v.low), finite(v.high)] for key, v in score.estimates.items()},
-                "episodes": [{key: finite(value) for key, value in one.items()} for one in score.episodes],
+                "episodes": [
+                    {key: finite(value) for key, value in episode.items()} for episode in score.episodes
+                ],
             }
             for score in scores
         },

@@ -77,8 +77,8 @@ def about(env: Any, env_id: str, env_kwargs: dict[str, Any], record: dict[str, A
     known = {key: str(record[key]) for key in ("algo", "seed") if key in record}
     settings = record.get("settings") or settings_of(env)
     made_with = record.get("versions", {}).get("hoof-env", hoof_env.__version__)
-    here = {"env_id": env_id, "env_kwargs": env_kwargs, "settings": settings, "hoof_env": made_with}
-    return here | describe(env) | known
+    environment = {"env_id": env_id, "env_kwargs": env_kwargs, "settings": settings, "hoof_env": made_with}
+    return environment | describe(env) | known
 
 
 def write_policy(trained: runs.TrainedPolicy, out: Path, metadata: dict[str, Any]) -> float:
@@ -229,8 +229,8 @@ def difference(trained: Any, predict: Any, observations: Any) -> float:
     wanted, _ = trained.predict(observations)
     # A policy must act on one observation as on many: batch sizes are dynamic
     alone = [predict(row)[0].reshape(-1) for row in observations[:20]]
-    both = (predict(observations)[0], np.array(alone))
-    return float(max(np.max(np.abs(one - wanted[: len(one)]) / half) for one in both))
+    results = (predict(observations)[0], np.array(alone))
+    return float(max(np.max(np.abs(actions - wanted[: len(actions)]) / half) for actions in results))
 
 
 def main(argv: list[str] | None = None) -> None:

@@ -99,7 +99,7 @@ class Played:
 
 def stances_of(time: Floats, forces: Floats, pushes: Floats, lift_off: float) -> list[Stance]:
     """Return the whole stances in a record; normal and horizontal forces have shape (n, 4)."""
-    found = []
+    stances = []
     for leg in range(forces.shape[1]):
         loaded = np.concatenate([[False], forces[:, leg] > lift_off, [False]])
         begins = np.flatnonzero(np.diff(loaded.astype(int)) == 1)
@@ -108,15 +108,15 @@ def stances_of(time: Floats, forces: Floats, pushes: Floats, lift_off: float) ->
             # A stance cut off by the record's ends has no duration; a short one is a bounce
             if begin > 0 and end < len(time) and time[end - 1] - time[begin] > SHORTEST:
                 when = slice(begin, end)
-                found.append(Stance(leg, time[begin], time[end - 1], forces[when, leg], pushes[when, leg]))
-    return found
+                stances.append(Stance(leg, time[begin], time[end - 1], forces[when, leg], pushes[when, leg]))
+    return stances
 
 
 def lag_of(stances: list[Stance], stride: float) -> float:
     """Return the lag from hind to fore hooves [strides], within half a stride, as a circular mean; NaN
     without landings. `stride` is the duration of a stride [s]."""
-    fore = np.array([one.began for one in stances if one.leg < 2])
-    hind = np.array([one.began for one in stances if one.leg >= 2])
+    fore = np.array([stance.began for stance in stances if stance.leg < 2])
+    hind = np.array([stance.began for stance in stances if stance.leg >= 2])
     if not len(fore) or not len(hind):
         return float("nan")
     # The next landing of either fore hoof: left and right are interchangeable
@@ -190,10 +190,10 @@ def _from_sums(played: Played, kilograms: float, height: float) -> dict[str, flo
     `height` [m] and a mass of `kilograms`."""
     upright = played.upright
     travelled = played.travelled[played.upright]
-    found = stance_figures(played.sums, played.seconds, played.turns)
+    figures = stance_figures(played.sums, played.seconds, played.turns)
     pairs = {
         name: np.nanmean(values.reshape(2, 2, -1)[..., upright], axis=(1, 2))
-        for name, values in found.items()
+        for name, values in figures.items()
     }
     result: dict[str, float] = {}
     # Forces by the mass of the animal, which makes sizes comparable
@@ -224,23 +224,25 @@ def _from_stances(played: Played, kilograms: float) -> dict[str, Any]:
     stances = []
     lags = []
     footfall: list[list[float]] = []
-    for kept in (kept for env, kept in enumerate(played.watched) if played.upright[env]):
-        time, forces, pushes = forces_of(kept)
-        own = stances_of(time, forces, pushes, lift_off)
-        stances += own
-        lags.append(lag_of(own, period))
+    for env, records in enumerate(played.watched):
+        if not played.upright[env]:
+            continue
+        time, forces, pushes = forces_of(records)
+        of_episode = stances_of(time, forces, pushes, lift_off)
+        stances += of_episode
+        lags.append(lag_of(of_episode, period))
         # Of the first upright episode
-        footfall = footfall or footfall_of(own, time[-1], 2 * period)
-    of_pairs = {pair: [one for one in stances if one.leg // 2 == k] for k, pair in enumerate(PAIRS)}
+        footfall = footfall or footfall_of(of_episode, time[-1], 2 * period)
+    of_pairs = {pair: [stance for stance in stances if stance.leg // 2 == k] for k, pair in enumerate(PAIRS)}
     result: dict[str, Any] = {
         "lag": mean_lag(lags) if lags else float("nan"),
-        "two_peaked": _mean([one.is_two_peaked for one in of_pairs["fore"]]),
+        "two_peaked": _mean([stance.is_two_peaked for stance in of_pairs["fore"]]),
         "footfall": footfall,
-        "curves": {pair: curve_of(own, kilograms) for pair, own in of_pairs.items()},
+        "curves": {pair: curve_of(of_pair, kilograms) for pair, of_pair in of_pairs.items()},
     }
-    for pair, own in of_pairs.items():
+    for pair, of_pair in of_pairs.items():
         for name in HORIZONTAL:
-            peaks = [getattr(one, f"peak_{name}") for one in own]
+            peaks = [getattr(stance, f"peak_{name}") for stance in of_pair]
             result[f"peak_{name}_{pair}"] = _mean(peaks) / kilograms
     return result
 
@@ -255,9 +257,9 @@ def footfall_of(stances: list[Stance], end: float, span: float) -> list[list[flo
     [s]."""
     begin = end - span
     return [
-        [one.leg, round(max(one.began - begin, 0.0), 4), round(one.ended - begin, 4)]
-        for one in stances
-        if one.ended > begin
+        [stance.leg, round(max(stance.began - begin, 0.0), 4), round(stance.ended - begin, 4)]
+        for stance in stances
+        if stance.ended > begin
     ]
 
 
@@ -278,5 +280,5 @@ def forces_of(records: list[dict[str, Floats]]) -> tuple[Floats, Floats, Floats]
 def curve_of(stances: list[Stance], mass: float) -> list[float]:
     """Return the mean normal force [N/kg] at each hundredth of a stance."""
     grid = np.linspace(0, 1, 101)
-    curves = [np.interp(grid, np.linspace(0, 1, len(one.force)), one.force) for one in stances]
+    curves = [np.interp(grid, np.linspace(0, 1, len(stance.force)), stance.force) for stance in stances]
     return [round(float(x), 4) for x in np.mean(curves, 0) / mass] if curves else []

@@ -145,9 +145,9 @@ class BatchRollout:
             _, rewards, terminated, truncated, infos = envs.step(idle)
             returns += np.where(ended, 0.0, rewards)
             for env in np.flatnonzero((terminated | truncated) & ~ended):
-                found = infos["final_info"]["episode_summary"]
+                columns = infos["final_info"]["episode_summary"]
                 summaries[env] = {
-                    name: float(each[env]) for name, each in found.items() if not name.startswith("_")
+                    name: float(values[env]) for name, values in columns.items() if not name.startswith("_")
                 }
             ended |= terminated | truncated
             if ended.all():
@@ -174,11 +174,13 @@ def landings(gaits: Floats, theta: Floats) -> NDArray[np.complex128]:
         stride = Stride(numbers[0], numbers[1])
         lead = gaits[:, 1] * (k == 0)
         begin = _complex(stride.phase(np.ones(len(gaits)), np.zeros(len(gaits))))
-        phases = [_complex(stride.phase(np.cos(each), np.sin(each))) for each in theta[2 * k : 2 * k + 2]]
+        phases = [
+            _complex(stride.phase(np.cos(angles), np.sin(angles))) for angles in theta[2 * k : 2 * k + 2]
+        ]
         # Relative to the phase at crank angle 0; the square makes half a stride a whole turn
         at.append((np.array(phases) / (begin * np.exp(2j * np.pi * lead))) ** 2)
-    found: NDArray[np.complex128] = at[0].mean(0) * at[1].mean(0).conj()
-    return found
+    mean: NDArray[np.complex128] = at[0].mean(0) * at[1].mean(0).conj()
+    return mean
 
 
 def _complex(pair: tuple[Floats, Floats]) -> NDArray[np.complex128]:
@@ -234,7 +236,7 @@ class Search:
             np.tile(gait, (POPULATION * STARTS, 1)), 10**6, POPULATION * STARTS
         )
         shown = ("speed_m_s", "slip_m", "cost_of_transport", "duty_factor", "failed")
-        figures = {key: round(float(np.mean([one[key] for one in summaries])), 4) for key in shown}
+        figures = {key: round(float(np.mean([summary[key] for summary in summaries])), 4) for key in shown}
         figures["lag"] = round(float(np.abs(lags).mean()), 4)
         return {"speed": round(speed, 4), "gait": gait.tolist(), "return": float(returns.mean()), **figures}
 
@@ -289,8 +291,8 @@ class Finder:
             runs.write_text(self.args.out, json.dumps(self.content, indent=1) + "\n")
             for step in steps:
                 print(name, {key: value for key, value in step.items() if key != "gait"}, flush=True)
-        found: list[dict[str, Any]] = self.content["searches"][name]["steps"]
-        return found
+        kept: list[dict[str, Any]] = self.content["searches"][name]["steps"]
+        return kept
 
     def ramp(
         self, search: Search, first: float, ratio: float, last: float, tick: Any
@@ -354,19 +356,19 @@ def trunk_series(gait: list[float], speed: float) -> list[list[float]]:
             m = infos["measured"]
             rows.append([m[name].copy() for name in ("left_hind_theta", "y", "vx", "pitch")])
     theta, y, vx, pitch = np.moveaxis(np.array(rows), 1, 0)[..., upright].reshape(4, -1)
-    one = np.ones(1)
-    zero = np.zeros(1)
-    begin = stride.phase(one, zero)
-    now = stride.phase(np.cos(theta), np.sin(theta))
+    ones = np.ones(1)
+    zeros = np.zeros(1)
+    begin = stride.phase(ones, zeros)
+    phasor = stride.phase(np.cos(theta), np.sin(theta))
     # From crank angle 0, as in `landings`
-    phase = np.arctan2(now[1], now[0]) - np.arctan2(begin[1], begin[0])
+    phase = np.arctan2(phasor[1], phasor[0]) - np.arctan2(begin[1], begin[0])
     # Even harmonics of the stride: the trunk moves twice a stride
     order = 2 * np.arange(1, HARMONICS + 1)
     waves = [wave(n * phase) for n in order for wave in (np.cos, np.sin)]
     terms = np.stack([np.ones_like(phase), *waves], 1)
     moves = np.stack([y / body.height, vx / vx.mean(), pitch], 1)
-    found: list[list[float]] = np.linalg.lstsq(terms, moves, rcond=None)[0].T.round(6).tolist()
-    return found
+    coefficients: list[list[float]] = np.linalg.lstsq(terms, moves, rcond=None)[0].T.round(6).tolist()
+    return coefficients
 
 
 def slip_at(gait: list[float], speed: float) -> float:
@@ -387,7 +389,7 @@ def shipped(searches: dict[str, Any]) -> dict[str, Any]:
 
     def steps_of(family: str) -> list[dict[str, Any]]:
         """Return the upright steps of a family: the best start, and the ramps from it."""
-        begins = [found["steps"][0] for name, found in searches.items() if name[:-1] == f"{family} "]
+        begins = [search["steps"][0] for name, search in searches.items() if name[:-1] == f"{family} "]
         steps = sorted(begins, key=lambda step: float(step["return"]))[-1:]  # the others are another gait
         for way in ("faster", "slower"):
             steps += searches.get(f"{family}, {way}", {"steps": []})["steps"]

@@ -71,21 +71,21 @@ class Args:
 
 def rejection_reason(figures: dict[str, Any], pairs: Sequence[str]) -> str:
     """Return why the figures of these pairs of legs do not count at any speed; an empty text if they do."""
-    found = []
+    reasons = []
     if figures["fell"] > MOST_FALLS:
-        found.append(f"fell in {100 * figures['fell']:.3g} % of episodes")
+        reasons.append(f"fell in {100 * figures['fell']:.3g} % of episodes")
     # Written so that NaN is a reason, too
-    kept = figures["reached"] / figures["speed"]
-    if not abs(kept - 1) <= MOST_OFF:
-        found.append(f"{kept:.2f} of the commanded speed")
+    speed_ratio = figures["reached"] / figures["speed"]
+    if not abs(speed_ratio - 1) <= MOST_OFF:
+        reasons.append(f"{speed_ratio:.2f} of the commanded speed")
     for pair in pairs:
         slip = figures[f"slip_{pair}"]
         stances = figures[f"stances_per_turn_{pair}"]
         if not slip < MOST_SLIP:
-            found.append(f"{pair} hooves slip {slip:.2f} m")
+            reasons.append(f"{pair} hooves slip {slip:.2f} m")
         if not TURNS[0] <= stances <= TURNS[1]:
-            found.append(f"{stances:.2f} {pair} stances a turn")
-    return ", ".join(found)
+            reasons.append(f"{stances:.2f} {pair} stances a turn")
+    return ", ".join(reasons)
 
 
 def distance(figures: dict[str, Any], froude: float) -> float:
@@ -104,26 +104,27 @@ class Gait:
     flaw: str = ""
 
 
-def at_speed(froude: float, some: list[dict[str, Any]], what: str = "gait", near: float = NEAR) -> Gait:
+def at_speed(froude: float, gaits: list[dict[str, Any]], what: str = "gait", near: float = NEAR) -> Gait:
     """Return the gait with the speed nearest a Froude number; it has a flaw if that is not near."""
-    if not some:
+    if not gaits:
         return Gait(None, f"there is no {what}")
-    one = min(some, key=lambda one: distance(one, froude))
-    return Gait(one, "" if distance(one, froude) < near else f"no {what} is near Froude number {froude:g}")
+    nearest = min(gaits, key=lambda gait: distance(gait, froude))
+    flaw = "" if distance(nearest, froude) < near else f"no {what} is near Froude number {froude:g}"
+    return Gait(nearest, flaw)
 
 
 def trots_of(standing: list[dict[str, Any]]) -> list[dict[str, Any]]:
     """Return the gaits with the lag of a trot or a pace."""
-    return [one for one in standing if min(one["lag"], 0.5 - one["lag"]) < TROT]
+    return [gait for gait in standing if min(gait["lag"], 0.5 - gait["lag"]) < TROT]
 
 
 def pairs_of(name: str) -> Sequence[str]:
     """Return the pairs of legs that a figure is about."""
     if name == "two_peaked":
         return PAIRS[:1]
-    own = name.rpartition("_")[2]
+    last_word = name.rpartition("_")[2]
     # The share of the impulse is about both pairs, whatever its name ends in
-    return [own] if own in PAIRS and name != "impulse_fore" else PAIRS
+    return [last_word] if last_word in PAIRS and name != "impulse_fore" else PAIRS
 
 
 def judged(
@@ -157,7 +158,7 @@ def verdicts(figures: list[dict[str, Any]]) -> list[tuple[str, ...]]:
     """Return rows of the table: figure, Froude number, the horse's figure, the bar, ours, the verdict or why
     there is none, and the source. Empty if the policy falls at every speed."""
     judges = read_judges()
-    standing = [one for one in figures if "lag" in one]
+    standing = [gait for gait in figures if "lag" in gait]
     if not standing:
         return []
     return [*_walk(judges, standing), *_trot(judges, standing), *_reported(judges, standing)]
@@ -176,7 +177,7 @@ def _trot(judges: dict[str, Any], standing: list[dict[str, Any]]) -> Iterator[tu
     trots = trots_of(standing)
     lowest = judges["reported"]["walk_to_trot"]["horse"]
     # Slower ones would be compared with peaks that no horse has at a walk's speed
-    quick = [one for one in trots if one["froude_reached"] >= lowest]  # where a horse trots, too
+    quick = [trot for trot in trots if trot["froude_reached"] >= lowest]
     what = f"trot-like gait from Froude number {lowest:g} on"
     trot = at_speed(judges["trot"]["froude"], quick, what, near=np.inf)
     for pair in PAIRS:
@@ -198,8 +199,8 @@ def _reported(judges: dict[str, Any], standing: list[dict[str, Any]]) -> Iterato
         if "froude" in judge:
             yield judged(name, at_speed(judge["froude"], standing), name, judge, [])
         else:
-            counting = [one for one in trots_of(standing) if not rejection_reason(one, PAIRS)]
-            first = min(counting, key=lambda one: float(one["froude_reached"]), default=None)
+            counting = [trot for trot in trots_of(standing) if not rejection_reason(trot, PAIRS)]
+            first = min(counting, key=lambda trot: float(trot["froude_reached"]), default=None)
             gait = Gait(first, "" if first else "there is no trot-like gait that counts")
             yield judged(name, gait, "froude_reached", judge, [])
 
@@ -238,14 +239,14 @@ SHOWN = (
 def pool(each: list[list[dict[str, Any]]]) -> list[dict[str, Any]]:
     """Return figures of several policies at each speed as one: means, and under "intervals" their 95 %
     intervals as text. Policies that do not stay up at a speed are left out there, except for "fell"."""
-    found = []
-    for same in zip(*each, strict=True):
-        standing = [one for one in same if "lag" in one]
-        one: dict[str, Any] = {name: same[0][name] for name in ("speed", "froude")}
-        one["intervals"] = {}
+    pooled = []
+    for at_this_speed in zip(*each, strict=True):
+        standing = [policy for policy in at_this_speed if "lag" in policy]
+        mean_figures: dict[str, Any] = {name: at_this_speed[0][name] for name in ("speed", "froude")}
+        mean_figures["intervals"] = {}
         for name in SHOWN if standing else ("fell",):
-            who = same if name == "fell" else standing
-            values = [other[name] for other in who if np.isfinite(other[name])]
+            counted = at_this_speed if name == "fell" else standing
+            values = [policy[name] for policy in counted if np.isfinite(policy[name])]
             if not values:  # none that was watched stayed up
                 continue
             # An arithmetic mean of 0.01 and 0.49 would be a walk
@@ -253,21 +254,23 @@ def pool(each: list[list[dict[str, Any]]]) -> list[dict[str, Any]]:
                 middle = mean_lag(values)
                 values = [middle + (x - middle + 0.25) % 0.5 - 0.25 for x in values]
             interval = estimate(values)
-            one[name] = interval.mean % 0.5 if name == "lag" else interval.mean
-            one["intervals"][name] = interval.text(3)
-        found.append(one)
-    return found
+            mean_figures[name] = interval.mean % 0.5 if name == "lag" else interval.mean
+            mean_figures["intervals"][name] = interval.text(3)
+        pooled.append(mean_figures)
+    return pooled
 
 
 def table_of(name: str, figures: list[dict[str, Any]]) -> str:
     """Return verdicts and all figures of a policy, Markdown."""
-    head = ("figure", *(f"Fr {one['froude']:.3g}, {one['speed']:.2f} m/s" for one in figures), "horse")
+    speeds = (f"Fr {gait['froude']:.3g}, {gait['speed']:.2f} m/s" for gait in figures)
+    head = ("figure", *speeds, "horse")
     reported = read_judges()["reported"]
     body = []
     for key in SHOWN:
-        ours = (
-            one.get("intervals", {}).get(key) or (f"{one[key]:.3g}" if key in one else "-") for one in figures
-        )
+        ours = []
+        for gait in figures:
+            measured = f"{gait[key]:.3g}" if key in gait else "-"
+            ours.append(gait.get("intervals", {}).get(key) or measured)
         body.append((key, *ours, str(reported.get(key, {}).get("horse", ""))))
     verdict = markdown_table(HEAD, verdicts(figures))
     units = "Forces in N/kg, slip in m, lag in strides."

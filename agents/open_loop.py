@@ -252,7 +252,7 @@ def optimise(args: Args) -> dict[str, Any]:
     restarts = earlier(path, about)
     check_folder(path.parent)
     objective = Objective(args.env_id, about["env_kwargs"], args.family)
-    left = [seed for seed in range(args.restarts) if seed not in [one["seed"] for one in restarts]]
+    left = [seed for seed in range(args.restarts) if seed not in [restart["seed"] for restart in restarts]]
     with tqdm(total=episodes * len(left), unit=" episodes", leave=False, disable=None) as bar:
         for k, seed in enumerate(left):
             bar.set_description(f"{path.stem}, search {seed}")
@@ -302,7 +302,7 @@ def search_once(objective: Objective, seed: int, about: dict[str, Any], bar: Any
 
 def means(episodes: Episodes) -> dict[str, float | None]:
     """Return the means of `KEPT`, None for one that is infinite."""
-    figures = {key: float(np.mean([one[key] for one in episodes])) for key in KEPT}
+    figures = {key: float(np.mean([episode[key] for episode in episodes])) for key in KEPT}
     return {key: value if math.isfinite(value) else None for key, value in figures.items()}
 
 
@@ -310,11 +310,11 @@ def write(
     path: Path, about: dict[str, Any], objective: Objective, restarts: list[dict[str, Any]]
 ) -> dict[str, Any]:
     """Write the best of the searches, scored, and all of them; return the content of the file."""
-    best = min(restarts, key=lambda one: one["cost"])
+    best = min(restarts, key=lambda restart: restart["cost"])
     episodes = objective.test(best["parameters"], about["test_episodes"])
     score: dict[str, Any] = {"first_seed": TEST_SEED, "mean": means(episodes), "interval95": {}}
     for key, mean in score["mean"].items():
-        interval = estimate([one[key] for one in episodes]) if mean is not None else None
+        interval = estimate([restart[key] for restart in episodes]) if mean is not None else None
         score["interval95"][key] = [interval.low, interval.high] if interval else None
     content = {
         **about,
@@ -322,8 +322,8 @@ def write(
         "gait": dict(zip(PARAMETERS, best["parameters"]["constant"], strict=True)),
         "dt": objective.leg.dt,
         "score": score,
-        "episodes": sum(one["episodes"] for one in restarts),
-        **{key: round(sum(one[key] for one in restarts), 1) for key in ("wall_s", "cpu_s")},
+        "episodes": sum(restart["episodes"] for restart in restarts),
+        **{key: round(sum(restart[key] for restart in restarts), 1) for key in ("wall_s", "cpu_s")},
         "command": runs.command(),
         "versions": {**runs.versions(), "cma": version("cma")},
         "restarts": restarts,
@@ -340,7 +340,7 @@ def earlier(path: Path, about: dict[str, Any]) -> list[dict[str, Any]]:
     with suppress(OSError, ValueError, KeyError, TypeError, AttributeError):
         content = parse_json(path.read_text(encoding="utf-8"))
         if all(content.get(key) == value for key, value in about.items()):
-            return [one for one in content["restarts"] if not one.get("interrupted")]
+            return [restart for restart in content["restarts"] if not restart.get("interrupted")]
     raise DataFileError(f"{path}: expected searches with {about} to go on with; name another --out")
 
 
@@ -356,10 +356,9 @@ def main(argv: list[str] | None = None) -> None:
 
     args = tyro.cli(Args, args=argv, prog="python -m agents.open_loop", description=__doc__)
     content = optimise(args)
-    for one in content["restarts"]:
-        print(
-            f"search {one['seed']}: cost {one['cost']:.3f}, {one['episodes']} episodes, {one['wall_s']:.0f} s"
-        )
+    for restart in content["restarts"]:
+        spent = f"{restart['episodes']} episodes, {restart['wall_s']:.0f} s"
+        print(f"search {restart['seed']}: cost {restart['cost']:.3f}, {spent}")
     for key, mean in content["score"]["mean"].items():
         bounds = content["score"]["interval95"][key]
         print(f"{key:18} " + (f"{mean:.3f} [{bounds[0]:.3f}, {bounds[1]:.3f}]" if bounds else "infinite"))

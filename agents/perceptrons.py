@@ -135,7 +135,7 @@ def gradient_of(  # type: ignore[no-untyped-def]
     rows,
     scale,
     x,
-    own,
+    batch,
     actor,
     critic,
     log_std,
@@ -152,15 +152,15 @@ def gradient_of(  # type: ignore[no-untyped-def]
     """
     for i in range(len(rows)):
         x[i] = observations[rows[i]]
-        own[i] = steps[rows[i]]
-        own[i, ADVANTAGE] = (own[i, ADVANTAGE] - scale[0]) / scale[1]
+        batch[i] = steps[rows[i]]
+        batch[i, ADVANTAGE] = (batch[i, ADVANTAGE] - scale[0]) / scale[1]
     forward(x, actor[0], actor[1], actor[2])
     forward(x, critic[0], critic[1], critic[2])
     loss_of(
         actor[2][-1],
         critic[2][-1],
         log_std[0],
-        own,
+        batch,
         clip_range,
         vf_coef,
         ent_coef,

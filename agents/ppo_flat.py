@@ -77,10 +77,10 @@ class Scale:
         count = self.count + returns.size
         mean = float(returns.mean(dtype=np.float64))
         gap = mean - self.mean
-        own = float(returns.var(dtype=np.float64))
+        variance = float(returns.var(dtype=np.float64))
         # Chan et al.: variances of two samples, pooled with the gap of their means
         between = gap**2 * self.count * returns.size / count
-        self.square = (self.square * self.count + own * returns.size + between) / count
+        self.square = (self.square * self.count + variance * returns.size + between) / count
         self.mean = self.mean + gap * returns.size / count
         self.count = count
         return np.float32(np.sqrt(self.square + 1e-8))
@@ -92,7 +92,9 @@ class UnusedAdam(torch.optim.Adam):
 
     def __init__(self, params: Any, lr: float = 1e-3, **kwargs: Any) -> None:
         usual = inspect.signature(torch.optim.Adam.__init__).parameters
-        defaults = {name: one.default for name, one in usual.items() if name not in ("self", "params")}
+        defaults = {
+            name: parameter.default for name, parameter in usual.items() if name not in ("self", "params")
+        }
         self.defaults = {**defaults, "lr": lr, **kwargs}
         self.state: Any = {}
         self.param_groups = [{"params": list(params), **self.defaults}]
@@ -203,10 +205,10 @@ class FlatPPO(OnPolicyAlgorithm):
     def _setup_learn(self, total_timesteps: int, callback: Any = None, *args: Any, **kwargs: Any) -> Any:
         self._load_kernels()
         before = self._last_obs
-        found = super()._setup_learn(total_timesteps, callback, *args, **kwargs)
+        setup = super()._setup_learn(total_timesteps, callback, *args, **kwargs)
         if self._last_obs is not before:  # the environments were reset
             self.scale.restart()
-        return found
+        return setup
 
     def _load_kernels(self) -> None:
         """Have the kernels compiled, or loaded, before a training's clock starts; nothing is learned."""
@@ -275,7 +277,7 @@ class FlatPPO(OnPolicyAlgorithm):
         buffer = self.rollout_buffer
         progress = self._current_progress_remaining
         columns = (buffer.log_probs, buffer.advantages, buffer.returns)
-        steps = np.concatenate([*(one[..., None] for one in columns), buffer.actions], 2)
+        steps = np.concatenate([*(column[..., None] for column in columns), buffer.actions], 2)
         steps = steps.reshape(-1, steps.shape[-1])
         observations = buffer.observations.reshape(len(steps), -1)
         rate = self.lr_schedule(progress)
@@ -337,13 +339,13 @@ class Gradient:
         chunks = np.array_split(chosen, -(-len(chosen) // CHUNK))
         parts = [self.part(k, len(rows)) for k, rows in enumerate(chunks)]
         calls = [
-            (observations, steps, rows, scale, *room, (log_std, own.log_std), *constants, losses)
-            for rows, (own, room, losses) in zip(chunks, parts, strict=True)
+            (observations, steps, rows, scale, *room, (log_std, derivatives.log_std), *constants, losses)
+            for rows, (derivatives, room, losses) in zip(chunks, parts, strict=True)
         ]
         threads = limit_threads(model.num_threads or torch.get_num_threads())
         run_together(compiled_gradient, calls, threads)
         # In the order of the chunks, whichever thread was first: the same bits on any number of threads
-        self.vector = np.sum([own.vector for own, _, _ in parts], 0)
+        self.vector = np.sum([derivatives.vector for derivatives, _, _ in parts], 0)
         return np.sum([losses for *_, losses in parts], 0)
 
     def part(self, number: int, rows: int) -> tuple[Any, ...]:
@@ -351,12 +353,15 @@ class Gradient:
         if (number, rows) not in self.parts:
             model = self.model
             # A copy of the policy has the layout of its derivatives
-            own = Weights.of(copy.deepcopy(self.model.policy))
+            derivatives = Weights.of(copy.deepcopy(self.model.policy))
             widths = model.weights.actor.matrices[0].shape[1], ACTIONS + model.weights.log_std.size
             room: list[Any] = [np.zeros((rows, width), np.float32) for width in widths]
             room += [
                 (net.matrices, net.biases, net.room(rows), net.room(rows), by.matrices, by.biases)
-                for net, by in ((model.weights.actor, own.actor), (model.weights.critic, own.critic))
+                for net, by in (
+                    (model.weights.actor, derivatives.actor),
+                    (model.weights.critic, derivatives.critic),
+                )
             ]
-            self.parts[number, rows] = own, room, np.zeros(2, np.float32)
+            self.parts[number, rows] = derivatives, room, np.zeros(2, np.float32)
         return self.parts[number, rows]

@@ -60,7 +60,7 @@ def alone(folder: Path) -> Iterator[None]:
     from filelock import FileLock, Timeout
 
     # What does not exist yet, deepest first: exactly this is removed again if nothing comes of it
-    made = [path for path in (folder / ".lock", folder, *folder.parents) if not path.exists()]
+    missing = [path for path in (folder / ".lock", folder, *folder.parents) if not path.exists()]
     check_folder(folder)
     folder.mkdir(parents=True, exist_ok=True)
     lock = FileLock(folder / ".lock")
@@ -74,7 +74,7 @@ def alone(folder: Path) -> Iterator[None]:
         yield
     except BaseException:
         with suppress(OSError):  # a folder that holds something stays
-            for path in made:
+            for path in missing:
                 path.rmdir() if path.is_dir() else path.unlink()
         raise
     finally:

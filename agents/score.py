@@ -278,10 +278,10 @@ def score(args: Args) -> list[tuple[str, list[dict[str, float]]]]:
     for name in filter(is_model, read):
         if not read[name].get("env_id"):
             warnings.warn(f"policy {name}: nothing says what it was trained for", stacklevel=2)
-    file, record = next(((name, one) for name, one in read.items() if one), ("", {}))
-    asked, own = environment_of(file, record, args.env_id)
+    file, record = next(((name, record_of) for name, record_of in read.items() if record_of), ("", {}))
+    asked, trained_kwargs = environment_of(file, record, args.env_id)
     env_id = asked or runs.DEFAULT_ENV
-    env_kwargs = parse_pairs("--env-kwargs", args.env_kwargs) or own
+    env_kwargs = parse_pairs("--env-kwargs", args.env_kwargs) or trained_kwargs
     with runs.make_env(env_id, **env_kwargs) as env:
         policies = {name: find_same(name, env, env_id) for name in args.policy}
     with_what = f" with {env_kwargs}" if env_kwargs else ""
@@ -299,7 +299,7 @@ def lines(scored: Sequence[tuple[str, list[dict[str, float]]]]) -> str:
     if len(trained) > 1:
         rows.append(Scored(f"IQM of {len(trained)}", over_seeds(trained), trained))
     titles = ["policy", "return", *(title for title, *_ in TABLE.values())]
-    return markdown_table(titles, [[one.name, one.intervals["return"].text(), *cells(one)] for one in rows])
+    return markdown_table(titles, [[row.name, row.intervals["return"].text(), *cells(row)] for row in rows])
 
 
 def main(argv: list[str] | None = None) -> None:
@@ -311,9 +311,9 @@ def main(argv: list[str] | None = None) -> None:
     print(lines(scored))
     if args.csv:
         rows = [
-            {"policy": name, "episode": seed, **{key: one[key] for key in PUBLISHED if key in one}}
+            {"policy": name, "episode": seed, **{key: figures[key] for key in PUBLISHED if key in figures}}
             for name, episodes in scored
-            for seed, one in zip(FINAL_SEEDS, episodes, strict=True)
+            for seed, figures in zip(FINAL_SEEDS, episodes, strict=True)
         ]
         runs.write_csv(args.csv, ("policy", "episode", *PUBLISHED), rows)
         print(f"written: {args.csv}")

@@ -122,18 +122,21 @@ def model_arguments(settings: Mapping[str, Any], actions: int = 1) -> dict[str, 
 
 
 def normalize_arguments(settings: Mapping[str, Any]) -> dict[str, Any] | None:
-    """Arguments of `VecNormalize` as the key `normalize` of `settings` has them; None where it is false.
-    `DataFileError`: it is neither true or false nor a mapping of such arguments."""
-    given = settings.get("normalize") or False
-    arguments = {} if isinstance(given, bool) else given
+    """Return the arguments of `VecNormalize` in the key `normalize` of `settings`, None if it is false.
+
+    Raises:
+        DataFileError: it is neither true or false nor a mapping of such arguments.
+    """
+    normalize = settings.get("normalize") or False
+    arguments = {} if isinstance(normalize, bool) else normalize
     if not isinstance(arguments, Mapping) or not all(
         isinstance(value, NORMALIZE.get(key, ())) for key, value in arguments.items()
     ):
         raise DataFileError(
             f"hyperparameter normalize: expected true, false or a mapping of {', '.join(NORMALIZE)}, "
-            f"got {given!r}"
+            f"got {normalize!r}"
         )
-    return {"gamma": settings.get("gamma", 0.99), **arguments} if given else None
+    return {"gamma": settings.get("gamma", 0.99), **arguments} if normalize else None
 
 
 def _action_noise(kind: Any, spread: Any, actions: int) -> Any:

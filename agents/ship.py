@@ -117,8 +117,8 @@ def choose(saved: Sequence[runs.SavedModel], env_id: str) -> Choice:
         return Choice(saved[0])
     values = []
     with runs.make_env(env_id) as env:
-        for one in tqdm(saved, desc=f"runs of {env_id}", leave=False, disable=None):
-            episodes = score_vector(one.load(env, env_id), env_id, CHOOSING_SEEDS)
+        for model in tqdm(saved, desc=f"runs of {env_id}", leave=False, disable=None):
+            episodes = score_vector(model.load(env, env_id), env_id, CHOOSING_SEEDS)
             values.append(float(np.mean([episode["return"] for episode in episodes])))
     return Choice(saved[int(np.argmax(values))], len(saved))
 
@@ -190,8 +190,8 @@ def score_record(policy: Any, scores: Sequence[Score], env_id: str, played_on: s
     """Return the content of score.json: means and intervals of all, and the returns of the first, the
     policy."""
     data = to_json(scores)["policies"]
-    for one in data.values():
-        del one["episodes"]
+    for of_policy in data.values():
+        del of_policy["episodes"]
     returns = [episode["return"] for episode in scores[0].episodes]
     return {
         "env_id": env_id,
@@ -265,8 +265,11 @@ def write_card(
         score=score,
         spread=float(np.std(score["returns"])),
         titles=[METRICS[key].title.replace("\n", " ") for key in keys],
-        rows=[(one.policy, [" ".join(cell(key, one.estimates[key])) for key in keys]) for one in scores],
-        estimates={one.policy: one.estimates for one in scores},
+        rows=[
+            (one_score.policy, [" ".join(cell(key, one_score.estimates[key])) for key in keys])
+            for one_score in scores
+        ],
+        estimates={one_score.policy: one_score.estimates for one_score in scores},
         choice=choice,
         suspended=is_suspended,
         files={file.name for file in folder.iterdir()},
@@ -277,21 +280,25 @@ def write_card(
 def write_index(folder: Path) -> None:
     """Write README.md, the table of the policies in `folder`."""
     rows = []
-    beside = ("open-loop", "run", "reference")
+    references = ("open-loop", "run", "reference")
     for path in sorted(folder.glob("*/score.json")):
         score = parse_json(path.read_text(encoding="utf-8"))
         algo = parse_json(path.with_name(runs.RECORD).read_text(encoding="utf-8"))["algo"]
         row = [f"`{score['env_id']}`", algo.upper()]
-        for name in ("policy", *beside):
-            one = score["policies"].get(name)
-            row.append(Interval(one["mean"]["return"], *one["interval95"]["return"]).text(2) if one else "")
+        for name in ("policy", *references):
+            of_policy = score["policies"].get(name)
+            if of_policy:
+                interval = Interval(of_policy["mean"]["return"], *of_policy["interval95"]["return"])
+                row.append(interval.text(2))
+            else:
+                row.append("")
         rows.append([*row, f"[card]({path.parent.name}/card.md)"])
     text = (
         "# Trained policies\n\n"
         "One for each id, made by `python -m agents.ship`; docs/agents.md says how to use them.\n"
         "Mean returns in the same episodes, and the bootstrap's 95 % interval.\n\n"
     )
-    titles = ["id", "policy", "return", *beside, "card"]
+    titles = ["id", "policy", "return", *references, "card"]
     runs.write_text(folder / "README.md", text + markdown_table(titles, rows) + "\n")
 
 
@@ -303,13 +310,17 @@ def main(argv: list[str] | None = None) -> None:
     models = find_runs(args.runs)
     sources = {env_id: env_id for env_id in models}
     # An id without a training of its own may be played by another's policy
-    sources |= {one: other for one, other in STANDS_FOR.items() if one not in models and other in models}
+    sources |= {
+        env_id: trained_on
+        for env_id, trained_on in STANDS_FOR.items()
+        if env_id not in models and trained_on in models
+    }
     ids = [check_choice("ids", env_id, sources) for env_id in args.ids] or list(sources)
     check_folder(args.out)
     choices = {source: choose(models[source], source) for source in {sources[env_id] for env_id in ids}}
     for env_id in ids:
         score = ship(choices[sources[env_id]], env_id, args.out)
-        means = {name: one["mean"]["return"] for name, one in score["policies"].items()}
+        means = {name: of_policy["mean"]["return"] for name, of_policy in score["policies"].items()}
         write_index(args.out)
         print(f"{env_id}: " + ", ".join(f"{name} {value:.2f}" for name, value in means.items()), flush=True)
 

@@ -92,9 +92,13 @@ class Scored:
 def mean_figures(episodes: Sequence[Mapping[str, float]]) -> dict[str, float]:
     """Return means over episodes of `FIGURES`, those that an id has; the cost of transport is that of the
     distance and work of all of them, NaN if they do not get forward."""
-    means = {name: float(np.mean([one[name] for one in episodes])) for name in FIGURES if name in episodes[0]}
+    means = {
+        name: float(np.mean([episode[name] for episode in episodes]))
+        for name in FIGURES
+        if name in episodes[0]
+    }
     if "cost_of_transport" in means:
-        distance, work, force, share = (sum(one[name] for one in episodes) for name in TRANSPORT)
+        distance, work, force, share = (sum(episode[name] for episode in episodes) for name in TRANSPORT)
         # Without progress the cost is not defined
         moved = share and distance > 0
         means["cost_of_transport"] = work * share / (force * distance) if moved else float("nan")
@@ -121,12 +125,14 @@ def over_episodes(episodes: Sequence[Mapping[str, float]]) -> dict[str, Interval
     from scipy.stats import bootstrap
 
     means = mean_figures(episodes)
-    intervals = {key: estimate([one[key] for one in episodes]) for key in means if key != "cost_of_transport"}
+    intervals = {
+        key: estimate([episode[key] for episode in episodes]) for key in means if key != "cost_of_transport"
+    }
     if "cost_of_transport" in means:
         mean = means["cost_of_transport"]
         intervals["cost_of_transport"] = Interval(mean)
         if math.isfinite(mean):
-            parts = np.array([[one[name] for one in episodes] for name in TRANSPORT])
+            parts = np.array([[episode[name] for episode in episodes] for name in TRANSPORT])
 
             def cost(drawn: Any, axis: int = -1) -> Any:
                 distance, work, force, share = parts[:, drawn].sum(axis)
@@ -153,8 +159,8 @@ def iqm(scores: ArrayLike) -> Floats:
     """
     from scipy.stats import bootstrap, trim_mean
 
-    def middle(some: Floats, axis: int) -> Floats:
-        return np.asarray(trim_mean(some, 0.25, axis=axis))
+    def middle(sample: Floats, axis: int) -> Floats:
+        return np.asarray(trim_mean(sample, 0.25, axis=axis))
 
     values = np.asarray(scores, np.float64)
     # trim_mean cuts a quarter of the seeds at either end
@@ -168,15 +174,17 @@ def iqm(scores: ArrayLike) -> Floats:
 
 def over_seeds(each: Sequence[Mapping[str, float]]) -> dict[str, Interval]:
     """Return `iqm` of every figure that the seeds have in common, by name."""
-    names = [name for name in each[0] if all(name in one for one in each)]
-    columns = iqm([[one[name] for name in names] for one in each]).T
+    names = [name for name in each[0] if all(name in figures for figures in each)]
+    columns = iqm([[figures[name] for name in names] for figures in each]).T
     return {name: Interval(*map(float, column)) for name, column in zip(names, columns, strict=True)}
 
 
-def cells(one: Scored) -> list[str]:
+def cells(policy: Scored) -> list[str]:
     """Format the columns of `TABLE`; an empty cell for a figure that the id does not have."""
-    known = one.intervals
-    return [known[key].text(digits, by) if key in known else "" for key, (_, digits, by) in TABLE.items()]
+    intervals = policy.intervals
+    return [
+        intervals[key].text(digits, by) if key in intervals else "" for key, (_, digits, by) in TABLE.items()
+    ]
 
 
 # Comparison with the paper's run
@@ -209,13 +217,13 @@ def compare(agents: Sequence[Scored], run: Scored) -> str:
     """Return a table of the paper's run and of what is compared with it."""
     means = {key: interval.mean for key, interval in run.intervals.items()}
     lines = [["run", *cells(run)]]
-    for one in agents:
-        mine = {key: interval.mean for key, interval in one.intervals.items()}
+    for agent in agents:
+        mine = {key: interval.mean for key, interval in agent.intervals.items()}
         parts = [f"{mine[key] / means[key]:.2f}" for key in LOWER]
-        verdict = "yes" if dominates(mine, means) and dominates_with_confidence(one, run) else "no"
-        count = sum(dominates(seed, means) for seed in one.seeds)
-        seeds = f"{count}/{len(one.seeds)}" if one.seeds else ""
-        lines.append([one.name, *cells(one), *parts, verdict, seeds])
+        verdict = "yes" if dominates(mine, means) and dominates_with_confidence(agent, run) else "no"
+        count = sum(dominates(seed, means) for seed in agent.seeds)
+        seeds = f"{count}/{len(agent.seeds)}" if agent.seeds else ""
+        lines.append([agent.name, *cells(agent), *parts, verdict, seeds])
     of_run = [f"{TABLE[key][0].rpartition(' ')[0] or key} / run's" for key in LOWER]
     titles = [title for title, *_ in TABLE.values()]
     return markdown_table(["", *titles, *of_run, "dominates", "seeds that do"], lines)

@@ -85,13 +85,15 @@ def jobs(args: Args) -> list[Job]:
     if not chosen:
         known = ", ".join(dict.fromkeys(f"{curves.algo} on {curves.env_id}" for curves in PLAN))
         raise ParameterError(f"expected one of {known}; got {args.algo} on {args.env_id}")
-    found = []
+    trainings = []
     for curves in chosen:
         steps = args.steps or curves.steps
         # Steps of the command's choice keep the distance of scores where they can
-        own = Curves(curves.env_id, curves.algo, args.seeds or curves.seeds, steps, min(curves.every, steps))
-        found += [Job(own, seed) for seed in range(own.seeds)]
-    return found
+        asked = Curves(
+            curves.env_id, curves.algo, args.seeds or curves.seeds, steps, min(curves.every, steps)
+        )
+        trainings += [Job(asked, seed) for seed in range(asked.seeds)]
+    return trainings
 
 
 def train(job: Job) -> list[dict[str, Any]]:
@@ -118,10 +120,10 @@ def train(job: Job) -> list[dict[str, Any]]:
         def _on_step(self) -> bool:
             if self.num_timesteps % curves.every == 0 or self.num_timesteps == curves.steps:
                 # The clock of learning stops while the policy is scored
-                here = time.process_time()
-                spent = here - self.began - self.scored
+                paused = time.process_time()
+                spent = paused - self.began - self.scored
                 add(self.model, self.num_timesteps, spent)
-                self.scored += time.process_time() - here
+                self.scored += time.process_time() - paused
             return True
 
     def add(model: Any, steps: int, seconds: float) -> None:

@@ -24,7 +24,7 @@ ANCHORS = ("zero action", "scripted gait", BEST)
 
 def mean_return(policy: Any, envs: Any) -> float:
     """Return the mean return of a policy on the starts of the final scores."""
-    return float(np.mean([one["return"] for one in play_rows(envs, policy, FINAL_SEEDS)]))
+    return float(np.mean([episode["return"] for episode in play_rows(envs, policy, FINAL_SEEDS)]))
 
 
 def anchors(env_id: str) -> dict[str, float]:
@@ -40,12 +40,12 @@ def anchors(env_id: str) -> dict[str, float]:
         def predict(self, *args: Any, **kwargs: Any) -> tuple[NDArray[np.float32], None]:
             return zero, None
 
-    found = {"zero action": mean_return(Zero(), envs)}
+    returns = {"zero action": mean_return(Zero(), envs)}
     with runs.make_env(env_id) as env:
         if envs.action_form == "rates":
             for title, name in (("scripted gait", envs.task.reference), (BEST, "open-loop")):
-                found[title] = mean_return(find_policy(name, env, env_id), envs)
-    return found
+                returns[title] = mean_return(find_policy(name, env, env_id), envs)
+    return returns
 
 
 AT_STEPS = (20_480, 61_440, 204_800, 400_000, 3_000_000)
@@ -63,30 +63,30 @@ def at(rows: Sequence[dict[str, Any]], steps: int) -> list[float]:
     return [row["return"] for row in latest.values()]
 
 
-def table(rows: Sequence[dict[str, Any]], beside: dict[str, dict[str, float]]) -> str:
+def table(rows: Sequence[dict[str, Any]], references: dict[str, dict[str, float]]) -> str:
     """Return a line for each algorithm and id: interquartile mean, lowest and highest seed in the middle and
     at the end, and the returns of policies that need no learning."""
     lines = []
     for curves in PLAN:
-        own = [row for row in rows if (row["env_id"], row["algo"]) == (curves.env_id, curves.algo)]
-        if not own:
+        own_rows = [row for row in rows if (row["env_id"], row["algo"]) == (curves.env_id, curves.algo)]
+        if not own_rows:
             continue
-        last = max(row["steps"] for row in own)
+        last = max(row["steps"] for row in own_rows)
         cells = []
         for steps in (last // 2, last):
-            values = at(own, steps)
+            values = at(own_rows, steps)
             cells.append(f"{float(iqm(values)[0]):.1f} ({min(values):.1f} to {max(values):.1f})")
-        seconds = np.median([row["train_seconds"] for row in own if row["steps"] == last])
-        known = beside[curves.env_id]
-        references = [f"{known[name]:.1f}" if name in known else "" for name in ANCHORS]
+        seconds = np.median([row["train_seconds"] for row in own_rows if row["steps"] == last])
+        known = references[curves.env_id]
+        reference_cells = [f"{known[name]:.1f}" if name in known else "" for name in ANCHORS]
         above = ""
         if BEST in known:
-            finals = at(own, last)
+            finals = at(own_rows, last)
             above = f"{sum(value > known[BEST] for value in finals)} of {len(finals)}"
-        seeds = str(len({row["seed"] for row in own}))
+        seeds = str(len({row["seed"] for row in own_rows}))
         name = curves.env_id.rpartition("/")[2].removesuffix("-v0")
         own_cells = [name, curves.algo.upper(), seeds, *cells, f"{last:,}", f"{seconds:.0f}"]
-        lines.append([*own_cells, *references, above])
+        lines.append([*own_cells, *reference_cells, above])
     head = (
         "id",
         "algorithm",
@@ -106,16 +106,16 @@ def compared(rows: Sequence[dict[str, Any]], column: str, places: Sequence[float
     place of `column`, steps or seconds of learning; an empty cell if its trainings do not go so far."""
     lines = []
     for algo in dict.fromkeys(curves.algo for curves in PLAN if curves.env_id == LEG):
-        own = [row for row in rows if (row["env_id"], row["algo"]) == (LEG, algo)]
-        if not own:
+        own_rows = [row for row in rows if (row["env_id"], row["algo"]) == (LEG, algo)]
+        if not own_rows:
             continue
         ends: dict[int, float] = {}
-        for row in own:
+        for row in own_rows:
             ends[row["seed"]] = max(row[column], ends.get(row["seed"], 0.0))
         cells = []
         for place in places:
             latest: dict[int, dict[str, Any]] = {}
-            for row in own:
+            for row in own_rows:
                 if row[column] <= place and row["steps"] >= latest.get(row["seed"], row)["steps"]:
                     latest[row["seed"]] = row
             # A training that ended before would be compared at its end
@@ -131,7 +131,7 @@ def title(algo: str) -> str:
     return "ppo_flat, tuned, 16 environments" if algo == TUNED else f"{algo.upper()}, stock"
 
 
-def draw(rows: Sequence[dict[str, Any]], beside: dict[str, dict[str, float]], path: Path) -> None:
+def draw(rows: Sequence[dict[str, Any]], references: dict[str, dict[str, float]], path: Path) -> None:
     """Draw a panel for each id: the median of all seeds and their range over steps, and lines for policies
     that need no learning."""
     import matplotlib
@@ -150,21 +150,23 @@ def draw(rows: Sequence[dict[str, Any]], beside: dict[str, dict[str, float]], pa
         panels = figure.subplots(down, across, squeeze=False).ravel()
         for panel, env_id in zip(panels, ids, strict=False):
             for algo, colour in colours.items():
-                own = [row for row in rows if (row["env_id"], row["algo"]) == (env_id, algo)]
-                steps = sorted({row["steps"] for row in own})
+                own_rows = [row for row in rows if (row["env_id"], row["algo"]) == (env_id, algo)]
+                steps = sorted({row["steps"] for row in own_rows})
                 if not steps:
                     continue
-                values = [[row["return"] for row in own if row["steps"] == step] for step in steps]
-                panel.plot(steps, [np.median(each) for each in values], color=colour, label=algo.upper())
+                values = [[row["return"] for row in own_rows if row["steps"] == step] for step in steps]
+                panel.plot(
+                    steps, [np.median(returns) for returns in values], color=colour, label=algo.upper()
+                )
                 panel.fill_between(
                     steps,
-                    [min(each) for each in values],
-                    [max(each) for each in values],
+                    [min(returns) for returns in values],
+                    [max(returns) for returns in values],
                     color=colour,
                     alpha=0.2,
                     linewidth=0,
                 )
-            for name, value in beside[env_id].items():
+            for name, value in references[env_id].items():
                 panel.axhline(value, color=GREY, linewidth=0.8, linestyle=styles[name], label=name)
             panel.set_title(env_id.rpartition("/")[2])
             panel.set_xlabel("environment steps")
@@ -206,13 +208,13 @@ Returns after so many seconds of the processor, on one thread:
 
 def write(out: Path, rows: Sequence[dict[str, Any]]) -> None:
     """Write table and picture of the curves that are there."""
-    beside = {env_id: anchors(env_id) for env_id in dict.fromkeys(row["env_id"] for row in rows)}
+    references = {env_id: anchors(env_id) for env_id in dict.fromkeys(row["env_id"] for row in rows)}
     with staged(out) as stage:
-        draw(rows, beside, stage / "stock.png")
+        draw(rows, references, stage / "stock.png")
         text = PAGE.format(
             starts=len(FINAL_SEEDS),
             commits=", ".join(sorted({f"`{row['commit'] or 'unknown'}`" for row in rows})),
-            table=table([row for row in rows if row["algo"] != TUNED], beside),
+            table=table([row for row in rows if row["algo"] != TUNED], references),
             by_steps=compared(rows, "steps", AT_STEPS),
             by_seconds=compared(rows, "train_seconds", AT_SECONDS),
         )

@@ -200,8 +200,8 @@ def checked(args: Args) -> tuple[dict[str, Any], dict[str, Any]]:
     env_kwargs = parse_pairs("--env-kwargs", args.env_kwargs)
     settings = load_settings(args.hyperparams or FOLDER / f"{args.algo}.yml", args.env_id)
     settings |= parse_pairs("--params", args.params)
-    given = {"n_timesteps": args.steps, "n_envs": args.n_envs}
-    settings |= {key: value for key, value in given.items() if value is not None}
+    overrides = {"n_timesteps": args.steps, "n_envs": args.n_envs}
+    settings |= {key: value for key, value in overrides.items() if value is not None}
     settings["n_envs"] = int(check_number("n_envs", settings["n_envs"], low=1, high=4096))
     settings["n_timesteps"] = int(check_number("steps", settings["n_timesteps"], low=1))
     check_number("seed", args.seed, low=0)
@@ -251,13 +251,13 @@ def find_earlier(
         ParameterError: it was begun otherwise.
     """
     earlier = runs.read_record(folder)
-    there = [name for name in (*runs.FILES, runs.STATISTICS, runs.CHECKPOINTS) if (folder / name).exists()]
-    if there and not earlier:
+    present = [name for name in (*runs.FILES, runs.STATISTICS, runs.CHECKPOINTS) if (folder / name).exists()]
+    if present and not earlier:
         raise OutputError(
-            f"{folder}: expected a new folder or one of a run, found {', '.join(there)} and no run.json; "
+            f"{folder}: expected a new folder or one of a run, found {', '.join(present)} and no run.json; "
             "choose another folder"
         )
-    held = {runs.MODEL, WEIGHTS, runs.CHECKPOINTS} & {*there}
+    held = {runs.MODEL, WEIGHTS, runs.CHECKPOINTS} & {*present}
     if held and not args.resume:
         raise OutputError(
             f"{folder} already holds a trained model; choose another folder, remove that one, or go on with "
@@ -272,7 +272,9 @@ def find_earlier(
     pairs["hoof-env"] = earlier.get("versions", {}).get("hoof-env"), record["versions"].get("hoof-env")
     used = load_settings(folder / runs.CONFIG, args.env_id)
     pairs |= {key: (used.get(key), settings.get(key)) for key in {**used, **settings}}
-    unlike = [f"{key}: {there!r} there, {now!r} here" for key, (there, now) in pairs.items() if there != now]
+    unlike = [
+        f"{key}: {theirs!r} there, {ours!r} here" for key, (theirs, ours) in pairs.items() if theirs != ours
+    ]
     if unlike:
         raise ParameterError(f"--resume: expected what {folder} was begun with; {'; '.join(unlike)}")
     # A model without checkpoints cannot go on
@@ -285,8 +287,10 @@ def find_earlier(
 def warn_of_bits(folder: Path, earlier: dict[str, Any], record: dict[str, Any]) -> None:
     """Warn of differences under which a run may go on, but not with the same bits."""
     keys = ("python", "platform", *runs.PACKAGES, "torch_threads", "device")
-    there, here = ({**one.get("versions", {}), **one.get("args", {})} for one in (earlier, record))
-    pairs = {key: (there[key], here.get(key)) for key in keys if key in there}
+    theirs, ours = (
+        {**record_of.get("versions", {}), **record_of.get("args", {})} for record_of in (earlier, record)
+    )
+    pairs = {key: (theirs[key], ours.get(key)) for key in keys if key in theirs}
     unlike = [f"{key} {then} there, {now} here" for key, (then, now) in pairs.items() if then != now]
     if unlike:
         warnings.warn(f"--resume: {folder} goes on, but with other bits: {'; '.join(unlike)}", stacklevel=2)

@@ -129,7 +129,7 @@ class TrialScorer(Scorer):
         self.curve: list[tuple[int, float]] = []
 
     def keep(self, episodes: list[dict[str, float]]) -> None:
-        mean = sum(one["return"] for one in episodes) / len(episodes)
+        mean = sum(episode["return"] for episode in episodes) / len(episodes)
         self.curve.append((self.num_timesteps, mean))
 
     def _on_rollout_start(self) -> None:
