@@ -1,10 +1,10 @@
-"""What a change costs: the speed of the work tree beside another commit's, on this machine.
+"""Cost of a change: the speed of the work tree compared with another commit's, on this machine.
 
     python -m benchmarks.compare --base COMMIT            about three minutes
 
 Each round runs one whole process of either commit, in changing order, under the same Python and packages. A
 process times the cases of `compare_cases.py` in processor time; a ratio is the work tree's speed over the
-base's in one round, above 1 where the work tree is faster. Exits with 1 where a median is below 0.95.
+base's in one round, above 1 if the work tree is faster. Exits with 1 if a median is below 0.95.
 """
 
 from __future__ import annotations
@@ -30,14 +30,14 @@ from hoof_env._output import markdown_table
 ROOT = Path(__file__).resolve().parents[1]
 CASES = Path(__file__).with_name("compare_cases.py")
 KEPT = ROOT / "runs" / "compare"
-"""Checkouts of bases, kept so that their kernels are compiled once."""
+"""Folder of the checkouts of bases, kept so that their kernels are compiled once."""
 
 LOWEST = 0.95  # of a median ratio
 RUNS = 15  # of each case in a process
 
 
 def checkout(commit: str) -> Path:
-    """The package as it was at a commit, in a folder of its own.
+    """Return a folder with the package as it was at a commit.
 
     Raises:
         ValueError: there is no such commit.
@@ -58,7 +58,8 @@ def checkout(commit: str) -> Path:
 
 
 def run_cases(tree: Path, runs: int = RUNS) -> dict[str, float]:
-    """Processor time [s] of each case, run so often, in a process that takes the package from `tree`.
+    """Return the processor time [s] of each case, timed `runs` times in a process that takes the package from
+    `tree`.
 
     Raises:
         RuntimeError: the process took the package from elsewhere.
@@ -73,7 +74,8 @@ def run_cases(tree: Path, runs: int = RUNS) -> dict[str, float]:
 
 
 def compare(base: Path, now: Path, rounds: int) -> dict[str, list[float]]:
-    """Ratios of speed, `now` over `base`, by case, one a round; a round before them compiles and warms up."""
+    """Return ratios of speed, `now` over `base`, by case, one a round; a round before them compiles and warms
+    up."""
     trees = {"base": base, "now": now}
     order = np.random.default_rng(0)
     ratios: dict[str, list[float]] = {}
@@ -87,7 +89,7 @@ def compare(base: Path, now: Path, rounds: int) -> dict[str, list[float]]:
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """The command; see `--help`."""
+    """Run the command; see `--help`."""
     parser = argparse.ArgumentParser(prog="python -m benchmarks.compare", description=__doc__.splitlines()[0])
     parser.add_argument("--base", required=True, help="commit to compare with")
     parser.add_argument("--rounds", type=int, default=11)

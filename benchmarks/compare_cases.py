@@ -1,7 +1,7 @@
-"""The cases of `compare`, as a script that knows only what every commit has: public names and ids.
+"""Cases of `compare`, as a script that knows only what every commit has: public names and ids.
 
-Its argument is how many runs of each case to time. Prints where the package is, and for each case the least
-processor time of a run [s].
+Its argument is the number of runs of each case. It prints the file of the package, and for each case the
+least processor time of a run [s].
 """
 
 from __future__ import annotations
@@ -23,7 +23,8 @@ BATCH = 1024
 
 
 def advance(hips: tuple[float, ...], trunk: str, count: int, steps: int, calls: int) -> Callable[[], object]:
-    """So many calls of so many steps of 1 ms of an engine with motors, each from the same state."""
+    """Return a function of `calls` calls of `steps` steps of 1 ms of an engine with motors, each from the
+    same state."""
     leg = load_geometry("identified")
     walk = load_gait("walk", "identified")
     low = 0.05 if trunk == "fixed" else 0.0
@@ -44,7 +45,8 @@ def advance(hips: tuple[float, ...], trunk: str, count: int, steps: int, calls: 
 
 
 def step(env: gym.Env, steps: int, size: float = 1.0) -> Callable[[], object]:
-    """So many steps of one environment with random actions up to a size, going on from the last."""
+    """Return a function of `steps` steps of one environment with random actions up to a size, going on from
+    the last."""
     shape: tuple[int, ...] = env.action_space.shape or ()
     actions = np.random.default_rng(0).uniform(-size, size, (steps, *shape)).astype(env.action_space.dtype)
     env.reset(seed=0)
@@ -59,8 +61,8 @@ def step(env: gym.Env, steps: int, size: float = 1.0) -> Callable[[], object]:
 
 
 def step_many(envs: Any, count: int, steps: int, size: float = 1.0) -> Callable[[], object]:
-    """So many steps of `count` environments that have been reset, of Gymnasium or EnvPool, with random
-    actions up to a size."""
+    """Return a function of `steps` steps of `count` environments that have been reset, of Gymnasium or
+    EnvPool, with random actions up to a size."""
     shape = (min(steps, 8), count, envs.action_space.shape[-1])
     actions = np.random.default_rng(0).uniform(-size, size, shape).astype(envs.action_space.dtype)
 
@@ -72,8 +74,8 @@ def step_many(envs: Any, count: int, steps: int, size: float = 1.0) -> Callable[
 
 
 def least_seconds(cases: dict[str, Callable[[], object]], runs: int) -> dict[str, float]:
-    """Least processor time [s] of each case, by turns, after one run of each that compiles and warms up: what
-    else the machine does adds to a run and takes nothing off."""
+    """Return the least processor time [s] of each case, by turns, after one run of each that compiles and
+    warms up: other work of the machine adds to a run and takes nothing off."""
     spent: dict[str, list[float]] = {name: [] for name in cases}
     for k in range(runs + 1):
         for name, run in cases.items():

@@ -1,11 +1,11 @@
-"""How fast the environments are, beside Gymnasium's HalfCheetah-v5 and EnvPool's, on one thread.
+"""Speed of the environments compared with Gymnasium's HalfCheetah-v5 and EnvPool's, on one thread.
 
     python -m benchmarks.env_speed          writes env_speed.json and .md, where `benchmarks.speed` does
 
 An environment step is 20 substeps of 1 ms here and 5 of 10 ms there; `HorseLegFixed` takes 200 of 0.1 ms and
 has no bars. One process, random actions, observations, rewards and resets included, rounds interleaved; a
-ratio is taken within a round. EnvPool is measured where it is installed, with one thread and as many
-environments as serve it best; else HalfCheetah-v5 stands for it.
+ratio is taken within a round. EnvPool is measured if it is installed, with one thread and the number of
+environments that serves it best; else HalfCheetah-v5 stands for it.
 """
 
 from __future__ import annotations
@@ -53,7 +53,7 @@ of the widest vectors in the code that numba compiles; the others are as they co
 
 
 def measure(rounds: int, steps: int) -> dict[str, Any]:
-    """Rates and ratios."""
+    """Return rates and ratios."""
     cheetah = "HalfCheetah-v5, single"
     runs = {cheetah: step(gym.make("HalfCheetah-v5"), steps)}
     units = {cheetah: steps}
@@ -101,7 +101,7 @@ def measure(rounds: int, steps: int) -> dict[str, Any]:
 
 
 def page(result: dict[str, Any]) -> str:
-    """The table as Markdown."""
+    """Return the table as Markdown."""
     lines = [
         [
             row["case"],

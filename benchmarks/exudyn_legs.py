@@ -25,17 +25,17 @@ from hoof_env.leg.linkage import BODIES, FRAME, JOINTS, LOCK
 eii: Any = exudyn.itemInterface  # its types ask for protocols that closures do not meet by name
 
 SPECTRAL_RADIUS = 0.6
-"""Of generalised alpha, below 1."""
+"""Spectral radius of generalised alpha, below 1."""
 
 SOLE = 13
 
 
 class ExudynLegs:
-    """A horse in Exudyn, ready to run once.
+    """Horse in Exudyn, ready to run once.
 
     Args:
         limbs, trunk: the horse.
-        start: its first pose; each crank keeps or is to keep the speed that it has there.
+        start: its first pose; each crank has the speed there, and keeps it or is driven to keep it.
         dt: time step [s].
         outside: forces at toe and heel; none if None. Called without `commit` within a step, with it after.
     """
@@ -70,7 +70,7 @@ class ExudynLegs:
         self.mbs.Assemble()
 
     def run(self, duration: float, samples: int, fast: bool = False) -> Record:
-        """Simulate `duration` [s] and look `samples` times besides the beginning, evenly.
+        """Simulate `duration` [s] and look `samples` times after the beginning, evenly.
 
         `fast` is for timing: modified Newton and tolerances of 1e-6, which measured fastest.
 
@@ -111,7 +111,8 @@ class ExudynLegs:
     # The parts
 
     def _body(self, mass: float, inertia: float, pose: Sequence[float], rates: Sequence[float]) -> int:
-        """A rigid body under its weight; all have three coordinates, in the order in which they are added."""
+        """Add a rigid body under its weight and return its number; all have three coordinates, in the order
+        in which they are added."""
         self._reference += pose
         node = self.mbs.AddNode(
             eii.NodeRigidBody2D(referenceCoordinates=list(pose), initialVelocities=list(rates))
@@ -124,17 +125,17 @@ class ExudynLegs:
         return int(body)
 
     def _coordinate(self, body: int, axis: int) -> int:
-        """Marker of one coordinate of a body; its value is the change since the start."""
+        """Add a marker of one coordinate of a body; its value is the change since the start."""
         node = self.mbs.GetObjectParameter(body, "nodeNumber")
         return int(self.mbs.AddMarker(eii.MarkerNodeCoordinate(nodeNumber=node, coordinate=axis)))
 
     def _hold(self, one: int, two: int, offset: Callable[[float], float] | None = None) -> int:
-        """Constraint: coordinate `two` less `one` is the offset."""
+        """Add a constraint: coordinate `two` less `one` is the offset."""
         law = {"offsetUserFunction": lambda mbs, t, item, _: offset(t)} if offset else {}
         return int(self.mbs.AddObject(eii.CoordinateConstraint(markerNumbers=[one, two], **law)))
 
     def _hang(self) -> None:
-        """What the trunk hangs from."""
+        """Add the supports of the trunk: constraints, drag, suspension."""
         trunk = self.trunk
         for axis in range(3):
             at = self._coordinate(self._trunk, axis)
@@ -149,6 +150,7 @@ class ExudynLegs:
                 self.mbs.AddLoad(eii.LoadCoordinate(markerNumber=at, load=lift))
 
     def _spring(self, at: int, stiffness: float, damping: float, offset: float) -> None:
+        """Add a spring and a damper between the ground and a coordinate."""
         self.mbs.AddObject(
             eii.CoordinateSpringDamper(
                 markerNumbers=[self._still, at], stiffness=stiffness, damping=damping, offset=offset
@@ -156,9 +158,11 @@ class ExudynLegs:
         )
 
     def _point(self, body: int, x: float, y: float) -> int:
+        """Add a marker of a point of a body."""
         return int(self.mbs.AddMarker(eii.MarkerBodyPosition(bodyNumber=body, localPosition=[x, y, 0])))
 
     def _leg(self, i: int) -> dict[str, Any]:
+        """Add a leg: frame, bodies, joints, lock, drive, and forces from outside; return their numbers."""
         limb = self.limbs[i]
         start = self.start
         geometry = limb.geometry
@@ -207,7 +211,7 @@ class ExudynLegs:
         return {"frame": frame, "bodies": bodies, "joints": joints, "ends": ends, "corners": corners} | drives
 
     def _prescribe(self, i: int, axes: list[int]) -> dict[str, Any]:
-        """Crank and swing as functions of time."""
+        """Add crank and swing as functions of time."""
         sigma = self.limbs[i].geometry.travel
         start = self.start
         theta = start.crank[i]
@@ -220,7 +224,7 @@ class ExudynLegs:
         return {"swing": self._hold(axes[0], axes[1], swing), "driver": driver}
 
     def _motor(self, i: int, frame: int, crank: int, axes: list[int]) -> dict[str, Any]:
-        """A torque between frame and crank, the rotor, and the swing geared to the crank."""
+        """Add a torque between frame and crank, the rotor, and the swing geared to the crank."""
         limb = self.limbs[i]
         sigma = self.limbs[i].geometry.travel
         start = self.start
@@ -228,7 +232,7 @@ class ExudynLegs:
         assert isinstance(motor, Motor)
 
         def torque(mbs: Any, t: float, item: int, u: float, v: float, *unused: float) -> float:
-            """On the crank, against the clock; Exudyn's force pulls marker 1 back."""
+            """Return the torque on the crank, against the clock; Exudyn's force pulls marker 1 back."""
             return sigma * self._servo(i, -sigma * v)
 
         nodes = [self.mbs.GetObjectParameter(body, "nodeNumber") for body in (self._trunk, frame, crank)]
@@ -248,12 +252,16 @@ class ExudynLegs:
         crank_at = self._reference[-3 * len(BODIES) + 2] - self._reference[-3 * len(BODIES) - 1]
 
         def swung(q: NDArray[np.float64]) -> tuple[float, float]:
+            """Return the swing of the leg and its slope by the crank angle."""
             return start.phi(i, start.crank[i] - sigma * (q[8] - q[5] - crank_at))
 
         def error(mbs: Any, t: float, item: int, q: Any, q_t: Any, velocity: bool) -> list[float]:
+            """Return the gap of the gear: swing of the frame against the trunk less that of the crank
+            angle."""
             return [q[5] - q[2] - sigma * swung(q)[0]]
 
         def jacobian(mbs: Any, t: float, item: int, q: Any, q_t: Any, velocity: bool) -> Any:
+            """Return the derivatives of the gap by the coordinates."""
             slope = swung(q)[1]  # sigma * d theta = d frame - d crank
             row = np.zeros((1, len(q)))
             row[0, [2, 5, 8]] = -1.0, 1.0 - slope, slope
@@ -273,7 +281,7 @@ class ExudynLegs:
         return {"swing": int(self.mbs.AddObject(gear))}
 
     def _servo(self, i: int, speed: float) -> float:
-        """Torque of a motor whose crank turns at `speed`, along theta [N m]."""
+        """Return the torque along theta [N m] of a motor with a crank that turns at `speed`."""
         motor: Any = self.limbs[i].drive
         asked = motor.speed_gain * (self.start.crank_speed[i] - speed)
         return float(np.clip(asked, -motor.torque_limit, motor.torque_limit))
@@ -281,7 +289,7 @@ class ExudynLegs:
     # The forces
 
     def _sole(self, body: int, x: float) -> tuple[complex, complex]:
-        """Place and velocity of a point on the sole."""
+        """Return position and velocity of a point on the sole."""
         values = [
             self.mbs.GetObjectOutputBody(body, kind, [x, 0, 0], exu.ConfigurationType.Current)
             for kind in (exu.OutputVariableType.Position, exu.OutputVariableType.Velocity)
@@ -289,7 +297,8 @@ class ExudynLegs:
         return complex(*values[0][:2]), complex(*values[1][:2])
 
     def _push(self, i: int, point: int) -> Callable[..., list[float]]:
-        """A connector's law, which Exudyn differentiates for Newton; its force pulls marker 1 back."""
+        """Return the law of a connector, which Exudyn differentiates for Newton; its force pulls marker 1
+        back."""
 
         def force(mbs: Any, t: float, item: int, at: Any, velocity: Any, *unused: Any) -> list[float]:
             assert self.outside is not None
@@ -299,6 +308,7 @@ class ExudynLegs:
         return force
 
     def _touch(self, t: float) -> None:
+        """Call the forces from outside at the end of a step, so that contacts latch."""
         assert self.outside is not None
         for i, leg in enumerate(self._legs):
             for point, x in enumerate(leg["corners"]):
@@ -307,7 +317,7 @@ class ExudynLegs:
     # What is to be seen
 
     def _look(self, t: float) -> tuple[Any, ...]:
-        """What `Record` has of the present instant."""
+        """Return the row of `Record` at the present instant."""
         system = self.mbs.systemData
         q = (np.array(self._reference) + system.GetODE2Coordinates()).reshape(-1, 3)
         v = np.array(system.GetODE2Coordinates_t()).reshape(-1, 3)

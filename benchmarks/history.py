@@ -1,4 +1,5 @@
-"""Every run's barred ratios with date, processor and vector width: a new run does not replace an old one.
+"""History of every run's barred ratios with date, processor and vector width: a new run does not replace an
+old one.
 
 A run adds rows to `speed.csv`; `speed.md` shows them all.
 """
@@ -15,7 +16,7 @@ from benchmarks.rounds import bar_text
 from hoof_env._output import markdown_table, staged
 
 RESULTS = Path(__file__).parent / "results"
-"""Holds a folder for each vector width, and the history of all."""
+"""Folder with one for each vector width, and the history of all."""
 
 RUN = ("date", "commit", "compiled for", "processor")
 COLUMNS = ("case", "beside", "bits", "ratio", "q1", "q3", "required", *RUN)
@@ -27,11 +28,12 @@ Written by `make bench`, which adds rows and replaces none. A ratio is the media
 its quartiles; bits are of the widest vectors that numba compiled. The last run of each width in full:"""
 
 Row = tuple[str, str, Mapping[str, float] | None, float | None]
-"""Case, what it is beside, the ratio's spread if it was measured, and the bar if there is one."""
+"""Case, the case that it is compared with, the ratio's spread if it was measured, and the bar if there is
+one."""
 
 
 def write(folder: Path, name: str, result: Mapping[str, Any], page: str, rows: Iterable[Row]) -> Path:
-    """Write a run and its page for its vector width, and `keep` its rows; returns the folder of the width."""
+    """Write a run and its page for its vector width, and `keep` its rows; return the folder of the width."""
     own = folder / f"{result['bits']}-bits"
     with staged(own) as stage:
         (stage / f"{name}.json").write_text(json.dumps(result, indent=1) + "\n")
@@ -65,7 +67,7 @@ def keep(folder: Path, machine: Mapping[str, str], bits: int, rows: Iterable[Row
 
 
 def read(folder: Path) -> list[dict[str, str]]:
-    """The rows of all runs so far."""
+    """Return the rows of all runs so far."""
     path = folder / "speed.csv"
     if not path.exists():
         return []
@@ -74,7 +76,7 @@ def read(folder: Path) -> list[dict[str, str]]:
 
 
 def page(rows: list[dict[str, str]], folder: Path) -> str:
-    """All runs as Markdown, case by case and each in order of time."""
+    """Return all runs as Markdown, case by case and each in order of time."""
     links = sorted(path.relative_to(folder) for path in folder.glob("*-bits/*.md"))
     listed = [f"* [{link.parent.name}, {link.stem}]({link.as_posix()})" for link in links]
     cases = list(dict.fromkeys(row["case"] for row in rows))

@@ -52,7 +52,7 @@ the mean of 64 starts; scores are not counted. Imports took {imports:.1f} s, loa
 
 
 class Timed(BaseCallback):
-    """Scores the policy after updates, with the clock stopped.
+    """Callback that scores the policy after updates, with the clock stopped.
 
     Attributes:
         curve: seconds, steps and return of each score.
@@ -75,7 +75,7 @@ class Timed(BaseCallback):
         self.score()
 
     def score(self) -> None:
-        """Score the policy where a score is due."""
+        """Score the policy if a score is due."""
         if self.num_timesteps < self._due:
             return
         here = time.perf_counter()
@@ -91,12 +91,12 @@ class Timed(BaseCallback):
 
 
 def first(curve: Curve, level: float) -> float:
-    """Seconds until a curve is above a level; infinite where it never is."""
+    """Return the seconds until a curve is above a level; infinite if it never is."""
     return next((seconds for seconds, _, value in curve if value > level), np.inf)
 
 
 def learn_flat(seed: int, envs: Any, threads: int, steps: int = STEPS) -> Curve:
-    """The curve of a training of `ppo_flat`, scored after every update at first, then after every eighth."""
+    """Train `ppo_flat` and return its curve, scored after every update at first, then after every eighth."""
     settings = load_settings(FOLDER / "ppo_flat.yml", ENV_ID)
     many = VecMonitor(runs.make_vec_env(ENV_ID, settings["n_envs"], 1))
     settings["n_timesteps"] = steps
@@ -104,7 +104,7 @@ def learn_flat(seed: int, envs: Any, threads: int, steps: int = STEPS) -> Curve:
     timed = Timed(envs, 0)
 
     class Sparser(BaseCallback):
-        """Scores less often later on."""
+        """Callback that scores less often later on."""
 
         def _on_step(self) -> bool:
             if self.num_timesteps > 200_000:
@@ -118,7 +118,7 @@ def learn_flat(seed: int, envs: Any, threads: int, steps: int = STEPS) -> Curve:
 
 
 def learn_stock(library: str, algo: str, seed: int, envs: Any, level: float) -> Curve:
-    """The curve of a stock learner, until it is above a level or its time is over."""
+    """Train a stock learner until it is above a level or its time is over, and return its curve."""
     algorithm = getattr(importlib.import_module(library), algo)
     with runs.make_env(ENV_ID) as env:
         model = algorithm("MlpPolicy", env, seed=seed)
@@ -128,7 +128,7 @@ def learn_stock(library: str, algo: str, seed: int, envs: Any, level: float) -> 
 
 
 def spread(values: list[float]) -> str:
-    """Median, lowest and highest."""
+    """Format median, lowest and highest."""
     shown = [f"{value:.1f}" if np.isfinite(value) else "never" for value in sorted(values)]
     return f"{np.median(values):.1f} ({shown[0]} to {shown[-1]})" if len(values) > 1 else shown[0]
 

@@ -33,14 +33,15 @@ FLYWHEEL = 1e9
 """Inertia that keeps a prescribed crank at its speed [kg m^2]: it is 1e10 times the leg's."""
 
 RADIUS = 0.01
-"""Of the balls at toe and heel [m]; the floor lies a radius deeper, so a ball touches when its point does."""
+"""Radius of the balls at toe and heel [m]; the floor lies a radius deeper, so a ball touches when its point
+does."""
 
 SLIDES = {"fixed": (), "rail": ("x",), "suspended": ("x", "y"), "free": ("x", "y", "pitch")}
 
 _SPEED = 'solver="Newton" jacobian="dense" integrator="Euler" iterations="5" tolerance="1e-8"'
-"""The fastest that holds the loops. One Newton iteration loses the horse, and so do 50 of CG; PGS is slower,
-a sparse Jacobian is, too, but for 14 hinges a leg on four legs, implicitfast by 3 %, elliptic
-cones by 20 % on four legs, and islands, which are off below, by 9 %."""
+"""Options of the fastest solver that holds the loops. One Newton iteration loses the horse, and so do 50 of
+CG; PGS is slower, a sparse Jacobian is, too, but for 14 hinges a leg on four legs, implicitfast by 3 %,
+elliptic cones by 20 % on four legs, and islands, which are off below, by 9 %."""
 
 _TRUTH = 'solver="Newton" jacobian="dense" integrator="RK4" iterations="50" tolerance="0"'
 
@@ -52,7 +53,8 @@ def _xyz(z: Any) -> str:
 def _leg(
     assembly: Assembly, limb: Limb, i: int, at: Pose, frame: NDArray[np.float64], contact: bool, rotor: float
 ) -> str:
-    """The bodies of a leg, each with the world's axes in the pose `at`; `frame` is the trunk's origin."""
+    """Return the XML of a leg's bodies, each with the world's axes in the pose `at`; `frame` is the trunk's
+    origin."""
     masses = limb.geometry.body_masses
     inertias = limb.geometry.body_inertias
 
@@ -88,15 +90,15 @@ def build_model(
     assembly: Assembly = RIGID,
     solref: tuple[float, float] | None = None,
 ) -> mujoco.MjModel:
-    """A horse in MuJoCo whose joints are at zero in the pose of `start`.
+    """Build a horse in MuJoCo with all joints at zero in the pose of `start`.
 
     Args:
         limbs, trunk: the horse. A prescribed crank is a flywheel that keeps its speed.
         start: its first pose.
         dt: time step [s].
-        contact: MuJoCo's own, of balls at toe and heel with the ground at y = 0.
-        assembly: which links are one body with a hinge; `RIGID` or `ALL`.
-        solref: of the loops; see the module's docstring.
+        contact: add MuJoCo's own contact, of balls at toe and heel with the ground at y = 0.
+        assembly: bodies that are one link; `RIGID` or `ALL`.
+        solref: time constant [s] and damping ratio of the loops; see the module's docstring.
 
     Raises:
         ValueError: the start asks for a swing that moves.
@@ -175,7 +177,7 @@ def build_model(
 
 
 class MujocoLegs:
-    """A horse of `build_model` with its state, drives and forces from outside.
+    """Horse of `build_model` with its state, drives and forces from outside.
 
     Args:
         limbs, trunk, start, dt: as in `build_model`, which takes `build`, too.
@@ -235,7 +237,7 @@ class MujocoLegs:
             self.evaluate()
 
     def run(self, duration: float, samples: int) -> Record:
-        """Advance by `duration` [s] and look `samples` times besides the beginning, evenly."""
+        """Advance by `duration` [s] and look `samples` times after the beginning, evenly."""
         steps = round(duration / self.model.opt.timestep / samples)
         rows = [self.look()]
         for _ in range(samples):
@@ -244,7 +246,7 @@ class MujocoLegs:
         return Record.of(rows)
 
     def look(self) -> tuple[Any, ...]:
-        """What `Record` has of the present instant."""
+        """Return the row of `Record` at the present instant."""
         return (
             self.data.time,
             self.crank,
@@ -257,7 +259,7 @@ class MujocoLegs:
         )
 
     def evaluate(self) -> None:
-        """Accelerations and forces at the present state."""
+        """Evaluate accelerations and forces at the present state."""
         self._guarded(mujoco.mj_forward)
         mujoco.mj_rnePostConstraint(self.model, self.data)
 
@@ -273,6 +275,7 @@ class MujocoLegs:
             mujoco.set_mjcb_passive(None)
 
     def _load(self, commit: bool) -> None:
+        """Apply the forces from outside to the hooves, at their centres of mass."""
         assert self.outside is not None
         for i, bodies in enumerate(self._bodies):
             hoof = bodies["hoof"]
@@ -300,7 +303,7 @@ class MujocoLegs:
 
     @property
     def crank_speed(self) -> NDArray[np.float64]:
-        """Of each crank [rad/s]."""
+        """Speed of each crank [rad/s]."""
         return np.array(self.data.qvel[self._cranks])
 
     @property
@@ -314,14 +317,14 @@ class MujocoLegs:
 
     @property
     def crank_torque(self) -> NDArray[np.float64]:
-        """What the drives give [N m], along theta."""
+        """Torques of the drives [N m], along theta."""
         torque = -FLYWHEEL * self.data.qacc[self._cranks]
         torque[self._motors] = self.data.actuator_force
         return torque
 
     @property
     def hip_torque(self) -> NDArray[np.float64]:
-        """What holds each leg's frame about O [N m], along phi, against its pins, drive and rotor."""
+        """Torques that hold each leg's frame about O [N m], along phi, against its pins, drive and rotor."""
         torque = -self.crank_torque
         pins = self.pins()
         spin = self.data.qacc[self._cranks]
@@ -338,7 +341,7 @@ class MujocoLegs:
         return torque
 
     def pins(self) -> NDArray[np.float64]:
-        """Forces at the pins [N], shape (legs, pins, 2), in the order of `assembly.pins`."""
+        """Return the forces at the pins [N], shape (legs, pins, 2), in the order of `assembly.pins`."""
         pins = self.assembly.pins
         loops = self.assembly.loops
         carrier = self.assembly.carrier
@@ -356,7 +359,7 @@ class MujocoLegs:
         return forces
 
     def points(self, leg: int) -> dict[str, complex]:
-        """Where the pins that begin a link are, and the toe and the heel [m]."""
+        """Return the places of the pins that begin a link, and of toe and heel [m]."""
         bodies = self._bodies[leg]
         at = {point: complex(*self.data.xpos[bodies[link]][:2]) for link, _, point in self.assembly.tree}
         turn = complex(*self.data.xmat[bodies["hoof"]][[0, 3]])
@@ -365,6 +368,6 @@ class MujocoLegs:
         return at
 
     def closure(self) -> float:
-        """The widest gap of a loop [m]."""
+        """Return the widest gap of a loop [m]."""
         gaps = np.asarray(self.data.efc_pos[: 3 * len(self.assembly.loops) * len(self.limbs)]).reshape(-1, 3)
         return float(np.linalg.norm(gaps, axis=1).max())

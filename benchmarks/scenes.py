@@ -1,4 +1,4 @@
-"""The animals that `speed` times: the same leg and the same horse in every engine.
+"""Animals that `speed` times: the same leg and the same horse in every engine.
 
 All walk: contact, motors, steps of 1 ms. MuJoCo's legs keep their swing, so here all legs do; the engine has
 no branch on a swing, so its cost is that of any gait. MuJoCo's contact is not in N/m: its time constant here
@@ -29,13 +29,13 @@ SPEED = 2 * np.pi
 
 @dataclass(frozen=True)
 class Scene:
-    """Legs on a trunk, as all engines get them.
+    """Legs on a trunk, the same for all engines.
 
     Attributes:
-        name: of the table's rows.
+        name: name in the table's rows.
         limbs, trunk: the animal.
-        cranks: angle of each at the start [rad].
-        swing: of all [rad].
+        cranks: angle of each crank at the start [rad].
+        swing: swing of all legs [rad].
         softness: time constant of MuJoCo's contact [s].
     """
 
@@ -48,12 +48,13 @@ class Scene:
 
     @property
     def start(self) -> Start:
+        """State in which it begins."""
         n = len(self.limbs)
         return Start(self.cranks, (SPEED,) * n, (self.swing,) * n, position=(0.0, self.trunk.height))
 
 
 def scenes(preset: str) -> dict[str, Scene]:
-    """The leg on a fixed trunk, the leg on a suspended one, and the horse."""
+    """Return the leg on a fixed trunk, the leg on a suspended one, and the horse, by name."""
     geometry = load_geometry(preset)
     swing = load_gait("walk", preset).swing_offset
     high = geometry.hip_height
@@ -73,13 +74,13 @@ def scenes(preset: str) -> dict[str, Scene]:
 
 
 def with_springs(scene: Scene) -> Scene:
-    """The scene with springs at the hooves."""
+    """Return the scene with springs at the hooves."""
     spring = HoofSpring.with_ratio(4e4, 475.0 / 4)
     return replace(scene, limbs=tuple(replace(limb, spring=spring) for limb in scene.limbs))
 
 
 def engine(scene: Scene, preset: str, num_envs: int = 1, **options: Any) -> TrunkEngine:
-    """The scene in this project's engine, with crank angles all round the circle, in random order."""
+    """Return the scene in this project's engine, with crank angles all round the circle, in random order."""
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", StepWarning)  # the cost of a step is asked, not its error
         made = TrunkEngine(

@@ -1,7 +1,7 @@
-"""How fast the engine is, beside MuJoCo and Exudyn on the same leg: `make bench`.
+"""Speed of the engine compared with MuJoCo and Exudyn on the same leg: `make bench`.
 
 Everything runs interleaved in one process on one thread. Writes speed.json and speed.md into a folder for the
-vector width, and a row for each barred case into speed.csv and speed.md beside it.
+vector width, and a row for each barred case into speed.csv and speed.md next to it.
 """
 
 from __future__ import annotations
@@ -37,8 +37,8 @@ ROUNDS = 40
 BATCH = 1024
 
 PRESET = "identified"
-"""With its swing held, its walk meets the ground under a fixed trunk too; that of
-`research/identify/first_fit.json` does not."""
+"""Leg and ground of the scenes. With its swing held, its walk meets the ground under a fixed trunk, too; that
+of `research/identify/first_fit.json` does not."""
 
 ASSEMBLIES = {"ALL": ALL, "RIGID": RIGID}
 
@@ -60,7 +60,8 @@ VARIANTS: tuple[tuple[str, dict[str, Any], float], ...] = (
     (", all joint reactions", {"reactions": True}, 0.5),
     (", semi_implicit_euler", {"integrator": "semi_implicit_euler"}, 0.0),
 )
-"""Name, options of the engine, and share of the bars that is asked of it; the last is MuJoCo's own scheme."""
+"""Name, options of the engine, and the share of the bars that it must meet; the last is MuJoCo's own
+scheme."""
 
 ANIMAL: tuple[tuple[str, dict[str, Any], float | None], ...] = (
     (", springs and three harmonics", {"harmonics": 3}, 1.4),
@@ -70,7 +71,7 @@ ANIMAL: tuple[tuple[str, dict[str, Any], float | None], ...] = (
         None,
     ),
 )
-"""What a whole animal has beyond rigid legs, and how much longer a step may take than theirs."""
+"""Name and options of compliant legs, and the largest ratio of their time of a step to that of rigid legs."""
 
 INTRO = """\
 # How fast it is
@@ -99,16 +100,16 @@ one, in the same round."""
 
 @dataclass(frozen=True)
 class Case:
-    """Something to time.
+    """Piece of work to time.
 
     Attributes:
         name: unique.
         group: the scene; cases of one group have the same reference.
-        run: does the work from the same state and returns the time that it took [s].
-        units: steps of the whole animal that this is.
-        note: for the table.
+        run: does the work from the same state and returns its time [s].
+        units: steps of the whole animal in it.
+        note: remark in the table.
         required, aimed: bars of the ratio to the reference.
-        bits: of the widest vectors in code that numba compiled.
+        bits: bits of the widest vectors in code that numba compiled.
     """
 
     name: str
@@ -126,7 +127,7 @@ Clock = Callable[[], float]
 
 
 def own_cases(quick: bool, clock: Clock) -> list[Case]:
-    """Cases of this project's engine."""
+    """Return the cases of this project's engine."""
     cases = []
     for (name, count), steps in STEPS.items():
         n, steps = (min(count, 64), max(steps // 20, 4)) if quick else (count, steps)
@@ -143,14 +144,15 @@ def own_cases(quick: bool, clock: Clock) -> list[Case]:
 
 
 def run_of(made: TrunkEngine, steps: int, clock: Clock) -> Callable[[], float]:
-    """Times so many steps of an engine from where it is now, its kernels compiled."""
+    """Return a function that times `steps` steps of an engine from its present state, with compiled
+    kernels."""
     made.advance(steps=1, account=False)
     before = partial(made.set_state, made.get_state())
     return partial(timed, clock, before, partial(made.advance, steps=steps, account=False))
 
 
 def mujoco_cases(quick: bool, clock: Clock) -> list[Case]:
-    """MuJoCo's `mj_step`, with its own contact and the Jacobian that is faster here."""
+    """Return the cases of MuJoCo's `mj_step`, with its own contact and the Jacobian that is faster here."""
     import mujoco
 
     from benchmarks.mujoco_legs import MujocoLegs
@@ -182,7 +184,7 @@ def mujoco_cases(quick: bool, clock: Clock) -> list[Case]:
 
 
 def exudyn_cases(quick: bool, clock: Clock) -> list[Case]:
-    """Exudyn at its fastest, with our contact law and our motor in Python."""
+    """Return the cases of Exudyn at its fastest, with this project's contact law and motor in Python."""
     from benchmarks.exudyn_legs import ExudynLegs
 
     def run(scene: Scene) -> float:
@@ -230,8 +232,8 @@ def compare(cases: list[Case], rounds: int) -> list[dict[str, Any]]:
 
 
 def start() -> dict[str, float]:
-    """Wall time [s] of `import hoof_env`, the median of five processes, and of compiling into an empty cache
-    the kernels of the environments."""
+    """Return the wall time [s] of `import hoof_env`, the median of five processes, and of compiling the
+    kernels of the environments into an empty cache."""
     root = Path(__file__).resolve().parents[1]
 
     def seconds_of(code: str, before: str = "", **settings: str) -> float:
@@ -253,7 +255,7 @@ def start() -> dict[str, float]:
 
 
 def measure(quick: bool, rounds: int, clock_name: str) -> dict[str, Any]:
-    """All of it; what `speed.json` holds."""
+    """Measure all of it and return the content of `speed.json`."""
     clock = CLOCKS[clock_name]
     cases = own_cases(quick, clock)
     notes = []
@@ -279,7 +281,7 @@ def measure(quick: bool, rounds: int, clock_name: str) -> dict[str, Any]:
 
 
 def speed_table(rows: list[dict[str, Any]]) -> str:
-    """Every case: its rate, its ratios, and whether they meet the bars."""
+    """Return the table of every case: its rate, its ratios, and the verdicts on the bars."""
     head = ["case", "bits", "steps/s", "ratio to MuJoCo ALL", "ratio to MuJoCo RIGID", "required", "aimed at"]
     lines = []
     for row in rows:
@@ -298,7 +300,7 @@ def speed_table(rows: list[dict[str, Any]]) -> str:
 
 
 def cost_table(rows: list[dict[str, Any]]) -> str:
-    """What springs and harmonics cost beside rigid legs."""
+    """Return the table of the costs of springs and harmonics, compared with rigid legs."""
     bars = {what: bar for what, _, bar in ANIMAL}
     lines = []
     for row in rows:
@@ -310,7 +312,7 @@ def cost_table(rows: list[dict[str, Any]]) -> str:
 
 
 def page(result: dict[str, Any]) -> str:
-    """The whole result as Markdown."""
+    """Return the whole result as Markdown."""
     about = [["leg and ground", result["preset"]], *([k, v] for k, v in result["machine"].items())]
     parts = [INTRO.format(**result), markdown_table(["", ""], about), RATIOS, speed_table(result["cases"])]
     parts += [COSTS, cost_table(result["cases"])]
@@ -325,7 +327,7 @@ def page(result: dict[str, Any]) -> str:
 
 
 def main(arguments: list[str] | None = None) -> None:
-    """The command; see `--help`."""
+    """Run the command; see `--help`."""
     parser = argparse.ArgumentParser(prog="python -m benchmarks.speed", description=__doc__.splitlines()[0])
     parser.add_argument("--out", type=Path, default=RESULTS, help="folder for those of all vector widths")
     parser.add_argument("--rounds", type=int, help=f"how many; {ROUNDS} if not given")

@@ -1,10 +1,11 @@
-"""What threads gain: one, two or more that share 1024 legs, beside as many separate processes.
+"""Gain of threads: one, two or more that share 1024 legs, compared with as many separate processes.
 
     python -m benchmarks.threads          writes threads.json and .md, where `benchmarks.speed` does
 
 A round has each case once, in a new order: one thread, T threads that are joined after each control step, and
-T processes with a T-th of the legs each, which are told to begin and wait for nobody. Then what a call to a
-thread costs and what a group of columns takes, from which the table of more cores is computed, not measured.
+T processes with a T-th of the legs each, which begin together and do not wait for each other. Then the cost
+of a call to a thread and the time of a group of columns, from which the table of more cores is computed, not
+measured.
 """
 
 from __future__ import annotations
@@ -67,14 +68,14 @@ class Legs:
         self.actions = [uniform(-1, 1, shape).astype(np.float32) for _ in range(8)]
 
     def run(self) -> float:
-        """Wall time [s] of `STEPS` steps."""
+        """Return the wall time [s] of `STEPS` steps."""
         begin = time.perf_counter()
         for k in range(STEPS):
             self.envs.step(self.actions[k % 8])
         return time.perf_counter() - begin
 
     def serial_and_kernel(self) -> tuple[float, float]:
-        """Wall time [s] of a step outside the kernel and in it."""
+        """Return the wall time [s] of a step outside the kernel and in it."""
         batch_step = self.envs.batch.step
         spent = 0.0
 
@@ -91,7 +92,7 @@ class Legs:
 
 
 def work(pipe: Connection, count: int) -> None:
-    """Of a process: run whenever it is told to."""
+    """Run once per message, in a worker process."""
     legs = Legs(count)
     legs.run()
     pipe.send(None)
@@ -101,7 +102,7 @@ def work(pipe: Connection, count: int) -> None:
 
 
 class Processes:
-    """So many processes with their share of the legs."""
+    """Worker processes that share the legs equally."""
 
     def __init__(self, count: int) -> None:
         context = multiprocessing.get_context("spawn")
@@ -113,15 +114,17 @@ class Processes:
         self.wait()
 
     def end(self) -> None:
+        """End the processes."""
         for pipe in self.pipes:
             pipe.send(False)
 
     def wait(self) -> None:
+        """Wait until all have run."""
         for pipe in self.pipes:
             pipe.recv()
 
     def run(self) -> float:
-        """Wall time [s] from telling them until the last is done."""
+        """Return the wall time [s] from the message until the last is done."""
         begin = time.perf_counter()
         for pipe in self.pipes:
             pipe.send(True)
@@ -130,7 +133,7 @@ class Processes:
 
 
 def call_cost(calls: int) -> float:
-    """Time [s] of each call more at once of a kernel that does nothing."""
+    """Return the time [s] of each additional call to a thread, of a kernel that does nothing."""
 
     @numba.njit(nogil=True)
     def nothing(x):  # type: ignore[no-untyped-def]
@@ -146,7 +149,7 @@ def call_cost(calls: int) -> float:
 
 
 def gain(legs: int, threads: int, serial: float, group: float, call: float, neighbours: float) -> float:
-    """How many times as fast so many threads are by the page's model; `serial` is for `LEGS`."""
+    """Return the speed of `threads` threads over that of one by the page's model; `serial` is for `LEGS`."""
     groups = -(-legs // LANES)
 
     def seconds(p: int) -> float:
@@ -156,7 +159,7 @@ def gain(legs: int, threads: int, serial: float, group: float, call: float, neig
 
 
 def measure(rounds: int, threads: int) -> dict[str, Any]:
-    """Rates, ratios, and what the model takes."""
+    """Return rates, ratios, and the parameters of the model."""
     one = Legs(LEGS)
     several = Legs(LEGS, num_threads=threads)
     processes = Processes(threads)
@@ -188,7 +191,7 @@ def measure(rounds: int, threads: int) -> dict[str, Any]:
 
 
 def page(result: dict[str, Any]) -> str:
-    """The tables as Markdown."""
+    """Return the tables as Markdown."""
     rates = [[name, f"{each['median']:,.0f}", describe(each)] for name, each in result["rate"].items()]
     ratios = [
         [case, beside, describe(ratio), bar_text(bar, ratio) if bar else ""]

@@ -1,9 +1,9 @@
-"""How fast Stable-Baselines3's PPO and agents/ppo_flat.py train, and where the time goes.
+"""Speed of training of Stable-Baselines3's PPO and agents/ppo_flat.py, and its parts.
 
     python -m benchmarks.train_speed      writes train_speed.json and .md, where `benchmarks.speed` does
 
 Each round trains every case, in a new order, for one rollout and its updates, with the settings of
-agents/hyperparams. What comes of such trainings is `python -m agents.baselines --subset trainers`.
+agents/hyperparams. `python -m agents.baselines --subset trainers` has the results of such trainings.
 """
 
 from __future__ import annotations
@@ -49,7 +49,7 @@ of its step, with what Stable-Baselines3 asks of it; play is the policy and the 
 
 
 def model_of(algo: Algorithm, env_threads: int = 1, **params: Any) -> Any:
-    """A model of an algorithm with `params` instead of the file's, on its environments."""
+    """Return a model of an algorithm with `params` instead of the file's, on its environments."""
     settings = load_settings(FOLDER / f"{algo}.yml", ENV_ID) | params
     many = runs.make_vec_env(ENV_ID, settings["n_envs"], env_threads)
     model = make_model(Args(env_id=ENV_ID, algo=algo), settings, many)
@@ -58,7 +58,7 @@ def model_of(algo: Algorithm, env_threads: int = 1, **params: Any) -> Any:
 
 
 def train(model: Any, torch_threads: int = 1) -> float:
-    """Wall time [s] of a rollout and its updates."""
+    """Return the wall time [s] of a rollout and its updates."""
     torch.set_num_threads(torch_threads)
     begin = time.perf_counter()
     model.learn(model.n_steps * model.n_envs, reset_num_timesteps=False)
@@ -66,13 +66,13 @@ def train(model: Any, torch_threads: int = 1) -> float:
 
 
 class Clock:
-    """Adds up the time that functions take."""
+    """Sum of the time that functions take."""
 
     def __init__(self) -> None:
         self.seconds = 0.0
 
     def around(self, function: Callable[..., Any]) -> Callable[..., Any]:
-        """The same function, timed."""
+        """Return the same function, timed."""
 
         def call(*args: Any, **kwargs: Any) -> Any:
             begin = time.perf_counter()
@@ -84,13 +84,13 @@ class Clock:
         return call
 
     def take(self) -> float:
-        """What was added up since the last call."""
+        """Return the sum since the last call."""
         taken, self.seconds = self.seconds, 0.0
         return taken
 
 
 def where_time_goes(model: Any, rounds: int) -> dict[str, float]:
-    """Seconds of a rollout and its updates, by part; medians."""
+    """Return the seconds of a rollout and its updates, by part; medians."""
     env = model.env
     while hasattr(env, "venv"):
         env = env.venv
@@ -108,7 +108,7 @@ def where_time_goes(model: Any, rounds: int) -> dict[str, float]:
 
 
 def measure(rounds: int) -> dict[str, Any]:
-    """Rates, ratios to Stable-Baselines3 on one thread, and parts."""
+    """Return rates, ratios to Stable-Baselines3 on one thread, and parts."""
     threads = min(2, available())
     sb3 = model_of("ppo")
     flat = {n: model_of("ppo_flat", num_threads=n) for n in {1, threads}}
@@ -143,7 +143,7 @@ def measure(rounds: int) -> dict[str, Any]:
 
 
 def page(result: dict[str, Any]) -> str:
-    """The tables as Markdown."""
+    """Return the tables as Markdown."""
     rates = [
         [
             row["case"],

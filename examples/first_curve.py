@@ -20,7 +20,7 @@ model.save("first_curve.zip")
 
 
 def play(policy, episodes=20):
-    """Mean return of a policy, in episodes that start as it says."""
+    """Return the mean return of a policy, in episodes with the start that it prescribes."""
     env = gym.make(ENV_ID)
     total = 0.0
     for seed in range(1000, 1000 + episodes):

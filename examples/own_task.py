@@ -22,18 +22,19 @@ def friction(step, weight):
 
 
 def comfort(step, weight):
-    """An ordinary function of numbers with `if` and `math`, granted while the trunk hardly accelerates."""
+    """Reward a trunk that hardly accelerates: an ordinary function of numbers with `if` and `math`."""
     if step.failed:
         return 0.0
     return weight * math.exp(-abs(step.trunk.report.acceleration.imag) / 9.81)
 
 
 def vertical_acceleration(scene):
+    """Return the vertical acceleration of the trunk [m/s^2]."""
     return scene.trunk.report.acceleration.imag
 
 
 def turf(penetration, rate, inverse_approach_speed, ground):
-    """Grows stiffer with depth, and loses more energy on the way out than Eq. 14."""
+    """Return a normal force [N] that grows stiffer with depth and loses more on the way out than Eq. 14."""
     spring = ground.stiffness * root_power(penetration, 12) * (1.0 + penetration / 0.05)
     damping = ground.chi * where(rate < 0.0, 2.0 * rate, rate) * inverse_approach_speed
     return spring * maximum(1.0 + damping, 0.0)

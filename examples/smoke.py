@@ -1,4 +1,4 @@
-"""Every environment, alone and among many, in a minute or two: whether an installation works.
+"""Every environment, alone and among many, in a minute or two: a test of an installation.
 
 python examples/smoke.py
 """
