@@ -46,6 +46,7 @@ class Assembly:
             two = link_of[joint.j]
             if one == two:
                 continue  # the inside of a rigid link
+            # Seen from the other link the force has the other sign
             if (joint.point, two, one) in pins:
                 pins[joint.point, two, one].append((row, -1))
             else:
@@ -63,6 +64,7 @@ class Assembly:
         carrier = self.carrier
         return tuple(
             (point, one, two)
+            # A pin of the tree is one between a link and its carrier, whichever way round
             for point, one, two in self.pins
             if carrier[one] != (two, point) and carrier.get(two) != (one, point)
         )
@@ -216,6 +218,7 @@ class GroundForces:
         self, limb: int, point: int, t: float, position: complex, velocity: complex, commit: bool
     ) -> complex:
         kept = self.contacts[limb]
+        # Within a step an engine tries states that it may throw away: they must not latch
         contact = kept[point] if commit else kept.copy()[point]
         return complex(touch(contact, position, velocity, self._ground))
 

@@ -53,6 +53,7 @@ def checkout(commit: str) -> Path:
         with tarfile.open(fileobj=io.BytesIO(packed)) as files:
             safely: dict[str, Any] = {"filter": "data"} if hasattr(tarfile, "data_filter") else {}
             files.extractall(part := tree.with_suffix(".part"), **safely)  # Python 3.11.2 has no filters
+        # A checkout that was interrupted keeps its other name and is made again
         part.rename(tree)
     return tree
 
@@ -64,6 +65,7 @@ def run_cases(tree: Path, runs: int = RUNS) -> dict[str, float]:
     Raises:
         RuntimeError: the process took the package from elsewhere.
     """
+    # The package of this tree, whichever is installed
     settings = {"PYTHONPATH": str(tree), "HOOF_ENV_QUIET": "1"}
     command = [sys.executable, "-P", str(CASES), str(runs)]  # -P: with no module of this folder beside it
     done = subprocess.run(command, cwd=tree, env=os.environ | settings, stdout=subprocess.PIPE, check=True)
@@ -79,6 +81,7 @@ def compare(base: Path, now: Path, rounds: int) -> dict[str, list[float]]:
     trees = {"base": base, "now": now}
     order = np.random.default_rng(0)
     ratios: dict[str, list[float]] = {}
+    # By turns, so that what else the machine does slows both commits alike
     for k in range(rounds + 1):
         seconds = {name: run_cases(trees[name]) for name in order.permutation(list(trees))}
         for case, spent in seconds["now"].items() if k else ():
@@ -93,12 +96,12 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser = argparse.ArgumentParser(prog="python -m benchmarks.compare", description=__doc__.splitlines()[0])
     parser.add_argument("--base", required=True, help="commit to compare with")
     parser.add_argument("--rounds", type=int, default=11)
-    given = parser.parse_args(arguments)
+    args = parser.parse_args(arguments)
     try:
-        base = checkout(given.base)
+        base = checkout(args.base)
     except ValueError as error:
         parser.error(f"--base: {error}")
-    spreads = {case: spread(np.array(r)) for case, r in compare(base, ROOT, given.rounds).items()}
+    spreads = {case: spread(np.array(r)) for case, r in compare(base, ROOT, args.rounds).items()}
     slower = {case for case, s in spreads.items() if s["median"] < LOWEST}
     rows = [[case, describe(s), "slower" if case in slower else ""] for case, s in spreads.items()]
     print(markdown_table(["case", f"speed over that of {base.name}", f"below {LOWEST}"], rows))

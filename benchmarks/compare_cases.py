@@ -27,6 +27,7 @@ def advance(hips: tuple[float, ...], trunk: str, count: int, steps: int, calls: 
     same state."""
     leg = load_geometry("identified")
     walk = load_gait("walk", "identified")
+    # A fixed trunk hangs lower, or its hooves would hardly touch the ground
     low = 0.05 if trunk == "fixed" else 0.0
     body = Trunk(trunk, mass=200.0, pitch_inertia=150.0, height=leg.hip_height - low)
     limbs = [Limb(leg, hip=(x, 0.0), drive=Motor()) for x in hips]

@@ -57,16 +57,17 @@ def measure(rounds: int, steps: int) -> dict[str, Any]:
     cheetah = "HalfCheetah-v5, single"
     runs = {cheetah: step(gym.make("HalfCheetah-v5"), steps)}
     units = {cheetah: steps}
+    # Many at once take fewer steps, so that rounds are about as long
     for name in BARS:
-        one = f"{name}, single"
+        single = f"{name}, single"
         all_at_once = f"{name}, {BATCH} at once"
-        many = max(steps // 20, 5)
+        batch_steps = max(steps // 20, 5)
         env = gym.make(f"hoof_env/{name}-v0")
         envs = gym.make_vec(f"hoof_env/{name}-v0", num_envs=BATCH)
         envs.reset(seed=0)
         size = SMALL if name == "Horse" else 1.0
-        runs |= {one: step(env, steps, size), all_at_once: step_many(envs, BATCH, many, size)}
-        units |= {one: steps, all_at_once: many * BATCH}
+        runs |= {single: step(env, steps, size), all_at_once: step_many(envs, BATCH, batch_steps, size)}
+        units |= {single: steps, all_at_once: batch_steps * BATCH}
     if importlib.util.find_spec("envpool"):
         import envpool
 
@@ -84,16 +85,17 @@ def measure(rounds: int, steps: int) -> dict[str, Any]:
     best = max(pools, key=lambda name: float(np.median(rate[name])), default=cheetah)
     rows = []
     for name in rate:
+        # One is compared with one, many with the best pool
         is_single = name.endswith("single")
         bars = BARS.get(name.split(",")[0], ((), ()))
-        beside = cheetah if is_single else best
+        reference = cheetah if is_single else best
         rows.append(
             {
                 "case": name,
                 "bits": vector_bits() if name.startswith("Horse") else None,
                 "rate": spread(rate[name]),
-                "beside": beside,
-                "ratio": spread(rate[name] / rate[beside]),
+                "beside": reference,
+                "ratio": spread(rate[name] / rate[reference]),
                 "bars": list(bars[0] if is_single else bars[1]) or None,
             }
         )
@@ -124,11 +126,11 @@ def main() -> None:
     parser.add_argument("--rounds", type=int, default=25)
     parser.add_argument("--steps", type=int, default=2000, help="of a single environment in a round")
     parser.add_argument("--out", type=Path, default=RESULTS, help="folder for those of all vector widths")
-    given = parser.parse_args()
-    result = measure(given.rounds, given.steps)
+    args = parser.parse_args()
+    result = measure(args.rounds, args.steps)
     print(page(result))
     rows = [(row["case"], row["beside"], row["ratio"], (row["bars"] or [None])[0]) for row in result["rows"]]
-    write(given.out, "env_speed", result, page(result), rows)
+    write(args.out, "env_speed", result, page(result), rows)
 
 
 if __name__ == "__main__":

@@ -182,6 +182,7 @@ class ExudynLegs:
         ]
 
         def local(k: int, point: str) -> tuple[float, float]:
+            # The frame has its axes in the pose of the hip, bodies theirs at their centres of mass
             if k == FRAME:
                 return (sigma * geometry.pivot[0], geometry.pivot[1]) if point == "C" else (0.0, 0.0)
             out = complex(*(pose.point(point) - pose.centres[k])) * np.exp(-1j * pose.angles[k])
@@ -247,6 +248,7 @@ class ExudynLegs:
                 forceVector=np.zeros(9),
             )
         )
+        # A held swing needs no gear
         if not start.swings:
             return {"swing": self._hold(axes[0], axes[1])}
         crank_at = self._reference[-3 * len(BODIES) + 2] - self._reference[-3 * len(BODIES) - 1]
@@ -343,7 +345,7 @@ class ExudynLegs:
                 torque = self._servo(i, speed)
             else:
                 torque = -sigma * float(multiplier(leg["driver"])[0])
-            gaps = [abs(place(*one) - place(*two)) for one, two in leg["ends"]]
+            gaps = [abs(place(*end_of_one) - place(*end_of_two)) for end_of_one, end_of_two in leg["ends"]]
             pins = np.array([multiplier(joint) for joint in leg["joints"]])
             rows.append((theta, speed, torque, swing, pins, max(gaps)))
         thetas, speeds, torques, swings, forces, widest = map(np.array, zip(*rows, strict=True))

@@ -34,12 +34,12 @@ one."""
 
 def write(folder: Path, name: str, result: Mapping[str, Any], page: str, rows: Iterable[Row]) -> Path:
     """Write a run and its page for its vector width, and `keep` its rows; return the folder of the width."""
-    own = folder / f"{result['bits']}-bits"
-    with staged(own) as stage:
+    width_folder = folder / f"{result['bits']}-bits"
+    with staged(width_folder) as stage:
         (stage / f"{name}.json").write_text(json.dumps(result, indent=1) + "\n")
         (stage / f"{name}.md").write_text(page)
     keep(folder, result["machine"], result["bits"], rows)
-    return own
+    return width_folder
 
 
 def keep(folder: Path, machine: Mapping[str, str], bits: int, rows: Iterable[Row]) -> None:
@@ -52,18 +52,19 @@ def keep(folder: Path, machine: Mapping[str, str], bits: int, rows: Iterable[Row
         rows: of one run.
     """
     run = {"bits": str(bits)} | {name: machine[name] for name in RUN}
-    kept = read(folder)
-    for case, beside, ratio, required in rows:
+    history = read(folder)
+    for case, reference, ratio, required in rows:
+        # Cases without a bar are in the run's own page only
         if ratio is not None and required is not None:
             numbers = {"ratio": ratio["median"], "q1": ratio["q1"], "q3": ratio["q3"], "required": required}
             texts = {name: f"{value:.3g}" for name, value in numbers.items()}
-            kept.append({"case": case, "beside": beside} | texts | run)
+            history.append({"case": case, "beside": reference} | texts | run)
     with staged(folder) as stage:
         with (stage / "speed.csv").open("w", newline="") as file:
             writer = csv.DictWriter(file, COLUMNS, lineterminator="\n")
             writer.writeheader()
-            writer.writerows(kept)
-        (stage / "speed.md").write_text(page(kept, folder))
+            writer.writerows(history)
+        (stage / "speed.md").write_text(page(history, folder))
 
 
 def read(folder: Path) -> list[dict[str, str]]:

@@ -12,6 +12,7 @@ from __future__ import annotations
 
 import time
 
+# Before everything else: imports are timed, too
 BEGAN = time.perf_counter()
 
 import argparse  # noqa: E402
@@ -78,12 +79,12 @@ class Timed(BaseCallback):
         """Score the policy if a score is due."""
         if self.num_timesteps < self._due:
             return
-        here = time.perf_counter()
+        paused = time.perf_counter()
         episodes = play_rows(self.envs, self.model, STARTS)
-        value = float(np.mean([one["return"] for one in episodes]))
-        self.curve.append((here - self._began - self._stopped, self.num_timesteps, value))
+        value = float(np.mean([episode["return"] for episode in episodes]))
+        self.curve.append((paused - self._began - self._stopped, self.num_timesteps, value))
         self._due = self.num_timesteps + self.steps_between
-        self._stopped += time.perf_counter() - here
+        self._stopped += time.perf_counter() - paused
 
     def _on_step(self) -> bool:
         seconds = time.perf_counter() - self._began - self._stopped
@@ -112,6 +113,7 @@ def learn_flat(seed: int, envs: Any, threads: int, steps: int = STEPS) -> Curve:
             return True
 
     model.learn(steps, callback=[timed, Sparser()])
+    # The last policy is scored, due or not
     timed._due = 0
     timed.score()
     return timed.curve
@@ -148,7 +150,8 @@ def main() -> None:
     with runs.make_env(ENV_ID) as env:
         runs.warm_up(env)
         gait = find_policy("open-loop", env, ENV_ID)
-        level = float(np.mean([one["return"] for one in play_rows(envs, gait, STARTS)]))
+        level = float(np.mean([episode["return"] for episode in play_rows(envs, gait, STARTS)]))
+    # Outside of the clock of all trainings
     learn_flat(0, envs, args.threads, 4096)  # loads the trainer's kernels
     loading = time.perf_counter() - begin
     results: dict[str, list[Curve]] = {"ppo_flat": []}
@@ -178,8 +181,8 @@ def main() -> None:
     head = ("learner", "seeds", "seconds to the best open loop", "seconds to within 5 %", "final return")
     text = "\n\n".join([intro, markdown_table(head, rows), markdown_table(("what", ""), [*about.items()])])
     bits = vector_bits()
-    found = {"machine": about, "bits": bits, "open_loop": level, "curves": results}
-    write(args.out, "learn_seconds", found, text + "\n", [])
+    result = {"machine": about, "bits": bits, "open_loop": level, "curves": results}
+    write(args.out, "learn_seconds", result, text + "\n", [])
     print(text)
 
 

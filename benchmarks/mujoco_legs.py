@@ -171,6 +171,7 @@ def build_model(
   <actuator>{motors}</actuator>
 </mujoco>""")
     if not contact:
+        # Softness of the constraints scales with these weights; see the module's docstring
         model.body_invweight0[:] *= 1e-4
         model.dof_invweight0[:] *= 1e-4
     return model
@@ -213,6 +214,7 @@ class MujocoLegs:
             for pose, limb in zip(poses, limbs, strict=True)
         ]
         for i, pose in enumerate(poses):
+            # MuJoCo's joints turn relative to the carrier
             spin = {"frame": 0.0}
             for link, parent, _ in assembly.tree:
                 spin[link] = pose.angular_velocities[assembly.links[link][0]]
@@ -293,6 +295,7 @@ class MujocoLegs:
                 at = complex(*self.data.xpos[hoof][:2]) + lever
                 force = self.outside(i, point, self.data.time, at, velocity + 1j * spin * lever, commit)
                 total += force
+                # MuJoCo applies forces at the centre of mass
                 moment += ((at - centre).conjugate() * force).imag
             self.data.xfrc_applied[hoof, [0, 1, 5]] = total.real, total.imag, moment
 
@@ -318,6 +321,7 @@ class MujocoLegs:
     @property
     def crank_torque(self) -> NDArray[np.float64]:
         """Torques of the drives [N m], along theta."""
+        # A flywheel keeps its speed: what slows it is the torque of the drive
         torque = -FLYWHEEL * self.data.qacc[self._cranks]
         torque[self._motors] = self.data.actuator_force
         return torque
@@ -350,6 +354,8 @@ class MujocoLegs:
         ties = ties.reshape(len(self.limbs), len(loops), 3)[..., :2]
         for i, bodies in enumerate(self._bodies):
             for k, (point, one, two) in enumerate(pins):
+                # Loops are constraints, all other pins joints between bodies, whose force is that on the
+                # child
                 if (point, one, two) in loops:
                     forces[i, k] = ties[i, loops.index((point, one, two))]
                 elif carrier[one] == (two, point):

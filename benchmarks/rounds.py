@@ -19,6 +19,7 @@ def interleave(runs: Mapping[str, Callable[[], float]], rounds: int, seed: int =
     seconds = {name: np.empty(rounds) for name in names}
     for run in runs.values():
         run()
+    # No collection in the midst of a round
     gc.collect()
     gc.disable()
     try:

@@ -58,7 +58,7 @@ def scenes(preset: str) -> dict[str, Scene]:
     geometry = load_geometry(preset)
     swing = load_gait("walk", preset).swing_offset
     high = geometry.hip_height
-    one = (Limb(geometry, drive=Motor()),)
+    one_limb = (Limb(geometry, drive=Motor()),)
     hips = ((0.6, 0.0), (0.6, 0.0), (-0.6, 0.0), (-0.6, 0.0))
     four = tuple(Limb(geometry, hip=hip, drive=Motor()) for hip in hips)
     trot = tuple(0.3 + x for x in (0.0, np.pi, np.pi, 0.0))
@@ -66,8 +66,8 @@ def scenes(preset: str) -> dict[str, Scene]:
     return {
         scene.name: scene
         for scene in (
-            Scene("leg", one, Trunk(kind="fixed", height=high - 0.05), (0.3,), swing, 1.0),
-            Scene("suspended leg", one, Trunk(kind="suspended", height=high), (0.3,), swing, 0.1),
+            Scene("leg", one_limb, Trunk(kind="fixed", height=high - 0.05), (0.3,), swing, 1.0),
+            Scene("suspended leg", one_limb, Trunk(kind="suspended", height=high), (0.3,), swing, 0.1),
             Scene("horse", four, big, trot, swing, 0.1),
         )
     }
@@ -83,10 +83,10 @@ def engine(scene: Scene, preset: str, num_envs: int = 1, **options: Any) -> Trun
     """Return the scene in this project's engine, with crank angles all round the circle, in random order."""
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", StepWarning)  # the cost of a step is asked, not its error
-        made = TrunkEngine(
+        trunk_engine = TrunkEngine(
             scene.limbs, scene.trunk, load_ground(preset), sim_dt=DT, substeps=1, num_envs=num_envs, **options
         )
     turns = 2 * np.pi / num_envs * np.random.default_rng(0).permutation(num_envs)
     gait = GaitParameters(SPEED, scene.swing, 0.0, 0.0)
-    made.reset(gait, np.array(scene.cranks)[:, None] + turns)
-    return made
+    trunk_engine.reset(gait, np.array(scene.cranks)[:, None] + turns)
+    return trunk_engine

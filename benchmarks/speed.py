@@ -146,6 +146,7 @@ def own_cases(quick: bool, clock: Clock) -> list[Case]:
 def run_of(made: TrunkEngine, steps: int, clock: Clock) -> Callable[[], float]:
     """Return a function that times `steps` steps of an engine from its present state, with compiled
     kernels."""
+    # Compiles outside of the clock
     made.advance(steps=1, account=False)
     before = partial(made.set_state, made.get_state())
     return partial(timed, clock, before, partial(made.advance, steps=steps, account=False))
@@ -177,6 +178,7 @@ def mujoco_cases(quick: bool, clock: Clock) -> list[Case]:
             runs = {
                 kind: run_of(scenes(PRESET)[name], assembly, k) for k, kind in enumerate(("dense", "sparse"))
             }
+            # The peer runs with the options that serve it best
             fastest = {kind: min(run() for _ in range(2 if quick else 7)) for kind, run in runs.items()}
             best = min(runs, key=lambda kind: fastest[kind])
             cases.append(Case(f"{name}, MuJoCo {assembly}", name, runs[best], steps, f"{best} Jacobian"))
@@ -249,6 +251,7 @@ def start() -> dict[str, float]:
     with tempfile.TemporaryDirectory() as folder:
         load = "from hoof_env.envs.compile_ahead import compile_kernels"
         cold = {"NUMBA_CACHE_DIR": folder, "HOOF_ENV_QUIET": "1"}
+        # An empty cache, so that everything is compiled
         compiled = seconds_of("compile_kernels(lambda line: None)", load, **cold)
     imported = float(np.median([seconds_of("import hoof_env") for _ in range(5)]))
     return dict(zip(START_BARS, (imported, compiled), strict=True))
@@ -333,13 +336,13 @@ def main(arguments: list[str] | None = None) -> None:
     parser.add_argument("--rounds", type=int, help=f"how many; {ROUNDS} if not given")
     parser.add_argument("--clock", choices=CLOCKS, default="wall", help="processor: on a busy machine")
     parser.add_argument("--quick", action="store_true", help="a smoke test: small numbers that mean nothing")
-    given = parser.parse_args(arguments)
-    rounds = given.rounds or (2 if given.quick else ROUNDS)
-    result = measure(given.quick, rounds, given.clock)
+    args = parser.parse_args(arguments)
+    rounds = args.rounds or (2 if args.quick else ROUNDS)
+    result = measure(args.quick, rounds, args.clock)
     rows = [(row["name"], "MuJoCo ALL", row["ratios"].get("ALL"), row["required"]) for row in result["cases"]]
-    own = write(given.out, "speed", result, page(result), rows)
+    folder = write(args.out, "speed", result, page(result), rows)
     print(speed_table(result["cases"]))
-    print(f"written to {own}")
+    print(f"written to {folder}")
 
 
 if __name__ == "__main__":

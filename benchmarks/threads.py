@@ -86,6 +86,7 @@ class Legs:
             spent += time.perf_counter() - begin
             return ended
 
+        # Timed from outside: the package has no clock in it
         with patch.object(self.envs.batch, "step", step):
             whole = self.run()
         return (whole - spent) / STEPS, spent / STEPS
@@ -105,6 +106,7 @@ class Processes:
     """Worker processes that share the legs equally."""
 
     def __init__(self, count: int) -> None:
+        # A forked process would inherit numba's threads
         context = multiprocessing.get_context("spawn")
         self.pipes = []
         for _ in range(count):
@@ -160,15 +162,16 @@ def gain(legs: int, threads: int, serial: float, group: float, call: float, neig
 
 def measure(rounds: int, threads: int) -> dict[str, Any]:
     """Return rates, ratios, and the parameters of the model."""
-    one = Legs(LEGS)
+    single = Legs(LEGS)
     several = Legs(LEGS, num_threads=threads)
     processes = Processes(threads)
     shared = f"{threads} threads"
     apart = f"{threads} processes"
-    runs: dict[str, Callable[[], float]] = {"1 thread": one.run, shared: several.run, apart: processes.run}
+    runs: dict[str, Callable[[], float]] = {"1 thread": single.run, shared: several.run, apart: processes.run}
     seconds = interleave(runs, rounds)
     processes.end()
-    parts = np.array([one.serial_and_kernel() for _ in range(rounds)])
+    parts = np.array([single.serial_and_kernel() for _ in range(rounds)])
+    # Medians of each, as the page says
     serial, kernel = np.median(parts, 0).tolist()
     ratios = [
         (shared, "1 thread", seconds["1 thread"] / seconds[shared], BESIDE_ONE),
@@ -181,8 +184,8 @@ def measure(rounds: int, threads: int) -> dict[str, Any]:
         "rounds": rounds,
         "legs": LEGS,
         "steps": STEPS,
-        "rate": {name: spread(LEGS * STEPS / each) for name, each in seconds.items()},
-        "ratios": [(case, beside, spread(ratio), bar) for case, beside, ratio, bar in ratios],
+        "rate": {name: spread(LEGS * STEPS / values) for name, values in seconds.items()},
+        "ratios": [(case, reference, spread(ratio), bar) for case, reference, ratio, bar in ratios],
         "serial": serial,
         "group": kernel * LANES / LEGS,
         "call": call_cost(threads),
@@ -192,10 +195,10 @@ def measure(rounds: int, threads: int) -> dict[str, Any]:
 
 def page(result: dict[str, Any]) -> str:
     """Return the tables as Markdown."""
-    rates = [[name, f"{each['median']:,.0f}", describe(each)] for name, each in result["rate"].items()]
+    rates = [[name, f"{rate['median']:,.0f}", describe(rate)] for name, rate in result["rate"].items()]
     ratios = [
-        [case, beside, describe(ratio), bar_text(bar, ratio) if bar else ""]
-        for case, beside, ratio, bar in result["ratios"]
+        [case, reference, describe(ratio), bar_text(bar, ratio) if bar else ""]
+        for case, reference, ratio, bar in result["ratios"]
     ]
     model = [result[key] for key in ("serial", "group", "call", "neighbours")]
     more = [[str(p), *(f"{gain(legs, p, *model):.1f}" for legs in MODELLED)] for p in CORES]
@@ -222,12 +225,12 @@ def main() -> None:
     parser.add_argument("--rounds", type=int, default=40)
     parser.add_argument("--threads", type=int, default=2, help="and processes")
     parser.add_argument("--out", type=Path, default=RESULTS, help="folder for those of all vector widths")
-    given = parser.parse_args()
-    if not 2 <= given.threads <= available():
-        parser.error(f"--threads: expected 2 to {available()}, the processors here, got {given.threads}")
-    result = measure(given.rounds, given.threads)
+    args = parser.parse_args()
+    if not 2 <= args.threads <= available():
+        parser.error(f"--threads: expected 2 to {available()}, the processors here, got {args.threads}")
+    result = measure(args.rounds, args.threads)
     print(page(result))
-    write(given.out, "threads", result, page(result), result["ratios"])
+    write(args.out, "threads", result, page(result), result["ratios"])
 
 
 if __name__ == "__main__":

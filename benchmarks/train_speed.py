@@ -92,10 +92,12 @@ class Clock:
 def where_time_goes(model: Any, rounds: int) -> dict[str, float]:
     """Return the seconds of a rollout and its updates, by part; medians."""
     env = model.env
+    # Down to the environments themselves, below the wrappers
     while hasattr(env, "venv"):
         env = env.venv
     timed = [(env.envs.batch, "step"), (model.env, "step_async"), (model.env, "step_wait"), (model, "train")]
     clocks = [Clock() for _ in timed]
+    # Clocks stand around methods of objects, not of classes: other models are not timed
     for clock, (owner, name) in zip(clocks, timed, strict=True):
         setattr(owner, name, clock.around(getattr(owner, name)))
     rows = []
@@ -132,11 +134,11 @@ def measure(rounds: int) -> dict[str, Any]:
         "rows": [
             {
                 "case": name,
-                "rate": spread(units / each),
-                "ratio": spread(seconds[SB3] / each),
+                "rate": spread(units / values),
+                "ratio": spread(seconds[SB3] / values),
                 "bar": BAR if name.startswith("PPO_FLAT") else None,
             }
-            for name, each in seconds.items()
+            for name, values in seconds.items()
         ],
         "parts": {name: {key: x / units for key, x in part.items()} for name, part in parts.items()},
     }
@@ -171,11 +173,11 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--rounds", type=int, default=15)
     parser.add_argument("--out", type=Path, default=RESULTS, help="folder for those of all vector widths")
-    given = parser.parse_args()
-    result = measure(given.rounds)
+    args = parser.parse_args()
+    result = measure(args.rounds)
     print(page(result))
     rows = [(row["case"], SB3, row["ratio"], row["bar"]) for row in result["rows"]]
-    write(given.out, "train_speed", result, page(result), rows)
+    write(args.out, "train_speed", result, page(result), rows)
 
 
 if __name__ == "__main__":
