@@ -164,9 +164,9 @@ def row_cells(row: Row, known: Mapping[str, Scored]) -> list[str]:
     """Return the cells of an agent in the table of returns; `known` are the policies without learning."""
     count = len(row.results)
     returns = np.array([result.figures["return"] for result in row.results])
-    steps, wall, cpu = (
-        np.median([result.final[key] for result in row.results]) for key in ("steps", "wall_s", "cpu_s")
-    )
+
+    def median(key: str) -> str:
+        return f"{np.median([result.final[key] for result in row.results]):,.0f}"
 
     def above(name: str) -> str:
         if name not in known:
@@ -175,9 +175,9 @@ def row_cells(row: Row, known: Mapping[str, Scored]) -> list[str]:
 
     return [
         str(count) if count == row.entry.seeds else f"{count} of {row.entry.seeds}",
-        f"{steps:,.0f}",
-        f"{wall:,.0f}",
-        f"{cpu:,.0f}",
+        median("steps"),
+        median("wall_s"),
+        median("cpu_s"),
         row.scored.intervals["return"].text(),
         f"{returns.mean():.1f}",
         f"{returns.min():.1f} to {returns.max():.1f}",
@@ -188,11 +188,10 @@ def row_cells(row: Row, known: Mapping[str, Scored]) -> list[str]:
 
 def figures_table(rows: Sequence[Row], gaits: References) -> str:
     """Return the table of gait figures: policies without learning and agents, by id."""
-    lines = [
-        [f"`{env_id}`", policy.name, *cells(policy)]
-        for env_id, known in gaits.items()
-        for policy in (*known.values(), *(row.scored for row in of_id(rows, env_id)))
-    ]
+    lines = []
+    for env_id, known in gaits.items():
+        agents = [row.scored for row in of_id(rows, env_id)]
+        lines += [[f"`{env_id}`", policy.name, *cells(policy)] for policy in (*known.values(), *agents)]
     return markdown_table(["id", "policy", *(title for title, *_ in TABLE.values())], lines)
 
 
@@ -293,12 +292,12 @@ def following_table(settled: Mapping[str, Mapping[int, Sequence[float]]]) -> str
 
 def write_settled(settled: Mapping[str, Mapping[int, Sequence[float]]], path: Path) -> None:
     """Write a line for each agent and command."""
-    lines = [
-        {"policy": title, "seed": seed, "command_m_s": command, "settled_m_s": round(speed, 4)}
-        for title, speeds in settled.items()
-        for seed, settled_at in speeds.items()
-        for command, speed in zip(following_commands(), settled_at, strict=True)
-    ]
+    lines = []
+    for title, speeds_of in settled.items():
+        for seed, speeds in speeds_of.items():
+            for command, speed in zip(following_commands(), speeds, strict=True):
+                figures = {"command_m_s": command, "settled_m_s": round(speed, 4)}
+                lines.append({"policy": title, "seed": seed} | figures)
     runs.write_csv(path, ("policy", "seed", "command_m_s", "settled_m_s"), lines)
 
 
@@ -345,7 +344,10 @@ def over_time(row: Row, key: str) -> tuple[Floats, Floats]:
     # From the second score on: the first is of the untrained policy, at 0, which no logarithm shows
     first = min(max(curve[1][key] for curve in curves), last)
     x = np.geomspace(first, last, POINTS)
-    returns = [np.interp(x, [p[key] for p in curve], [p["return"] for p in curve]) for curve in curves]
+    returns = []
+    for curve in curves:
+        places = [point[key] for point in curve]
+        returns.append(np.interp(x, places, [point["return"] for point in curve]))
     return x, iqm(returns)
 
 

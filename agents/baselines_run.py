@@ -301,9 +301,10 @@ def read_result(entry: Entry, folder: Path) -> Result:
         # A table must not mix results of different settings
         keys = sorted(key for key in {**used, **expected} if used.get(key) != expected.get(key))
         if keys:
-            asked, used_here = ({key: settings.get(key) for key in keys} for settings in (expected, used))
+            wanted = {key: expected.get(key) for key in keys}
+            got = {key: used.get(key) for key in keys}
             raise DataFileError(
-                f"{folder}: expected a training with {asked}, got {used_here}; remove what is outdated"
+                f"{folder}: expected a training with {wanted}, got {got}; remove what is outdated"
             )
     return result
 
@@ -331,9 +332,10 @@ def seconds_to(level: float, result: Result) -> float:
 def versions_of(rows: Sequence[Row]) -> dict[str, str]:
     """Return the versions that the trainings were made with; several of one package are listed together."""
     versions: dict[str, set[str]] = {}
-    for result in (result for row in rows for result in row.results):
-        for name, value in runs.read_record(result.folder)["versions"].items():
-            versions.setdefault(name, set()).add(value)
+    for row in rows:
+        for result in row.results:
+            for name, value in runs.read_record(result.folder)["versions"].items():
+                versions.setdefault(name, set()).add(value)
     return {name: ", ".join(sorted(values)) for name, values in versions.items()}
 
 

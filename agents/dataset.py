@@ -202,9 +202,8 @@ def policy_files(name: str) -> list[Path]:
         return []
     model = find_saved(path).path
     neighbours = () if model.suffix == ".onnx" else (ABOUT, WEIGHTS, STATISTICS)
-    return [
-        file for file in (model, *(model.with_name(neighbour) for neighbour in neighbours)) if file.is_file()
-    ]
+    files = [model, *(model.with_name(neighbour) for neighbour in neighbours)]
+    return [file for file in files if file.is_file()]
 
 
 def plain_start(policy: Any) -> dict[str, Any]:

@@ -167,13 +167,16 @@ def write_table(results: Any, folder: str, varied: list[str]) -> int:
         run = result.checkpoint.path if result.checkpoint else ""
         why = reason(str(result.error)) if result.error else report.get("failed")
         is_done = trial.status == "TERMINATED" and trial.trial_id not in Progress.going
-        state = "failed" if why else "done" if is_done else "unfinished"
-        reasons += [f"  {run or 'a trial'}: {why}"] if why else []
+        state = "done" if is_done else "unfinished"
+        if why:
+            state = "failed"
+            reasons.append(f"  {run or 'a trial'}: {why}")
         row = {key: config.get(key) for key in varied} | {key: report.get(key) for key in FIGURES}
         rows.append(row | {"state": state, "run": str(run).removeprefix(f"{folder}/")})
     if "://" not in folder and rows:
         runs.write_csv(Path(folder, "trials.csv"), list(rows[0]), rows)
-    counts = {state: sum(row["state"] == state for row in rows) for state in ("done", "failed", "unfinished")}
+    states = [row["state"] for row in rows]
+    counts = {state: states.count(state) for state in ("done", "failed", "unfinished")}
     print(", ".join(f"{count} {state}" for state, count in counts.items() if count) + f": {folder}")
     print("\n".join(reasons), end="\n" if reasons else "")
     if counts["unfinished"]:

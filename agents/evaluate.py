@@ -206,19 +206,16 @@ def to_json(scores: Sequence[Score], **about: Any) -> dict[str, Any]:
     def finite(value: float) -> float | None:
         return value if math.isfinite(value) else None
 
-    return {
-        **about,
-        "policies": {
-            score.policy: {
-                "mean": {key: finite(value.mean) for key, value in score.estimates.items()},
-                "interval95": {key: [finite(v.low), finite(v.high)] for key, v in score.estimates.items()},
-                "episodes": [
-                    {key: finite(value) for key, value in episode.items()} for episode in score.episodes
-                ],
-            }
-            for score in scores
-        },
-    }
+    policies = {}
+    for score in scores:
+        intervals = score.estimates.items()
+        episodes = score.episodes
+        policies[score.policy] = {
+            "mean": {key: finite(interval.mean) for key, interval in intervals},
+            "interval95": {key: [finite(each.low), finite(each.high)] for key, each in intervals},
+            "episodes": [{key: finite(value) for key, value in episode.items()} for episode in episodes],
+        }
+    return {**about, "policies": policies}
 
 
 def main(argv: list[str] | None = None) -> None:

@@ -315,13 +315,13 @@ class Finder:
         """Find a gait from nothing, and gaits of higher and lower speeds from there."""
         args = self.args
         speed = speed_of(froude)
-        begins = [
-            self.keep(
+        begins = []
+        for seed in range(args.restarts):
+            steps = self.keep(
                 f"{name} {seed}",
                 lambda tick, seed=seed: [Search(seed, lag=lag).run(speed, args.generations, tick)],
-            )[0]
-            for seed in range(args.restarts)
-        ]
+            )
+            begins.append(steps[0])
         # Restarts end in different gaits: the ramps go on from the best one
         best = np.array(max(begins, key=lambda one: float(one["return"]))["gait"])
         for way, ratio, last in (("faster", STEP, 8.0), ("slower", 1 / STEP, speed_of(LOWEST) / STEP)):

@@ -138,9 +138,10 @@ def judged(
     # A reason comes before a missing figure: a gait that falls has no figures
     if not known:
         verdict = why or "not measured"
+    elif bars and why:
+        verdict = f"does not count: {why}"
     elif bars:
-        met = any(low <= ours <= high for low, high in bars)
-        verdict = f"does not count: {why}" if why else "met" if met else "missed"
+        verdict = "met" if any(low <= ours <= high for low, high in bars) else "missed"
     else:
         verdict = f"off by {ours / judge['horse'] - 1:+.0%}" + (f", does not count: {why}" if why else "")
     return (

@@ -252,7 +252,8 @@ def optimise(args: Args) -> dict[str, Any]:
     restarts = earlier(path, about)
     check_folder(path.parent)
     objective = Objective(args.env_id, about["env_kwargs"], args.family)
-    left = [seed for seed in range(args.restarts) if seed not in [restart["seed"] for restart in restarts]]
+    done = {restart["seed"] for restart in restarts}
+    left = [seed for seed in range(args.restarts) if seed not in done]
     with tqdm(total=episodes * len(left), unit=" episodes", leave=False, disable=None) as bar:
         for k, seed in enumerate(left):
             bar.set_description(f"{path.stem}, search {seed}")

@@ -310,11 +310,11 @@ def main(argv: list[str] | None = None) -> None:
     scored = score(args)
     print(lines(scored))
     if args.csv:
-        rows = [
-            {"policy": name, "episode": seed, **{key: figures[key] for key in PUBLISHED if key in figures}}
-            for name, episodes in scored
-            for seed, figures in zip(FINAL_SEEDS, episodes, strict=True)
-        ]
+        rows: list[dict[str, Any]] = []
+        for name, episodes in scored:
+            for seed, figures in zip(FINAL_SEEDS, episodes, strict=True):
+                published = {key: figures[key] for key in PUBLISHED if key in figures}
+                rows.append({"policy": name, "episode": seed, **published})
         runs.write_csv(args.csv, ("policy", "episode", *PUBLISHED), rows)
         print(f"written: {args.csv}")
 

@@ -142,7 +142,8 @@ def draw(rows: Sequence[dict[str, Any]], references: dict[str, dict[str, float]]
 
     colours = {"ppo": BLUE, "sac": ORANGE, "td3": GREEN, "tqc": PURPLE}
     styles = dict(zip(ANCHORS, (":", "--", "-"), strict=True))
-    ids = [env_id for env_id in (LEG, *OTHERS) if any(row["env_id"] == env_id for row in rows)]
+    trained_on = {row["env_id"] for row in rows}
+    ids = [env_id for env_id in (LEG, *OTHERS) if env_id in trained_on]
     with matplotlib.rc_context(STYLE):
         across = min(3, len(ids))
         down = -(-len(ids) // across)
