@@ -11,7 +11,7 @@ A horse's figure at a Froude number is compared with that of the gait at the nea
 if the policy falls in a tenth of the episodes at most and keeps the commanded speed to 15 %, the hooves slip
 less than 0.10 m a stance and land 0.95 to 1.05 times a turn of their crank, and the Froude number of the
 speed that was reached is within 0.1 of the horse's. The last does not hold for the peaks of a trot: they are
-compared with the trot-like gait nearest Froude number 1, but not below 0.35, a speed at which horses walk.
+compared with the trot-like gait nearest Froude number 1, but not below 0.35: slower horses walk.
 
 Of several policies, as the seeds of an algorithm, there is a table of all, too: means with 95 % intervals.
 """
