@@ -169,7 +169,8 @@ def search(
     tick: Callable[[int, float], Any],
     start: Sequence[float] | None = None,
 ) -> tuple[Floats, float, bool]:
-    """Search once by CMA-ES, from the best point of a random screening, or from the constant gait `start`.
+    """Search once by CMA-ES, from the best point of a random screening or from the constant gait `start`;
+    return the best point, its cost over starts that the search had not met, and True if Ctrl-C ended it.
 
     Candidates of a generation meet the same starts, those of the next and other searches others. At the end
     the mean of the distribution, the luckiest candidate and the best of the last generation meet more.
@@ -180,9 +181,6 @@ def search(
         episodes: episodes that it takes, about.
         tick: called with a number of episodes and the lowest cost in them.
         start: constant gait, shape (4,).
-
-    Returns:
-        The best point, its cost over starts that the search had not met, and True if Ctrl-C ended it.
 
     Raises:
         KeyboardInterrupt: Ctrl-C came before anything was found.

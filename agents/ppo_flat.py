@@ -152,7 +152,6 @@ class FlatPPO(OnPolicyAlgorithm):
         num_threads: int | None = None,
         _init_setup_model: bool = True,
     ) -> None:
-        # The default of Stable-Baselines3's policy, too; other activations have no kernel
         kwargs = {"activation_fn": nn.Tanh, **(policy_kwargs or {})}
         if kwargs["activation_fn"] is not nn.Tanh or str(device) not in ("cpu", "auto"):
             raise ParameterError(
