@@ -169,8 +169,8 @@ def search(
     tick: Callable[[int, float], Any],
     start: Sequence[float] | None = None,
 ) -> tuple[Floats, float, bool]:
-    """Search once by CMA-ES, from the best point of a random screening or from the constant gait `start`;
-    return the best point, its cost over starts that the search had not met, and True if Ctrl-C ended it.
+    """Search by CMA-ES from the best of random points, or from the constant gait `start`; return the best point,
+    its cost over starts that the search had not met, and True if Ctrl-C ended it.
 
     Candidates of a generation meet the same starts, those of the next and other searches others. At the end
     the mean of the distribution, the luckiest candidate and the best of the last generation meet more.
