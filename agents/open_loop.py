@@ -169,8 +169,8 @@ def search(
     tick: Callable[[int, float], Any],
     start: Sequence[float] | None = None,
 ) -> tuple[Floats, float, bool]:
-    """Search by CMA-ES from the best of random points, or from the constant gait `start`; return the best point,
-    its cost over starts that the search had not met, and True if Ctrl-C ended it.
+    """Search by CMA-ES from the best of random points, or from the constant gait `start`; return the best
+    point, its cost over starts that the search had not met, and True if Ctrl-C ended it.
 
     Candidates of a generation meet the same starts, those of the next and other searches others. At the end
     the mean of the distribution, the luckiest candidate and the best of the last generation meet more.
@@ -189,7 +189,6 @@ def search(
     fresh = SEARCH_SEED * (seed + 1)
 
     def costs(x: Any, starts: int) -> list[float]:
-        """Return the costs of candidates on starts that no other call meets."""
         nonlocal fresh
         values = objective.costs(np.array(x), range(fresh, fresh + starts))
         fresh += starts
