@@ -16,8 +16,7 @@ about = policy.get_modelmeta().custom_metadata_map
 env = gymnasium.make(about["env_id"], **json.loads(about["env_kwargs"]))
 for seed in range(1000, 1003):
     observation, _ = env.reset(seed=seed)
-    total = 0.0
-    done = False
+    total, done = 0.0, False
     while not done:
         (actions,) = policy.run(["action"], {"observation": observation[np.newaxis]})
         observation, reward, terminated, truncated, _ = env.step(actions[0])
