@@ -50,8 +50,8 @@ SPEED = "hoof_env/HorseLegSpeed-v0"
 COMMANDS = 5  # speeds between the lowest and the highest command
 SETTLED = 4.0  # seconds after which the speed is that of the command
 
-POINTS = 40  # of a curve
-SOON = 0.4  # of the first row's time to the open-loop gait's return
+POINTS = 40  # points of a drawn curve
+SOON = 0.4  # bar: share of the first row's time to the open-loop gait's return
 References = Mapping[str, Mapping[str, Scored]]  # policies without learning, by id and name
 
 

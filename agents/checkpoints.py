@@ -33,7 +33,7 @@ from hoof_env.errors import DataFileError, OutputError
 KEPT = 2
 REPLAY = "replay.pkl"
 STATE = "state.pkl"
-COUNTED = ("episode_returns", "episode_lengths", "episode_count")  # by a `VecMonitor`
+COUNTED = ("episode_returns", "episode_lengths", "episode_count")  # counters of a `VecMonitor`
 EXPLORATION = ("exploration_mat", "exploration_matrices")
 """Attributes with the exploration noise that gSDE drew for a rollout, before its first callback."""
 UNFINISHED = ".unfinished-"
@@ -145,7 +145,7 @@ class Resumed:
             envs: Any = monitor
             if (checkpoint / runs.STATISTICS).exists():
                 envs = VecNormalize.load(str(checkpoint / runs.STATISTICS), monitor)
-            with warnings.catch_warnings():  # of n_steps without its buffer, which is loaded next
+            with warnings.catch_warnings():  # it warns of n_steps without its buffer, which is loaded next
                 warnings.filterwarnings("ignore", "`n_steps=", UserWarning)
                 self.model = algorithm.load(
                     checkpoint / runs.MODEL, env=envs, device=device, force_reset=False

@@ -41,9 +41,9 @@ from hoof_env.gait import GaitParameters
 from hoof_env.saved_policy import ABOUT, STATISTICS, WEIGHTS, describe_actions, find_saved
 
 MANIFEST = "manifest.json"
-PROJECT = Path(__file__).parents[1] / "pyproject.toml"  # of the checkout, which need not be installed
-ID = re.compile(r"(?:[-\w][-\w/]*[-\w]/)?[-\w]+-v\d+")  # as Minari takes it, but always with a version
-ROOT = "MINARI_DATASETS_PATH"  # where Minari keeps datasets
+PROJECT = Path(__file__).parents[1] / "pyproject.toml"  # file of the checkout, which need not be installed
+ID = re.compile(r"(?:[-\w][-\w/]*[-\w]/)?[-\w]+-v\d+")  # Minari's form of an id, but always with a version
+ROOT = "MINARI_DATASETS_PATH"  # variable with Minari's folder of datasets
 ACTIONS = "actions"  # the key of what actions are
 
 

@@ -36,7 +36,7 @@ FIXED_ID = "hoof_env/HorseLegFixed-v0"
 TRAINED = "trained agent"
 OPEN_LOOP = "open-loop"
 SCRIPTED = ("walk", "run", OPEN_LOOP, "idle", "random", "bang-bang")
-FIRST_SEED = 1000  # of the scored episodes; training starts its own from another seed
+FIRST_SEED = 1000  # first of the scored episodes; training starts its own from another seed
 SLOW = 4  # how many times slower than life the films of the fixed trunk play
 
 

@@ -36,7 +36,7 @@ def train_trial(config: dict[str, Any]) -> None:
     }
     params = config["params"] | {k: v for k, v in chosen.items() if not k.startswith(ENV)}
     folder = Path("run").absolute()  # in the trial's own folder on the worker
-    shutil.rmtree(folder, ignore_errors=True)  # of a worker that died here
+    shutil.rmtree(folder, ignore_errors=True)  # a worker that died here left it
     checkpoint = tune.get_checkpoint()
     if checkpoint:
         checkpoint.to_directory(str(folder))
@@ -98,7 +98,7 @@ class Reporter(Scorer):
         tune.report(self.last, checkpoint=checkpoint)
 
 
-FIGURES = ("return", "steps", "train_s")  # of a report
+FIGURES = ("return", "steps", "train_s")  # numbers of a report
 
 
 class Progress(tune.Callback):

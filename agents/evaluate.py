@@ -29,7 +29,7 @@ from hoof_env._output import check_folder
 from hoof_env.errors import OutputError, ParameterError, check_number
 from hoof_env.saved_policy import environment_of
 
-FPS = 50.0  # of films
+FPS = 50.0  # frames a second of films
 
 
 @dataclass(frozen=True)

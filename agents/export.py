@@ -33,9 +33,9 @@ from hoof_env.errors import DataFileError, HoofEnvError, ParameterError
 from hoof_env.records import check_place
 from hoof_env.saved_policy import INPUT, LISTS, OUTPUT, OnnxPolicy, describe, environment_of, settings_of
 
-OPSET = 18  # of the file; onnxruntime reads it from 1.14 on
+OPSET = 18  # version of ONNX's operators; onnxruntime reads it from 1.14 on
 TRIED = 1000  # random observations on which file and model must agree
-TOLERANCE = 1e-5  # by how much an action may differ, as a part of the half range of the action space
+TOLERANCE = 1e-5  # largest difference of an action, in half ranges of the action space
 
 
 @dataclass(frozen=True)

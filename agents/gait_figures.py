@@ -32,7 +32,7 @@ SECONDS = 10.0  # length of an episode [s]
 WATCHED = 8  # episodes whose forces are kept at every substep
 SHORTEST = 0.05  # stance [s]
 DIP = 0.05  # least dip next to a peak, over the highest one [-]
-FORCES = ("toe_normal", "heel_normal", "toe_friction", "heel_friction")  # that are kept
+FORCES = ("toe_normal", "heel_normal", "toe_friction", "heel_friction")  # columns of a record that are kept
 HORIZONTAL = ("braking", "propulsion")  # forces backward and forward
 
 
@@ -146,7 +146,7 @@ def watch(envs: Any, policy: Any, speed: float, gait: Floats | None = None) -> P
         start = np.zeros(n, bool)
         upright = upright & ~failed
         measured = infos["measured"]
-        if k == settled - 1:  # where the first step that counts begins
+        if k == settled - 1:  # the first step that counts begins here
             began = _place(measured)
         if settled <= k < steps - 1:  # the last one may have started again
             for name, total in sums.items():

@@ -42,7 +42,7 @@ SECONDS = 5.0
 FIRST = 0.4  # spread of a search from nothing
 NEXT = 0.05  # least spread where the speed changes
 STEP = 1.03  # ratio of one speed to the next
-FROUDE = 0.25  # where the search begins
+FROUDE = 0.25  # Froude number at which the search begins
 # Froude numbers that the task commands; the slower gaits end at the first
 LOWEST = 0.1
 HIGHEST = 1.0
@@ -51,10 +51,10 @@ MOST = 40  # steps of speed at most
 # most falls, and distance of speeds, of what is shipped [-]
 STABLE = 0.1
 NEAR = 0.05
-HARMONICS = 3  # of the trunk's motion
+HARMONICS = 3  # number of harmonics of the trunk's motion
 FALLEN = 0.1  # share of falls at which the speed is raised no more
-TROT_FROUDE = 0.5  # where the trot-like family begins
-LAG = 600.0  # what a stride between the landings of hind and fore hooves costs a trot-like gait
+TROT_FROUDE = 0.5  # Froude number at which the trot-like family begins
+LAG = 600.0  # cost of a stride between the landings of hind and fore hooves in the trot-like family
 TROT = 0.05
 SLIP = 0.1
 """Largest lag [strides] and slip of a stance [m] of shipped trot-like gaits: as for agents."""

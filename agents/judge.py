@@ -41,13 +41,13 @@ from hoof_env.envs.reference import PAIRS
 from hoof_env.errors import ParameterError, check_number, count
 
 ENV_ID = "hoof_env/Horse-v0"
-TROT = 0.05  # largest lag of what counts as one
+TROT = 0.05  # largest lag of a trot or a pace [strides]
 
-MOST_FALLS = 0.10  # share of episodes; what is left of more of them is luck
-MOST_OFF = 0.15  # from the commanded speed, over that [-]
-MOST_SLIP = 0.10  # a stance [m]
+MOST_FALLS = 0.10  # share of episodes; survivors of more falls are a biased sample
+MOST_OFF = 0.15  # largest difference from the commanded speed, over that [-]
+MOST_SLIP = 0.10  # largest slip of a stance [m]
 TURNS = (0.95, 1.05)  # stances a turn
-NEAR = 0.1  # between Froude numbers, of the speed reached and of the horse
+NEAR = 0.1  # largest difference between the Froude numbers reached and of the horse
 
 
 @dataclass

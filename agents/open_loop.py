@@ -42,7 +42,7 @@ Floats = NDArray[np.float64]
 Episodes = list[dict[str, float]]
 
 SIZES = {"constant": 4, "clocked": 13}  # numbers of a gait, by family
-# of the clock [Hz]; the crank turns at 2 Hz at most
+# Frequencies of the clock [Hz]; the crank turns at 2 Hz at most
 SLOWEST = 0.2
 FASTEST = 4.0
 # candidates of a generation and random starts that each meets
@@ -63,7 +63,7 @@ SEARCH_SEED = 10_000_000
 TOLERANCES = {"tolx": 1e-3, "tolfun": 0, "tolfunhist": 0, "tolstagnation": 10**9}
 """Options of CMA-ES that end a search when its steps are small, and for no other reason."""
 
-EPISODES = {"constant": 10_240, "clocked": 30_720}  # of a search, by family
+EPISODES = {"constant": 10_240, "clocked": 30_720}  # episodes of a search, by family
 
 KEPT = (
     "return",

@@ -17,7 +17,7 @@ from hoof_env._plotting import BLUE, GREEN, GREY, ORANGE, STYLE
 
 TEMPLATES = Path(__file__).with_name("templates")
 
-BINS = 60  # of training episodes in the picture
+BINS = 60  # groups of training episodes in the picture
 
 
 def draw_learning_curve(folder: Path, scores: Sequence[Score], path: Path, **options: Any) -> None:
@@ -53,7 +53,7 @@ def draw_learning_curve(folder: Path, scores: Sequence[Score], path: Path, **opt
         axes.plot(1e-6 * training_length(folder)[0], policy[1], "o", color=GREEN, label=label)
         for _, level in others:
             axes.axhline(level, color=ORANGE, lw=1, ls="--")
-        height = 0.065 * np.ptp(axes.get_ylim())  # of a line of text
+        height = 0.065 * np.ptp(axes.get_ylim())  # height of a line of text
         below = -np.inf
         # From the lowest up, each label at least a line above the one before
         for name, level in sorted(others, key=lambda one: one[1]):

@@ -33,7 +33,7 @@ from agents.perceptrons import ACTIONS, ADVANTAGE, CHUNK, Floats, Weights, compi
 from hoof_env.errors import ParameterError
 from hoof_env.simd.threads import check_threads, limit_threads, run_together
 
-# of Adam
+# Decay rates of the moments, and the term that keeps Adam from dividing by 0
 BETA1 = 0.9
 BETA2 = 0.999
 EPSILON = 1e-5
@@ -172,7 +172,7 @@ class FlatPPO(OnPolicyAlgorithm):
         self.num_threads = None if num_threads is None else check_threads(num_threads)
         self.random = np.random.default_rng(seed)
         self.scale = Scale(gamma)
-        self.moments: Floats | None = None  # of the gradient, for Adam
+        self.moments: Floats | None = None  # moments of the gradient, for Adam
         super().__init__(
             policy,
             env,
@@ -230,7 +230,7 @@ class FlatPPO(OnPolicyAlgorithm):
         buffer.reset()
         callback.on_rollout_start()
         ended = np.zeros(buffer.rewards.shape, bool)
-        cut_off = []  # by a time limit: step, environment and its last observation
+        cut_off = []  # episodes cut off by a time limit: step, environment and its last observation
         # All of a rollout at once, which is one call instead of one a step
         noise = self.random.standard_normal(buffer.actions.shape, np.float32)
         buffer.log_probs[:] = -0.5 * np.square(noise).sum(-1) - weights.log_std.sum()

@@ -68,7 +68,7 @@ def alone(folder: Path) -> Iterator[None]:
         lock.acquire(timeout=0)
     except Timeout:
         raise OutputError(f"{folder}: another process is at work there; choose another folder") from None
-    except NotImplementedError:  # of filelock, where a system has none
+    except NotImplementedError:  # filelock raises it if a system has no locks
         warnings.warn(f"{folder}: a file system that has no locks; keep other processes out", stacklevel=3)
     try:
         yield

@@ -66,7 +66,7 @@ def play(
         while not done:
             action, _ = policy.predict(observation, episode_start=start, deterministic=True)
             observation, reward, terminated, truncated, info = env.step(action)
-            total += float(np.asarray(reward).sum())  # of a vector, all objectives
+            total += float(np.asarray(reward).sum())  # a vector reward: the sum of all objectives
             start = np.zeros(1, bool)
             done = terminated or truncated
         episodes.append({"return": total, **_with_stance_peak(info.get("episode_summary", {}))})

@@ -51,7 +51,7 @@ them."""
 CHECKED = 20
 """Number of episodes, from the first of the score on, that are played again to check a shipped policy."""
 
-GAITS = ("run", "walk", "carrying_walk", "reference", "open-loop")  # scored beside it, where an id has them
+GAITS = ("run", "walk", "carrying_walk", "reference", "open-loop")  # scored as well, if an id has them
 
 LIMIT = 1_000_000
 FILM_LIMIT = 750_000
@@ -144,7 +144,7 @@ def ship(choice: Choice, env_id: str, out: Path) -> dict[str, Any]:
     folder = out / env_id.rpartition("/")[2]
     with staged(folder) as stage:
         write_policy(trained, stage / FILE, metadata)
-        policy = OnnxPolicy(stage / FILE)  # what is shipped is what is scored
+        policy = OnnxPolicy(stage / FILE)  # the shipped file is scored, not the model
         scores = [Score("policy", score_vector(policy, trained_on, SCORE_SEEDS)), *gaits(trained_on)]
         score = score_record(policy, scores, env_id, trained_on)
         if env_id != trained_on:
@@ -155,7 +155,7 @@ def ship(choice: Choice, env_id: str, out: Path) -> dict[str, Any]:
         (stage / runs.RECORD).write_text(json.dumps(record, indent=2) + "\n", encoding="utf-8")
         text = json.dumps(score, indent=1, allow_nan=False)
         (stage / "score.json").write_text(text + "\n", encoding="utf-8")
-        no_name = {"Software": None}  # of the program that drew it
+        no_name = {"Software": None}  # the drawing program's name would change the file
         draw_learning_curve(saved.path.parent, scores, stage / "curve.png", dpi=90, metadata=no_name)
         film(stage, env_id)
         write_card(stage, env_id, record, score, scores, choice)

@@ -22,7 +22,7 @@ from hoof_env._output import markdown_table
 
 Floats = NDArray[np.float64]
 
-REPS = 5000  # of a bootstrap over seeds
+REPS = 5000  # resamples of a bootstrap over seeds
 
 FIGURES = (
     "return",
@@ -136,7 +136,7 @@ def over_episodes(episodes: Sequence[Mapping[str, float]]) -> dict[str, Interval
 
             def cost(drawn: Any, axis: int = -1) -> Any:
                 distance, work, force, share = parts[:, drawn].sum(axis)
-                with np.errstate(divide="ignore", invalid="ignore"):  # of a draw that gets nowhere
+                with np.errstate(divide="ignore", invalid="ignore"):  # a draw that gets nowhere divides by 0
                     return work * share / (force * distance)
 
             rng = np.random.default_rng(0)

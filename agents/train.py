@@ -104,7 +104,7 @@ def train(args: Args, *also: Any) -> Trained:
     # An OutputError is an OSError, too, and says more than the one below
     except HoofEnvError:
         raise
-    except OSError as error:  # as of monitor.csv on a full disk
+    except OSError as error:  # a full disk, for example, at monitor.csv
         raise OutputError(f"cannot write to {str(folder)!r}: {error.strerror or error}") from None
 
 
@@ -120,7 +120,7 @@ def _train(
     earlier = find_earlier(args, folder, record, settings)
     # The same command again: nothing to do
     if finished := earlier.get("finished"):
-        checkpoints.tidy(folder, keep=0)  # of a process that was killed before it did so
+        checkpoints.tidy(folder, keep=0)  # a process that was killed may have left them
         return Trained(folder, finished["steps"], finished["seconds"], None)
     checkpoints.tidy(folder)
     start = next(iter(checkpoints.checkpoints(folder)), None) if earlier else None
@@ -133,7 +133,7 @@ def _train(
         raise ParameterError(f"device: expected one that torch finds here, got {args.device!r}")
     torch.set_num_threads(args.torch_threads)
     config = yaml.safe_dump({args.env_id: settings}, sort_keys=False)  # the library adds to policy_kwargs
-    threads = args.torch_threads  # of the environments, too: they change no bit there
+    threads = args.torch_threads  # threads of the environments, too: they change no bit there
     envs = many = runs.make_vec_env(args.env_id, settings["n_envs"], threads, **env_kwargs)
     try:
         resumed = None
@@ -177,7 +177,8 @@ def learn(
             is_through = True
         except EndedError:
             callbacks.on_training_end()
-        except (ValueError, RuntimeError) as error:  # of torch or the environment: not finite
+        except (ValueError, RuntimeError) as error:
+            # Torch or the environment has refused numbers that are not finite
             check_divergence(model, folder)
             if "of distribution" in str(error):
                 raise diverged(model, folder, "the policy's actions have no distribution") from None

@@ -234,7 +234,7 @@ def open_study(args: Args, folder: Path, about: dict[str, Any]) -> Any:
         from sqlalchemy.exc import SQLAlchemyError
     except ModuleNotFoundError:
         raise ParameterError("agents.tune needs Optuna: pip install 'hoof-env[tune]'") from None
-    optuna.logging.set_verbosity(optuna.logging.ERROR)  # what ends a trial is raised, too
+    optuna.logging.set_verbosity(optuna.logging.ERROR)  # errors that end a trial are raised, too
     check_space(args, about)
     path = folder / "study.db"
     try:

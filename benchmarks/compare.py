@@ -32,8 +32,8 @@ CASES = Path(__file__).with_name("compare_cases.py")
 KEPT = ROOT / "runs" / "compare"
 """Folder of the checkouts of bases, kept so that their kernels are compiled once."""
 
-LOWEST = 0.95  # of a median ratio
-RUNS = 15  # of each case in a process
+LOWEST = 0.95  # least median ratio
+RUNS = 15  # runs of each case in a process
 
 
 def checkout(commit: str) -> Path:

@@ -32,7 +32,7 @@ def advance(hips: tuple[float, ...], trunk: str, count: int, steps: int, calls: 
     body = Trunk(trunk, mass=200.0, pitch_inertia=150.0, height=leg.hip_height - low)
     limbs = [Limb(leg, hip=(x, 0.0), drive=Motor()) for x in hips]
     with warnings.catch_warnings():
-        warnings.simplefilter("ignore")  # of steps that are long for the ground
+        warnings.simplefilter("ignore")  # it warns of steps that are long for the ground
         engine = TrunkEngine(limbs, body, Ground(exponent=1.375), sim_dt=1e-3, substeps=1, num_envs=count)
     engine.reset(walk, theta=np.add.outer(np.arange(len(hips)) * np.pi, np.linspace(0.3, 6.5, count)))
     state = engine.get_state()

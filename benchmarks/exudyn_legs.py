@@ -58,7 +58,7 @@ class ExudynLegs:
         self._container = exu.SystemContainer()
         self.mbs = self._container.AddSystem()
         self._reference: list[float] = []
-        self._rows: dict[int, int] = {}  # of bodies, among the coordinates
+        self._rows: dict[int, int] = {}  # rows of bodies among the coordinates
         self._ground = self.mbs.AddObject(eii.ObjectGround())
         self._still = self.mbs.AddMarker(
             eii.MarkerNodeCoordinate(nodeNumber=self.mbs.AddNode(eii.NodePointGround()), coordinate=0)
@@ -139,7 +139,7 @@ class ExudynLegs:
         trunk = self.trunk
         for axis in range(3):
             at = self._coordinate(self._trunk, axis)
-            if axis >= TRUNKS.index(trunk.kind):  # of x, y and pitch each kind leaves free one more
+            if axis >= TRUNKS.index(trunk.kind):  # each kind leaves free one more of x, y and pitch
                 self._hold(self._still, at)
             elif axis == 0:
                 self._spring(at, 0.0, trunk.drag, 0.0)
@@ -240,7 +240,8 @@ class ExudynLegs:
         self.mbs.AddObject(
             eii.CoordinateSpringDamper(markerNumbers=[axes[1], axes[2]], springForceUserFunction=torque)
         )
-        turns = np.array([0, 0, 0, 0, 0, 1 - motor.gear_ratio, 0, 0, motor.gear_ratio])  # of the rotor
+        # Turns of the rotor, by coordinate of trunk, frame and crank
+        turns = np.array([0, 0, 0, 0, 0, 1 - motor.gear_ratio, 0, 0, motor.gear_ratio])
         rotor = self.mbs.AddObject(
             eii.ObjectGenericODE2(
                 nodeNumbers=nodes,

@@ -36,9 +36,9 @@ IMPORTED = time.perf_counter()
 
 ENV_ID = "hoof_env/HorseLeg-v0"
 STARTS = range(2_000_000, 2_000_064)
-STEPS = 1_300_000  # of a training of `ppo_flat`
-NEAR = 0.05  # of the final return
-STOCK_SECONDS = 60.0  # that a stock learner may take
+STEPS = 1_300_000  # steps of a training of `ppo_flat`
+NEAR = 0.05  # largest distance from the final return, as a share of it
+STOCK_SECONDS = 60.0  # most seconds of a stock learner
 
 Curve = list[tuple[float, int, float]]
 """Seconds, steps and return of each score."""

@@ -53,7 +53,7 @@ def vector_bits() -> int:
     add(np.zeros(8))
     # Names of registers tell the width: numba may be told another processor than this one
     code = "".join(add.inspect_asm().values())
-    if registers := re.findall(r"%([xyz])mm", code):  # of x86
+    if registers := re.findall(r"%([xyz])mm", code):  # registers of x86
         return {"x": 128, "y": 256, "z": 512}[max(registers)]
     return 128 if re.search(r"\bv\d+\.2d", code) else 64
 

@@ -209,7 +209,7 @@ class MujocoLegs:
             {link: self.model.body(f"{link} {i}").id for link in assembly.links} for i in range(len(limbs))
         ]
         poses = start.poses(limbs)
-        self._arms = [  # of toe and heel from the ankle, in the hoof's axes
+        self._arms = [  # vectors of toe and heel from the ankle, in the hoof's axes
             [pose.point(name) - pose.point("G") for name in corners(limb)]
             for pose, limb in zip(poses, limbs, strict=True)
         ]
