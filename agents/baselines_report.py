@@ -75,8 +75,8 @@ def references(env_id: str) -> dict[str, Scored]:
     for name in (*GAITS, OPEN_LOOP):
         try:
             known[name] = reference(name, name, env_id)
-        # Not every id has an open-loop gait; the paper's gaits must be found
         except HoofEnvError:
+            # Not every id has an open-loop gait; the paper's gaits must be found
             if name in GAITS:
                 raise
     return known

@@ -38,8 +38,8 @@ def run(command: Callable[[], int | None]) -> NoReturn:
         flush_or_drop()
         print(f"error: {error}", file=sys.stderr)
         code = 2
-    # JSON and YAML parsers recurse once a level
     except RecursionError:
+        # JSON and YAML parsers recurse once a level
         print("error: a file or an argument is nested too deep", file=sys.stderr)
         code = 2
     except KeyboardInterrupt:

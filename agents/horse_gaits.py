@@ -48,7 +48,7 @@ LOWEST = 0.1
 HIGHEST = 1.0
 KNOTS = (1.2, 1.5, 1.85, 2.2, 2.6, 3.0, 3.4)  # speeds that the reference gaits have, about [m/s]
 MOST = 40  # steps of speed at most
-# most falls, and distance of speeds, of what is shipped [-]
+# Largest share of falls and largest relative distance of speeds of shipped gaits
 STABLE = 0.1
 NEAR = 0.05
 HARMONICS = 3  # number of harmonics of the trunk's motion
@@ -78,7 +78,7 @@ landing, hind hooves land twice a stride."""
 
 CENTRE = (1.05, 0.45, -0.7, 0.0, 0.0)  # swing about which a search from nothing begins [rad]
 SPANS = (0.5, 0.4, 0.4, 0.3, 0.3)
-# crank rate [rad/s]; harmonic of the crank's speed [-]
+# Range of the crank rate [rad/s]; largest harmonic of the crank's speed [-]
 RATE = (2.5, 12.5)
 PART = 0.6
 

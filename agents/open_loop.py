@@ -45,7 +45,7 @@ SIZES = {"constant": 4, "clocked": 13}  # numbers of a gait, by family
 # Frequencies of the clock [Hz]; the crank turns at 2 Hz at most
 SLOWEST = 0.2
 FASTEST = 4.0
-# candidates of a generation and random starts that each meets
+# Candidates of a generation and random starts that each meets
 POPULATION = 16
 STARTS = 16
 ROWS = POPULATION * STARTS

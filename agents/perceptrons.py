@@ -29,7 +29,9 @@ ACTIONS = 3
 """Columns of a step: logarithm of the probability, advantage, target of the value, and the actions from the
 last column on."""
 
+# Numbers of float32 throughout: one of float64 would make the loops compute in it
 ZERO, HALF, ONE, FAR = (np.float32(number) for number in (0.0, 0.5, 1.0, 100.0))
+# Coefficients of `tanh`, numerator and denominator
 C0, A1, A2, A3 = (np.float32(number) for number in (34459425, 4729725, 135135, 990))
 B1, B2, B3, B4 = (np.float32(number) for number in (16216200, 945945, 13860, 45))
 
@@ -105,7 +107,7 @@ def loss_of(  # type: ignore[no-untyped-def]
     `LOG_PROB` and the names after it are the columns of `steps`. The entropy is the sum of `log_std`, up to a
     constant.
     """
-    # Of the entropy, which grows with every logarithm by 1
+    # The entropy grows with each logarithm by 1
     by_log_std[:] = -ent_coef * np.float32(len(steps)) / count
     losses[:] = ZERO
     for i in range(len(steps)):

@@ -101,8 +101,8 @@ def train(args: Args, *also: Any) -> Trained:
     try:
         with runs.alone(folder):
             return _train(args, folder, record, env_kwargs, settings, also)
-    # An OutputError is an OSError, too, and says more than the one below
     except HoofEnvError:
+        # An OutputError is an OSError, too, and says more than the one below
         raise
     except OSError as error:  # a full disk, for example, at monitor.csv
         raise OutputError(f"cannot write to {str(folder)!r}: {error.strerror or error}") from None
