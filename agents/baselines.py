@@ -5,8 +5,8 @@
     python -m agents.baselines --only sac td3         some rows of it
     python -m agents.baselines --subset trainers --workers 1      how fast PPO and PPO_FLAT train, by turns
 
-What is trained is in agents/plans. A training that is done is not repeated; Ctrl-C, or kill -9, and the same
-command go on where it was. Each has its log beside its results, RUN/log.txt.
+The files of agents/plans list the trainings. A training that is done is not repeated; Ctrl-C, or kill -9, and
+the same command go on where it was. Each has its log next to its results, RUN/log.txt.
 """
 
 from __future__ import annotations
@@ -32,6 +32,8 @@ from hoof_env.errors import ParameterError, check_number
 
 @dataclass(frozen=True)
 class Args:
+    """Arguments of the command."""
+
     subset: Plan = "full"
     """which plan; each has a folder of its own"""
     only: tuple[str, ...] = ()
@@ -45,12 +47,21 @@ class Args:
 
 
 def train_all(args: Args) -> list[Run]:
-    """Train what is not done yet; returns the trainings that failed. `ParameterError`: no training of that
-    name. `OutputError`: the folder cannot be written. `KeyboardInterrupt`: Ctrl-C; everything can go on."""
+    """Train what is not done yet and return the trainings that failed.
+
+    Raises:
+        ParameterError: there is no training of that name.
+        OutputError: the folder cannot be written.
+        KeyboardInterrupt: Ctrl-C; the same call goes on.
+    """
     check_number("workers", args.workers, low=1)
     folder = args.out or FOLDERS[args.subset]
     names = args.only or ("",)
-    chosen = [one for one in runs_of(load_plan(args.subset)) if any(text in one.name for text in names)]
+    chosen = [
+        training
+        for training in runs_of(load_plan(args.subset))
+        if any(text in training.name for text in names)
+    ]
     if not chosen:
         raise ParameterError(f"only: expected a part of a training's name, got {args.only!r}")
     check_folder(folder)
@@ -58,8 +69,8 @@ def train_all(args: Args) -> list[Run]:
 
 
 def work_off(chosen: Sequence[Run], folder: Path, workers: int) -> list[Run]:
-    """Train so many at a time until all are done; returns those that failed."""
-    waiting = [one for one in chosen if not is_done(one, folder)]
+    """Train `workers` at a time until all are done; return those that failed."""
+    waiting = [training for training in chosen if not is_done(training, folder)]
     running: dict[Run, subprocess.Popen[bytes]] = {}
     failed: list[Run] = []
     interval = 1.0 if sys.stderr.isatty() else 60.0  # seconds between two lines, where each is kept
@@ -68,17 +79,22 @@ def work_off(chosen: Sequence[Run], folder: Path, workers: int) -> list[Run]:
     ) as bar:
         try:
             while waiting or running:
+                # Free places are filled at once, so that a long training holds up no other
                 while waiting and len(running) < workers:
-                    one = waiting.pop(0)
-                    running[one] = start(one, folder)
+                    training = waiting.pop(0)
+                    running[training] = start(training, folder)
+                # Trainings take minutes: half a second between looks costs nothing
                 time.sleep(0.5)
-                for one in [one for one, process in running.items() if process.poll() is not None]:
-                    running.pop(one)
-                    if not is_done(one, folder):
-                        failed.append(one)
-                        tqdm.write(f"{one.name} failed: {last_line(folder / one.name)}")
+                for training in [
+                    training for training, process in running.items() if process.poll() is not None
+                ]:
+                    running.pop(training)
+                    # Whatever the exit code says, a training is done if it has its final score
+                    if not is_done(training, folder):
+                        failed.append(training)
+                        tqdm.write(f"{training.name} failed: {last_line(folder / training.name)}")
                 bar.n = len(chosen) - len(waiting) - len(running) - len(failed)
-                bar.set_postfix_str(", ".join(one.name for one in running), refresh=False)
+                bar.set_postfix_str(", ".join(training.name for training in running), refresh=False)
                 bar.update(0)
         finally:
             for process in running.values():  # each ends in good order, with a checkpoint
@@ -89,29 +105,38 @@ def work_off(chosen: Sequence[Run], folder: Path, workers: int) -> list[Run]:
 
 
 def is_done(one: Run, folder: Path) -> bool:
+    """True if the training has its final score."""
     return (folder / one.name / FINAL).is_file()
 
 
 def start(one: Run, folder: Path) -> subprocess.Popen[bytes]:
     """Begin a training, or go on with it, in a process that Ctrl-C does not reach."""
+    # The log needs the folder before the training makes it
     (folder / one.name).mkdir(parents=True, exist_ok=True)
+    # One thread each: several trainings share the cores
     threads = dict.fromkeys(("OMP_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS"), "1")
     with (folder / one.name / "log.txt").open("ab") as log:
         return subprocess.Popen(
             [sys.executable, "-m", "agents.baselines_run", *one.command(folder)],
-            stdin=subprocess.DEVNULL, stdout=log, stderr=log, start_new_session=True,
+            stdin=subprocess.DEVNULL,
+            stdout=log,
+            stderr=log,
+            start_new_session=True,
             env=os.environ | threads,
-        )  # fmt: skip
+        )
 
 
 def last_line(folder: Path) -> str:
+    """Return the last line of a training's log, which says why it failed."""
     lines = (folder / "log.txt").read_text(encoding="utf-8", errors="replace").split("\n")
     return next((line for line in reversed(lines) if line.strip()), "its log is empty")
 
 
 def main(argv: list[str] | None = None) -> int:
+    """Train all, write the page and return the exit code."""
     import tyro
 
+    # SIGTERM ends the trainings as Ctrl-C does, each with a checkpoint
     def interrupt(*_: Any) -> None:
         raise KeyboardInterrupt
 
@@ -120,8 +145,8 @@ def main(argv: list[str] | None = None) -> int:
     failed = train_all(args)
     if args.report:
         print(f"written: {baselines_report.report(baselines_report.Args(args.subset, args.out))}")
-    for one in failed:
-        print(f"failed: {one.name}", file=sys.stderr)
+    for training in failed:
+        print(f"failed: {training.name}", file=sys.stderr)
     return 1 if failed else 0
 
 

@@ -1,13 +1,13 @@
-"""Checkpoints: all that a training goes on from, in a folder that is whole or is not there.
+"""Checkpoints: all that a training goes on from, in a folder that is whole or does not exist.
 
 `checkpoints/N/`, after N steps and between two rollouts, holds model.zip (weights, optimisers, counters,
 schedules, action noise), policy.*, where they exist vecnormalize.pkl and replay.pkl, and state.pkl:
-environments, generators, where monitor.csv stood.
+environments, generators, length of monitor.csv.
 
-What goes on from there has the bits of a run that was never stopped: on the same machine, on the CPU, with
-the same number of threads, with environments that have `get_state` and `set_state`, and without
-max_episode_steps around an environment that is not native. Other environments start new episodes, with other
-seeds than the first ones. These files are pickles: resume only runs that you trust.
+A resumed run has the bits of a run that was never stopped: on the same machine, on the CPU, with the same
+number of threads, with environments that have `get_state` and `set_state`, and without max_episode_steps
+around an environment that is not native. Other environments start new episodes, with other seeds than the
+first ones. These files are pickles: resume only runs that you trust.
 """
 
 from __future__ import annotations
@@ -33,21 +33,22 @@ from hoof_env.errors import DataFileError, OutputError
 KEPT = 2
 REPLAY = "replay.pkl"
 STATE = "state.pkl"
-COUNTED = ("episode_returns", "episode_lengths", "episode_count")  # by a `VecMonitor`
+COUNTED = ("episode_returns", "episode_lengths", "episode_count")  # counters of a `VecMonitor`
 EXPLORATION = ("exploration_mat", "exploration_matrices")
-"""What gSDE drew for a rollout, before its first callback."""
+"""Attributes with the exploration noise that gSDE drew for a rollout, before its first callback."""
 UNFINISHED = ".unfinished-"
 
 
 @contextmanager
 def whole(folder: Path) -> Iterator[Path]:
-    """A folder that is there with all its files, on the disk, once the block has succeeded, else not at all;
-    `OutputError` if it cannot be written."""
+    """Open a folder that exists with all its files, on the disk, once the block has succeeded, else not at
+    all; `OutputError` if it cannot be written."""
     try:
         folder.parent.mkdir(parents=True, exist_ok=True)
         stage = Path(tempfile.mkdtemp(prefix=UNFINISHED, dir=folder.parent))
         try:
             yield stage
+            # The files reach the disk before the name does: a crash leaves no checkpoint with holes
             for path in (*stage.iterdir(), stage):
                 _flush(path)
             stage.rename(folder)
@@ -59,15 +60,16 @@ def whole(folder: Path) -> Iterator[Path]:
 
 
 def checkpoints(run: Path) -> list[Path]:
-    """The checkpoints of a run, the last one first; whatever else was left half-done is not among them."""
+    """Return the checkpoints of a run, the last one first; half-done folders are not among them."""
     folders = (path for path in (run / runs.CHECKPOINTS).glob("*") if path.name.isdigit())
     return sorted(folders, key=lambda path: int(path.name), reverse=True)
 
 
 def tidy(run: Path, keep: int = KEPT) -> None:
-    """Remove all checkpoints but the last ones, and what killed processes left; no checkpoint is ever seen
+    """Remove all checkpoints but the last `keep`, and what killed processes left; no checkpoint is ever seen
     half-removed."""
     for path in checkpoints(run)[keep:]:
+        # Renaming is atomic, removing a folder is not: a reader never finds half a checkpoint
         path.rename(path.with_name(f"{UNFINISHED}{path.name}"))
     for folder in (run, run / runs.CHECKPOINTS):
         for path in folder.glob(f"{UNFINISHED}*"):
@@ -77,7 +79,7 @@ def tidy(run: Path, keep: int = KEPT) -> None:
 
 
 def save(model: Any, run: Path, seconds: float) -> None:
-    """Write a checkpoint of a model between two rollouts, `seconds` into the training; older ones go."""
+    """Write a checkpoint of a model between two rollouts, `seconds` into the training; remove older ones."""
     import torch
     from stable_baselines3.common.vec_env import VecMonitor
 
@@ -106,7 +108,7 @@ def save(model: Any, run: Path, seconds: float) -> None:
 
 
 def write_episodes(envs: Any, path: Path, go_on: bool = False) -> None:
-    """Have the `VecMonitor` in `envs` write its episodes at `path`, behind those that are there or anew."""
+    """Have the `VecMonitor` in `envs` write its episodes at `path`, after those in the file or anew."""
     from stable_baselines3.common.monitor import ResultsWriter
     from stable_baselines3.common.vec_env import VecMonitor
 
@@ -116,9 +118,20 @@ def write_episodes(envs: Any, path: Path, go_on: bool = False) -> None:
 
 
 class Resumed:
-    """A model that goes on from a checkpoint of its class, with `many`, its `VecEnv` without wrappers:
-    `model.learn(rest, reset_num_timesteps=False)`; `seconds` are of training up to here. `DataFileError`: the
-    checkpoint cannot be read or is of other environments.
+    """Model that goes on from a checkpoint of its class: `model.learn(rest, reset_num_timesteps=False)`.
+
+    Args:
+        checkpoint: folder of the checkpoint.
+        algorithm: class of the model.
+        many: its `VecEnv` without wrappers.
+        device: torch device.
+
+    Attributes:
+        model: the model with its environments.
+        seconds: time of training up to the checkpoint [s].
+
+    Raises:
+        DataFileError: the checkpoint cannot be read or is of other environments.
     """
 
     def __init__(self, checkpoint: Path, algorithm: Any, many: Any, device: str) -> None:
@@ -128,10 +141,11 @@ class Resumed:
             self._state = pickle.loads((checkpoint / STATE).read_bytes())
             self.seconds: float = self._state["seconds"]
             monitor = VecMonitor(many)
+            # As `make_model` wraps them: the monitor inside, the normalisation outside
             envs: Any = monitor
             if (checkpoint / runs.STATISTICS).exists():
                 envs = VecNormalize.load(str(checkpoint / runs.STATISTICS), monitor)
-            with warnings.catch_warnings():  # of n_steps without its buffer, which is loaded next
+            with warnings.catch_warnings():  # it warns of n_steps without its buffer, which is loaded next
                 warnings.filterwarnings("ignore", "`n_steps=", UserWarning)
                 self.model = algorithm.load(
                     checkpoint / runs.MODEL, env=envs, device=device, force_reset=False
@@ -148,10 +162,12 @@ class Resumed:
         self._noise = copy.deepcopy(getattr(self.model, "action_noise", None))
 
     def _put_back(self, monitor: Any, many: Any) -> None:
+        """Restore the states of environments, monitor and normalisation."""
         states = self._state["environments"]
         model = self.model
         if states is None:
             model._last_obs = None  # the training resets them
+            # New episodes, but not those that the first start played
             many.seed((model.seed or 0) + model.num_timesteps)
             return
         many.reset()
@@ -163,22 +179,25 @@ class Resumed:
             model.get_vec_normalize_env().returns = self._state["returns"]
 
     def _continue_monitor(self, monitor: Any, path: Path) -> None:
-        """Episodes after the checkpoint are played again: their rows go, and time goes on from there."""
+        """Drop the rows of episodes after the checkpoint, which are played again, and continue its clock."""
         monitor.t_start = time.time() - self.seconds
-        there = path.exists()
-        if there:
+        is_there = path.exists()
+        if is_there:
             os.truncate(path, min(path.stat().st_size, self._state["monitor_bytes"]))
-        write_episodes(monitor, path, go_on=there)
+        write_episodes(monitor, path, go_on=is_there)
 
     def start(self) -> None:
-        """Put back what setting up a training resets; call it when the training starts."""
+        """Restore what setting up a training resets; call it when the training starts."""
+        # `learn` resets the action noise, whose state is part of the checkpoint
         if self._noise is not None:
             self.model.action_noise = self._noise
 
     def start_rollout(self) -> None:
-        """Put back what was drawn, and is drawn from; call it when the first rollout starts."""
+        """Restore the random generators and the noise drawn from them; call it when the first rollout
+        starts."""
         import torch
 
+        # Not in `start`: setting up a training draws from these generators
         generators = self._state["generators"]
         random.setstate(generators["python"])
         np.random.set_state(generators["numpy"])  # noqa: NPY002
@@ -189,24 +208,27 @@ class Resumed:
 
 
 def _explorer(model: Any) -> Any:
+    """Return the distribution that draws exploration noise."""
     return getattr(model, "actor", model.policy).action_dist
 
 
 def _layer(envs: Any, kind: type) -> Any:
+    """Return the wrapper of a kind around or in a `VecEnv`."""
     while not isinstance(envs, kind):
         envs = envs.venv
     return envs
 
 
 def _stateful(many: Any) -> list[Any]:
-    """What has the states of a `VecEnv` without wrappers: one environment for all, or each."""
+    """Return the objects that have the states of a `VecEnv` without wrappers: one environment for all, or
+    each."""
     from hoof_env.envs.sb3 import Sb3VecEnv
 
     return [many.envs] if isinstance(many, Sb3VecEnv) else [env.unwrapped for env in many.envs]
 
 
 def _environment_states(envs: Any) -> list[Any] | None:
-    """States of the environments, None if one has none."""
+    """Return the states of the environments, None if one has none."""
     try:
         return [env.get_state() for env in _stateful(envs.unwrapped)]
     except AttributeError:
@@ -214,7 +236,7 @@ def _environment_states(envs: Any) -> list[Any] | None:
 
 
 def _flush(path: Path) -> None:
-    """Have the disk hold it before anything relies on it."""
+    """Flush a file or a folder to the disk before anything relies on it."""
     if path.is_dir() and os.name != "posix":  # Windows cannot flush a folder
         return
     number = os.open(path, os.O_RDONLY if path.is_dir() else os.O_RDWR)

@@ -1,4 +1,4 @@
-"""What the commands share: key=value arguments, threads, one line for an error, 130 for Ctrl-C."""
+"""Behaviour that all commands share: key=value arguments, threads, one line for an error, 130 for Ctrl-C."""
 
 from __future__ import annotations
 
@@ -15,14 +15,18 @@ from hoof_env.errors import parse_pairs as parse_pairs
 
 
 def check_threads(threads: int) -> None:
-    """`ParameterError` unless there are as many cores for the threads of torch; more only wait."""
+    """Check that there are as many cores as threads of torch, for more only wait; `ParameterError` if not."""
     usable = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
     check_number("torch_threads", threads, low=1, high=usable)
 
 
 def run(command: Callable[[], int | None]) -> NoReturn:
-    """Exit with what `command` returns: one line and 2 for an error of ours or of the system, as a full disk,
-    one line and 130 for Ctrl-C; a warning is one line, too."""
+    """Exit with the return value of `command`.
+
+    An error of this package or of the system, as a full disk, is one line and code 2; Ctrl-C is one line and
+    code 130; a warning is one line, too.
+    """
+    # Other threads' errors keep their tracebacks
     hook = threading.excepthook  # TensorBoard's thread fails on a full disk; its caller reports that, too
     bear_any_output()
     threading.excepthook = lambda args: None if isinstance(args.exc_value, OSError) else hook(args)
@@ -35,6 +39,7 @@ def run(command: Callable[[], int | None]) -> NoReturn:
         print(f"error: {error}", file=sys.stderr)
         code = 2
     except RecursionError:
+        # JSON and YAML parsers recurse once a level
         print("error: a file or an argument is nested too deep", file=sys.stderr)
         code = 2
     except KeyboardInterrupt:

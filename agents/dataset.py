@@ -4,12 +4,12 @@
     python -m agents.dataset agents/policies/Horse-v0 --env-id hoof_env/Horse-v0
 
 A policy is what agents.score takes. Episode k of each policy is reset with seed + k and the options that its
-policy starts with, so that whatever resets `dataset.recover_environment()` likewise and takes the same
-actions sees the same numbers. Beside Minari's files lies manifest.json with the command, the versions, the
-licence, the returns of each policy and how its episodes start, and the SHA-256 of every file and of the files
-of trained policies. A dataset that is not whole is not kept: it is made in a folder of its own and moved.
+policy starts with, so that resetting `dataset.recover_environment()` likewise and taking the same actions
+gives the same numbers. Next to Minari's files lies manifest.json with the command, the versions, the licence,
+the returns of each policy and how its episodes start, and the SHA-256 of every file and of the files of
+trained policies. A dataset that is not whole is not kept: it is made in a folder of its own and moved.
 
-Minari's metadata say what the actions are: `load` and `check_actions` refuse a dataset whose actions are of
+Minari's metadata record the form of the actions: `load` and `check_actions` refuse a dataset with actions of
 another form, which may have the same shape.
 """
 
@@ -42,9 +42,9 @@ from hoof_env.saved_policy import ABOUT, STATISTICS, WEIGHTS, find_saved
 from hoof_env.saved_record import describe_actions
 
 MANIFEST = "manifest.json"
-PROJECT = Path(__file__).parents[1] / "pyproject.toml"  # of the checkout, which need not be installed
-ID = re.compile(r"(?:[-\w][-\w/]*[-\w]/)?[-\w]+-v\d+")  # as Minari takes it, but always with a version
-ROOT = "MINARI_DATASETS_PATH"  # where Minari keeps datasets
+PROJECT = Path(__file__).parents[1] / "pyproject.toml"  # file of the checkout, which need not be installed
+ID = re.compile(r"(?:[-\w][-\w/]*[-\w]/)?[-\w]+-v\d+")  # Minari's form of an id, but always with a version
+ROOT = "MINARI_DATASETS_PATH"  # variable with Minari's folder of datasets
 ACTIONS = "actions"  # the key of what actions are
 
 
@@ -53,7 +53,7 @@ class Args:
     """Arguments of the command."""
 
     policies: Positional[tuple[str, ...]]
-    """whose episodes are kept, one policy after the other"""
+    """policies to play, one after the other"""
     env_id: str = "hoof_env/HorseLeg-v0"
     """the environment"""
     env_kwargs: tuple[str, ...] = ()
@@ -77,13 +77,19 @@ def main(argv: list[str] | None = None) -> None:
 
 
 def write(args: Args) -> Path:
-    """The folder of the dataset that the arguments ask for. `OutputError` where there is one already,
-    `ParameterError` of what cannot be played or named, `MissingExtraError` without Minari."""
+    """Write the dataset that the arguments ask for and return its folder.
+
+    Raises:
+        OutputError: there is a dataset already.
+        ParameterError: a policy, an id or a number does not fit.
+        MissingExtraError: Minari is not installed.
+    """
     try:
         import minari
         import minari.data_collector  # which asks for more than reading does
     except ImportError:
         raise MissingExtraError('agents.dataset needs Minari: pip install "hoof-env[minari]"') from None
+    # All arguments are checked before Minari makes a folder
     _check_policies(args.policies)
     episodes = count("episodes", args.episodes)
     dataset_id = check_id(args.dataset_id or default_id(args.env_id, args.policies))
@@ -92,6 +98,7 @@ def write(args: Args) -> Path:
         raise OutputError(f"{folder}: expected no dataset there; choose another --dataset-id or --out")
     args.out.mkdir(parents=True, exist_ok=True)
     kwargs = parse_pairs("--env-kwargs", args.env_kwargs)
+    # Minari finds its folder by the environment alone
     before = os.environ.get(ROOT)
     with tempfile.TemporaryDirectory(dir=args.out, prefix=".making-") as making:
         os.environ[ROOT] = making
@@ -102,21 +109,26 @@ def write(args: Args) -> Path:
             os.environ.pop(ROOT)
             if before is not None:
                 os.environ[ROOT] = before
-        made = Path(making, dataset_id)
-        _write_manifest(made, args, returns)
+        finished = Path(making, dataset_id)
+        _write_manifest(finished, args, returns)
         folder.parent.mkdir(parents=True, exist_ok=True)
-        made.rename(folder)
+        finished.rename(folder)
     return folder
 
 
 def load(dataset_id: str) -> Any:
-    """A dataset as `minari.load_dataset` gives it. `DataFileError`: its actions are not what its environment
-    takes today; others as Minari's."""
+    """Load a dataset as `minari.load_dataset` does.
+
+    Raises:
+        DataFileError: its environment is not registered here, or takes actions of another form today.
+        MissingExtraError: Minari is not installed.
+    """
     try:
         import minari
     except ImportError:
         raise MissingExtraError('agents.dataset needs Minari: pip install "hoof-env[minari]"') from None
     dataset = minari.load_dataset(dataset_id)
+    # Before `recover_environment`, which imports what the dataset names
     check_environment(dataset)
     with dataset.recover_environment() as env:
         check_actions(dataset, env)
@@ -124,14 +136,17 @@ def load(dataset_id: str) -> Any:
 
 
 def check_environment(dataset: Any) -> None:
-    """Refuse a dataset whose environment is not a registered one as it is registered: the name of code in it
-    would be imported. `DataFileError`."""
+    """Refuse a dataset if its environment is not a registered one as it is registered: `DataFileError`.
+    Otherwise the name of code in the dataset would be imported."""
     spec = dataset.spec.env_spec
     known = gym.registry.get(spec.id)
     task = str(spec.kwargs.get("task", ""))
     registered = known.kwargs.get("task") if known else None
-    same = known is not None and spec.entry_point == known.entry_point and not spec.additional_wrappers
-    if not same or (":" in task and task != registered):
+    # The id alone proves nothing: an entry point or a wrapper in the dataset may be any code
+    is_registered = (
+        known is not None and spec.entry_point == known.entry_point and not spec.additional_wrappers
+    )
+    if not is_registered or (":" in task and task != registered):
         raise DataFileError(
             f"dataset {dataset.spec.dataset_id}: expected the id of an environment that is registered here, "
             f"got {spec.id!r} at {spec.entry_point!r}; a dataset must not import a module: import yours first"
@@ -139,19 +154,20 @@ def check_environment(dataset: Any) -> None:
 
 
 def check_actions(dataset: Any, env: Any) -> None:
-    """Refuse a dataset, to read it or to add to it, whose actions are not of the form that an environment
+    """Refuse a dataset, to read it or to add to it, if its actions are not of the form that the environment
     takes: `DataFileError`."""
-    here = describe_actions(env)
-    there = dataset.storage.metadata.get(ACTIONS)
-    if there != here.get(ACTIONS):
-        form = "actions of an older form (positions in a box)" if there is None else f"actions {there}"
+    expected = describe_actions(env)
+    stored = dataset.storage.metadata.get(ACTIONS)
+    if stored != expected.get(ACTIONS):
+        form = "actions of an older form (positions in a box)" if stored is None else f"actions {stored}"
         raise DataFileError(
-            f"dataset {dataset.spec.dataset_id}: expected actions {here.get(ACTIONS)}, got {form}; make it"
-            " again by agents.dataset"
+            f"dataset {dataset.spec.dataset_id}: expected actions {expected.get(ACTIONS)}, got {form}; make "
+            "it again by agents.dataset"
         )
 
 
 def _check_policies(policies: Sequence[str]) -> None:
+    """Check that there is a policy, and none twice."""
     if not policies:
         raise ParameterError("policies: expected at least one, got none")
     for name, times in Counter(policies).items():
@@ -160,7 +176,7 @@ def _check_policies(policies: Sequence[str]) -> None:
 
 
 def check_id(dataset_id: str) -> str:
-    """The id, or `ParameterError` of one that Minari does not take; before anything is played."""
+    """Return the id; `ParameterError` if Minari does not take it, before anything is played."""
     if not ID.fullmatch(dataset_id):
         raise ParameterError(
             "dataset_id: expected NAMESPACE/NAME-vK of letters, digits, _ and -, the namespace of two or "
@@ -170,7 +186,8 @@ def check_id(dataset_id: str) -> str:
 
 
 def default_id(env_id: str, policies: Sequence[str]) -> str:
-    """Of policies on an environment; what an id cannot hold, as the points of numbers, is _ in it."""
+    """Return an id for policies on an environment; characters that an id cannot hold, as the points of
+    numbers, become _."""
     short = env_id.rpartition("/")[2].removesuffix("-v0")
     names = [Path(name).stem if Path(name).exists() else name for name in policies]
     plain = [re.sub(r"[^\w-]+", "_", part) for part in (short, "-".join(names))]
@@ -178,19 +195,20 @@ def default_id(env_id: str, policies: Sequence[str]) -> str:
 
 
 def policy_files(name: str) -> list[Path]:
-    """The files that a trained policy or a gait is read from; none of a scripted policy."""
+    """Return the files that a trained policy or a gait is read from; an empty list for a scripted policy."""
     path = Path(name)
     if name.endswith(".json"):
         return [path]
     if not (is_model(name) or path.is_dir()):
         return []
-    found = find_saved(path).path
-    beside = () if found.suffix == ".onnx" else (ABOUT, WEIGHTS, STATISTICS)
-    return [file for file in (found, *(found.with_name(one) for one in beside)) if file.is_file()]
+    model = find_saved(path).path
+    neighbours = () if model.suffix == ".onnx" else (ABOUT, WEIGHTS, STATISTICS)
+    files = [model, *(model.with_name(neighbour) for neighbour in neighbours)]
+    return [file for file in files if file.is_file()]
 
 
 def plain_start(policy: Any) -> dict[str, Any]:
-    """Reset options that episodes of a policy begin with, as data that files can hold."""
+    """Return the reset options that episodes of a policy begin with, as data that files can hold."""
     start = start_of(policy)
     return {
         key: asdict(value) if isinstance(value, GaitParameters) else value for key, value in start.items()
@@ -198,7 +216,7 @@ def plain_start(policy: Any) -> dict[str, Any]:
 
 
 def _collect(minari: Any, env: Any, args: Args, episodes: int, dataset_id: str) -> dict[str, Any]:
-    """Play all episodes, and have Minari write them; returns of each policy."""
+    """Play all episodes, have Minari write them, and return the figures of each policy for the manifest."""
     from tqdm import tqdm
 
     policies = {name: find_policy(name, env, args.env_id) for name in args.policies}
@@ -209,6 +227,7 @@ def _collect(minari: Any, env: Any, args: Args, episodes: int, dataset_id: str) 
         for name, policy in policies.items():
             totals = []
             options = plain_start(policy)
+            # One environment for all episodes, so that a seed alone decides how an episode goes
             for k in range(episodes):
                 observation, _ = collector.reset(seed=args.seed + k, options=options)
                 total = 0.0
@@ -226,10 +245,13 @@ def _collect(minari: Any, env: Any, args: Args, episodes: int, dataset_id: str) 
                 totals.append(total)
                 bar.update()
             returns[name] = {
-                "episodes": episodes, "first_seed": args.seed, "mean_return": float(np.mean(totals)),
-                "sd_return": float(np.std(totals)), **({"start": options} if options else {}),
+                "episodes": episodes,
+                "first_seed": args.seed,
+                "mean_return": float(np.mean(totals)),
+                "sd_return": float(np.std(totals)),
+                **({"start": options} if options else {}),
                 **({"sha256": files[name]} if files[name] else {}),
-            }  # fmt: skip
+            }
     dataset = collector.create_dataset(
         dataset_id,
         algorithm_name=", ".join(returns),
@@ -241,6 +263,7 @@ def _collect(minari: Any, env: Any, args: Args, episodes: int, dataset_id: str) 
 
 
 def _write_manifest(folder: Path, args: Args, returns: dict[str, Any]) -> None:
+    """Write the manifest of a dataset, with the digests of all its files."""
     files = sorted(file for file in folder.rglob("*") if file.is_file())
     about = {
         "env_id": args.env_id,
@@ -255,6 +278,7 @@ def _write_manifest(folder: Path, args: Args, returns: dict[str, Any]) -> None:
 
 
 def _sha256(file: Path) -> str:
+    """Return the SHA-256 of a file, hexadecimal."""
     return hashlib.sha256(file.read_bytes()).hexdigest()
 
 

@@ -3,7 +3,7 @@
     python -m agents.demo              into runs/demo, in a minute or two
     python -m agents.demo --quick      tiny numbers, only to see that everything works
 
-The paper's four conditions with every solver, published beside simulated; scripted gaits and the simplest
+The paper's four conditions with every solver, published next to simulated; scripted gaits and the simplest
 policies in hoof_env/HorseLeg-v0; a small PPO agent, trained for five seconds and scored on the same episodes;
 and report.html, one file with tables, figures and films. The folder is a run folder, too, which
 agents.evaluate plays. Ctrl-C leaves an older report as it was.
@@ -22,8 +22,8 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from agents import evaluate, runs, train
-from agents.baselines_report import draw_learning_curve, render_template
 from agents.command import run
+from agents.pages import draw_learning_curve, render_template
 from hoof_env._output import check_folder, staged
 from hoof_env.errors import check_number
 from hoof_env.film import render_episode
@@ -36,19 +36,19 @@ FIXED_ID = "hoof_env/HorseLegFixed-v0"
 TRAINED = "trained agent"
 OPEN_LOOP = "open-loop"
 SCRIPTED = ("walk", "run", OPEN_LOOP, "idle", "random", "bang-bang")
-FIRST_SEED = 1000  # of the scored episodes; training starts its own from another seed
+FIRST_SEED = 1000  # first of the scored episodes; training starts its own from another seed
 SLOW = 4  # how many times slower than life the films of the fixed trunk play
 
 
 @dataclass(frozen=True)
 class Budget:
-    """How long things may take.
+    """Limits of time and size.
 
     Attributes:
-        seconds: of learning; importing, compiling and scoring come on top.
-        steps: after which learning ends if it is through earlier, and to which rates of learning fall.
-        episodes: of each policy that is scored.
-        film_seconds: of each film.
+        seconds: time of learning [s]; importing, compiling and scoring come on top.
+        steps: steps at which learning ends if it is faster, and over which learning rates fall.
+        episodes: episodes of each policy that is scored.
+        film_seconds: length of each film [s].
         params: hyperparameters that differ from the file's.
     """
 
@@ -65,6 +65,8 @@ QUICK = Budget(60.0, 2_048, 2, 0.4, params=("n_envs=4", "n_steps=512", "batch_si
 
 @dataclass(frozen=True)
 class Args:
+    """Arguments of the command."""
+
     out: Path = Path("runs/demo")
     """folder of the report; an older report there is replaced when the new one is complete"""
     seed: int = 0
@@ -74,8 +76,12 @@ class Args:
 
 
 def demo(args: Args) -> Path:
-    """Do all four steps and return the path of the report. `OutputError`: the folder cannot be written.
-    `KeyboardInterrupt`: Ctrl-C; nothing was replaced."""
+    """Do all four steps and return the path of the report.
+
+    Raises:
+        OutputError: the folder cannot be written.
+        KeyboardInterrupt: Ctrl-C; nothing was replaced.
+    """
     check_number("seed", args.seed, low=0, high=FIRST_SEED - 1)
     check_folder(args.out)
     budget = QUICK if args.quick else FULL
@@ -86,6 +92,7 @@ def demo(args: Args) -> Path:
             print_counts(reproduction)
 
         with announced(2, f"scripted policies in {ENV_ID}, {budget.episodes} episodes each"):
+            # The same episodes for all policies, the agent included
             playing = evaluate.Args(policy=SCRIPTED, episodes=budget.episodes, seed=FIRST_SEED, env_id=ENV_ID)
             scores, _ = evaluate.evaluate(playing)
             evaluate.print_table(scores)
@@ -108,11 +115,13 @@ def demo(args: Args) -> Path:
 
 
 def say(line: str) -> None:
+    """Print a line of a step's output."""
     print(f"      {line}", flush=True)
 
 
 @contextmanager
 def announced(number: int, title: str) -> Iterator[None]:
+    """Print the title of a step, and its time at the end."""
     print(f"[{number}/4] {title}", flush=True)
     started = time.monotonic()
     yield
@@ -124,21 +133,29 @@ def train_agent(args: Args, budget: Budget, stage: Path) -> train.Trained:
     folder = stage / "training"
     trained = train.train(
         train.Args(
-            env_id=ENV_ID, algo="ppo_flat", seed=args.seed, steps=budget.steps,
-            max_minutes=budget.seconds / 60, params=budget.params, out=folder, checkpoint_every=0,
+            env_id=ENV_ID,
+            algo="ppo_flat",
+            seed=args.seed,
+            steps=budget.steps,
+            max_minutes=budget.seconds / 60,
+            params=budget.params,
+            out=folder,
+            checkpoint_every=0,
         )
-    )  # fmt: skip
+    )
+    # A report about half a training would mislead
     if trained.stopped_by:
         raise KeyboardInterrupt
     for name in filter(lambda name: (folder / name).is_file(), (*runs.FILES, runs.STATISTICS)):
+        # Into the report's folder, so that agents.evaluate can play it as a run
         os.replace(folder / name, stage / name)
     shutil.rmtree(folder)  # TensorBoard's curves are in monitor.csv too
     return trained
 
 
 def film_all(scores: Sequence[evaluate.Score], budget: Budget, stage: Path) -> list[dict[str, str]]:
-    """Film gaits and agent on their own trunk, and the gaits, slowly, on a fixed one; returns a title, a
-    caption and the film itself of each."""
+    """Film gaits and agent on their own trunk, and the gaits, slowly, on a fixed one; return title, caption
+    and film of each."""
     clips = []
     size = (640, 360)
     first_episodes = {score.policy: score.episodes[0] for score in scores}
@@ -146,6 +163,7 @@ def film_all(scores: Sequence[evaluate.Score], budget: Budget, stage: Path) -> l
         policy = str(stage / runs.MODEL) if name == TRAINED else name
         path = stage / f"{name.replace(' ', '-')}.mp4"
         render_episode(path, policy, ENV_ID, seed=FIRST_SEED, seconds=budget.film_seconds, size=size)
+        # The film shows the first scored episode: its caption has the figures of that
         first = first_episodes[name]
         way = "forward" if first["distance_m"] >= 0 else "backward"
         caption = (
@@ -167,6 +185,7 @@ def film_all(scores: Sequence[evaluate.Score], budget: Budget, stage: Path) -> l
 
 
 def print_counts(reproduction: Reproduction) -> None:
+    """Print how many published numbers each solver reproduces."""
     for solver in SOLVERS:
         say(f"{solver} solver: {counted(reproduction.rows, reproduction.shapes, solver)}")
 
@@ -179,13 +198,15 @@ def render(
     clips: Sequence[dict[str, str]],
     folder: Path,
 ) -> str:
-    """The report: one HTML page that holds its pictures and films and needs no network. The trained policy is
-    the last of `scores`; its run folder is `folder`, where the figures lie as SVG."""
+    """Return the report: one HTML page that holds its pictures and films and needs no network.
+
+    The trained policy is the last of `scores`; its run folder is `folder`, which also has the figures as SVG.
+    """
     *others, agent = scores
     episodes = len(agent.episodes)
     gaits = [score for score in others if score.policy in GAITS]
-    beside = [*gaits, *(score for score in others if score.policy == OPEN_LOOP)]
-    draw_learning_curve(folder, [agent, *beside], folder / "curve.svg", metadata={"Date": None})
+    references = [*gaits, *(score for score in others if score.policy == OPEN_LOOP)]
+    draw_learning_curve(folder, [agent, *references], folder / "curve.svg", metadata={"Date": None})
     return render_template(
         "report.html.j2",
         quick=args.quick,
@@ -216,11 +237,13 @@ def render(
 
 
 def data_uri(path: Path) -> str:
+    """Return a file as a data URI."""
     kind = {".svg": "image/svg+xml", ".mp4": "video/mp4"}[path.suffix]
     return f"data:{kind};base64,{base64.b64encode(path.read_bytes()).decode('ascii')}"
 
 
 def main(argv: list[str] | None = None) -> None:
+    """Make the report."""
     import tyro
 
     started = time.monotonic()

@@ -41,6 +41,8 @@ SHIPPED = {
 
 @dataclass(frozen=True)
 class Cluster:
+    """Arguments of every command on a cluster."""
+
     what: Positional[Literal["trials"]] = "trials"
     """trainings, each a trial of Ray Tune"""
     address: str | None = None
@@ -51,13 +53,15 @@ class Cluster:
     """more for Ray's runtime_env on a cluster: key=value ..., or one JSON object, as
     '{"pip": ["numba", "stable-baselines3"]}'"""
     retries: int = 3
-    """of each trial whose worker dies or fails"""
+    """of each trial after its worker died or failed"""
     out: str = "runs/distribute"
     """folder that all machines see, or s3://... and the like; each experiment has its own folder there"""
 
 
 @dataclass(frozen=True)
 class Trials(Cluster, TrainingArgs):
+    """Arguments of the command."""
+
     seeds: int = 1
     """trainings of each setting, from seed 0 on"""
     space: tuple[str, ...] = ()
@@ -70,7 +74,7 @@ class Trials(Cluster, TrainingArgs):
 
 
 def parse_space(items: Sequence[str]) -> dict[str, list[Any]]:
-    """Read `key=[...]`; `ParameterError` if an item is something else or a key comes twice.
+    """Parse `key=[...]`; `ParameterError` if an item is something else or a key comes twice.
 
     >>> parse_space(["n_steps=[16, 32]", 'env.trunk=["rail"]'])
     {'n_steps': [16, 32], 'env.trunk': ['rail']}
@@ -81,6 +85,7 @@ def parse_space(items: Sequence[str]) -> dict[str, list[Any]]:
         values = parse_pairs("--space", [f"values={text}"])["values"]
         if not (key and values and isinstance(values, list)):
             raise ParameterError(f"--space: expected key=[JSON, ...], got {item!r}; agents.tune searches")
+        # The later one would replace the earlier silently
         if key in space:
             raise ParameterError(f"--space: {key} is given twice")
         space[key] = values
@@ -90,6 +95,7 @@ def parse_space(items: Sequence[str]) -> dict[str, list[Any]]:
 def check_keys(keys: Iterable[str], algo: str, settings: Iterable[str]) -> None:
     """Refuse keys that are neither hyperparameters of `algo`, nor in its `settings`, nor an environment's."""
     known = {*inspect.signature(algorithm_class(algo)).parameters, *settings, "normalize", "n_envs"}
+    # Arguments that the command itself sets
     known -= {"env", "seed", "device", "_init_setup_model", "verbose", "tensorboard_log", "n_timesteps"}
     for key in keys:
         if key not in known and not key.startswith(ENV):
@@ -100,18 +106,20 @@ def check_keys(keys: Iterable[str], algo: str, settings: Iterable[str]) -> None:
 
 
 def prepare(args: Trials) -> dict[str, Any]:
-    """The parameter space of `args`: constants, lists of what varies and of seeds; all checked."""
+    """Return the parameter space of `args`, checked: constants, lists of what varies and of seeds."""
     for name in ("seeds", "report_every", "cpus_per_trial"):
         check_number(name, getattr(args, name), low=1)
     algorithm_class(args.algo)
     fixed: dict[str, Any] = {"env_id": args.env_id, "algo": args.algo, "torch_threads": args.cpus_per_trial}
-    one = TrainArgs(**fixed, steps=args.steps, env_kwargs=args.env_kwargs, params=args.params)
-    env_kwargs, settings = checked(one)
+    training = TrainArgs(**fixed, steps=args.steps, env_kwargs=args.env_kwargs, params=args.params)
+    env_kwargs, settings = checked(training)
     space = parse_space(args.space)
     check_keys(space, args.algo, settings)
     with runs.make_env(args.env_id, **env_kwargs) as env:
+        # Once here, not in every worker at the same time
         runs.warm_up(env)  # kernels are compiled before workers want them
     for key, values in space.items():
+        # A value that no environment takes fails here, not in a worker
         for value in values if key.startswith(ENV) else ():
             runs.make_env(args.env_id, **env_kwargs | {key.removeprefix(ENV): value}).close()
     return {
@@ -126,7 +134,7 @@ def prepare(args: Trials) -> dict[str, Any]:
 
 
 def run_trials(args: Trials) -> int:
-    """Run the trials of `args` that have not ended yet and write their table; returns its exit code."""
+    """Run the trials of `args` that have not ended yet, write their table and return its exit code."""
     plan = prepare(args)
     start(args)
     from ray import tune
@@ -136,20 +144,24 @@ def run_trials(args: Trials) -> int:
     varied = [*(key for key in plan if key not in FIXED), "seed"]
     space = plan | {key: tune.grid_search(plan[key]) for key in varied}
     config = tune.TuneConfig(
-        metric="return", mode="max",
+        metric="return",
+        mode="max",
         reuse_actors=True,  # libraries are imported and kernels read once for each worker
         trial_dirname_creator=lambda trial: _folder_name(trial, varied),
-    )  # fmt: skip
+    )
     trainable = tune.with_resources(train_trial, {"cpu": args.cpus_per_trial})
     name = experiment_name(args)
     storage = args.out
     storage = storage if "://" in storage else str(Path(storage).absolute())
     folder = f"{storage}/{name}"
     running = tune.RunConfig(
-        name=name, storage_path=storage, verbose=0, callbacks=[Progress()],
+        name=name,
+        storage_path=storage,
+        verbose=0,
+        callbacks=[Progress()],
         failure_config=tune.FailureConfig(max_failures=args.retries),
         checkpoint_config=tune.CheckpointConfig(num_to_keep=1),
-    )  # fmt: skip
+    )
     try:
         if tune.Tuner.can_restore(folder):
             print(f"going on with {folder}, whose files are pickles, which can run any code", flush=True)
@@ -165,13 +177,16 @@ def run_trials(args: Trials) -> int:
 
 
 def experiment_name(args: Trials) -> str:
-    """What the folder is called: a digest tells apart what was asked for, wherever it runs."""
+    """Return the folder's name, with a digest of the arguments that a result depends on; where it runs does
+    not count."""
     asked = {key: value for key, value in asdict(args).items() if key not in Cluster.__dataclass_fields__}
+    # The same arguments find the same folder again, other ones never
     digest = hashlib.sha256(json.dumps(asked, sort_keys=True).encode()).hexdigest()[:8]
     return f"{args.algo}-{args.env_id.rpartition('/')[2]}-{digest}"
 
 
 def _folder_name(trial: Any, varied: list[str]) -> str:
+    """Return the folder's name of a trial, at most 100 characters and its number."""
     text = ",".join(f"{key}={trial.config[key]}" for key in varied)
     number = trial.trial_id.rpartition("_")[2]
     return f"{number}-" + "".join(c if c.isalnum() or c in "=,.-_" else "_" for c in text)[:100]
@@ -179,13 +194,14 @@ def _folder_name(trial: Any, varied: list[str]) -> str:
 
 def start(args: Cluster) -> None:
     """Join the cluster at `args.address`, or make one of this machine's cores; `ParameterError` if Ray is not
-    installed, or no cluster at that address lets us in."""
+    installed, or the cluster cannot be reached."""
     if missing := [name for name in ("ray", "pandas") if not importlib.util.find_spec(name)]:
         raise ParameterError(
             f"expected ray[tune] to be installed, found no {', '.join(missing)}: "
             "pip install 'hoof-env[distribute]'"
         )
     check_number("retries", args.retries, low=0)
+    # None is all cores, by Ray's own count
     if args.cpus is not None:
         check_number("cpus", args.cpus, low=1)
     os.environ.setdefault("RAY_AIR_NEW_OUTPUT", "0")
@@ -209,6 +225,7 @@ def start(args: Cluster) -> None:
 
 
 def main(argv: list[str] | None = None) -> int:
+    """Run the trials and return the exit code."""
     import tyro
 
     return run_trials(tyro.cli(Trials, args=argv, prog="python -m agents.distribute", description=__doc__))

@@ -29,12 +29,12 @@ from hoof_env._output import check_folder
 from hoof_env.errors import OutputError, ParameterError, check_number
 from hoof_env.saved_record import environment_of
 
-FPS = 50.0  # of films
+FPS = 50.0  # frames a second of films
 
 
 @dataclass(frozen=True)
 class Metric:
-    """A column of the table: title, factor and digits of what a person reads."""
+    """Column of the table: title, and factor and digits of the printed value."""
 
     title: str
     factor: float = 1.0
@@ -53,32 +53,33 @@ METRICS = {
     "failed": Metric("failed"),
     "loading_rate_n_s": Metric("loading rate\nkN/s", 1e-3, 1),
 }
-"""The columns: "return", figures of the episode (`hoof_env.envs.batch.EpisodeBatch.summary`), and
+"""Columns of the table: "return", figures of the episode (`hoof_env.envs.batch.EpisodeBatch.summary`), and
 "stance_peak_n", the mean over its stances of their highest force, 0 without a stance."""
 
 
 @dataclass(frozen=True)
 class Score:
-    """What a policy did: one dictionary per episode, its return and the figures of its summary."""
+    """Score of a policy: one dictionary per episode, with its return and the figures of its summary."""
 
     policy: str
     episodes: list[dict[str, float]]
 
     @cached_property
     def estimates(self) -> dict[str, Interval]:
-        """By key of `METRICS`, those that the episodes have."""
+        """Means and intervals by key of `METRICS`, those that the episodes have."""
         return {
             key: estimate([one[key] for one in self.episodes]) for key in METRICS if key in self.episodes[0]
         }
 
 
 def film_paths(video: Path, names: Sequence[str]) -> dict[str, Path]:
-    """Where the film of each policy goes: `video`, with the policy's name added if there are several;
+    """Return the path of each policy's film: `video`, with the policy's name added if there are several;
     `ParameterError` if two films would have one name, or it is not that of an MP4."""
     if video.suffix.lower() not in ("", ".mp4"):
         raise ParameterError(f"--video: expected a file that ends in .mp4, got {str(video)!r}")
     paths: dict[str, Path] = {}
     for name in dict.fromkeys(names):
+        # Every model has this file name; its run folder tells them apart
         short = Path(name).parent.name if name.endswith("model.zip") else Path(name).stem
         suffix = f"-{short}" if len(set(names)) > 1 else ""
         path = video.with_name(f"{video.stem}{suffix}{video.suffix or '.mp4'}")
@@ -90,6 +91,8 @@ def film_paths(video: Path, names: Sequence[str]) -> dict[str, Path]:
 
 @dataclass(frozen=True)
 class Args:
+    """Arguments of the command."""
+
     policy: tuple[str, ...] = ("walk", "run", "idle", "random")
     """names of scripted policies, paths of gaits and trained models (trusted ones only: a model is code)"""
     episodes: int = 20
@@ -107,12 +110,18 @@ class Args:
 
 
 def evaluate(args: Args) -> tuple[list[Score], dict[str, Any]]:
-    """Score the policies of `args`; returns the scores and what they were measured in (env_id, env_kwargs).
-    `ParameterError`, `DataFileError`: the arguments, a policy or a model do not fit. `OutputError`: the JSON
-    or the video cannot be written."""
+    """Score the policies of `args`; return the scores and the env_id and env_kwargs that they were measured
+    in.
+
+    Raises:
+        ParameterError: an argument or a policy does not fit.
+        DataFileError: a model does not fit.
+        OutputError: the JSON or the video cannot be written.
+    """
     from tqdm import tqdm
 
     _check(args)
+    # Before anything is played: two policies may ask for one file
     films = film_paths(args.video, args.policy) if args.video else {}
     env_id, env_kwargs = _environment(args)
     scores = []
@@ -134,6 +143,7 @@ def evaluate(args: Args) -> tuple[list[Score], dict[str, Any]]:
 
 
 def _check(args: Args) -> None:
+    """Check the arguments before anything is played."""
     check_number("episodes", args.episodes, low=1)
     check_number("seed", args.seed, low=0)
     if not args.policy:
@@ -145,12 +155,12 @@ def _check(args: Args) -> None:
 
 
 def _environment(args: Args) -> tuple[str, dict[str, Any]]:
-    """The id and the arguments of the environment: those that are given, else those of the first policy that
-    is a file."""
+    """Return id and arguments of the environment: those of the command, else those of the first policy with a
+    file."""
     records_of = {name: read_policy_record(name) for name in args.policy}
-    name, record = next(((name, one) for name, one in records_of.items() if one), ("", {}))
-    env_id, own = environment_of(name, record, args.env_id)
-    return env_id or runs.DEFAULT_ENV, parse_pairs("--env-kwargs", args.env_kwargs) or own
+    name, record = next(((name, record_of) for name, record_of in records_of.items() if record_of), ("", {}))
+    env_id, env_kwargs = environment_of(name, record, args.env_id)
+    return env_id or runs.DEFAULT_ENV, parse_pairs("--env-kwargs", args.env_kwargs) or env_kwargs
 
 
 def film(env: Any, policy: Any, path: Path, seed: int) -> None:
@@ -163,10 +173,12 @@ def film(env: Any, policy: Any, path: Path, seed: int) -> None:
 
 
 def cell(key: str, value: Interval) -> tuple[str, str]:
+    """Format mean and interval of a metric."""
     return value.parts(METRICS[key].digits, METRICS[key].factor)
 
 
 def table(scores: Sequence[Score]) -> Any:
+    """Return the scores as a table of rich."""
     from rich import box
     from rich.table import Table
 
@@ -182,32 +194,32 @@ def table(scores: Sequence[Score]) -> Any:
 
 
 def print_table(scores: Sequence[Score]) -> None:
-    """Print the scores; as wide as they need where the output is not a terminal."""
+    """Print the scores; as wide as they need if the output is not a terminal."""
     from rich.console import Console
 
     Console(width=None if sys.stdout.isatty() else 180).print(table(scores))
 
 
 def to_json(scores: Sequence[Score], **about: Any) -> dict[str, Any]:
-    """The scores as plain data: JSON knows no infinity, so an infinite figure is null."""
+    """Return the scores as plain data: JSON knows no infinity, so an infinite figure is null."""
 
     def finite(value: float) -> float | None:
         return value if math.isfinite(value) else None
 
-    return {
-        **about,
-        "policies": {
-            score.policy: {
-                "mean": {key: finite(value.mean) for key, value in score.estimates.items()},
-                "interval95": {key: [finite(v.low), finite(v.high)] for key, v in score.estimates.items()},
-                "episodes": [{key: finite(value) for key, value in one.items()} for one in score.episodes],
-            }
-            for score in scores
-        },
-    }
+    policies = {}
+    for score in scores:
+        intervals = score.estimates.items()
+        episodes = score.episodes
+        policies[score.policy] = {
+            "mean": {key: finite(interval.mean) for key, interval in intervals},
+            "interval95": {key: [finite(each.low), finite(each.high)] for key, each in intervals},
+            "episodes": [{key: finite(value) for key, value in episode.items()} for episode in episodes],
+        }
+    return {**about, "policies": policies}
 
 
 def main(argv: list[str] | None = None) -> None:
+    """Score, print and write."""
     import tyro
 
     args = tyro.cli(Args, args=argv, prog="python -m agents.evaluate", description=__doc__)

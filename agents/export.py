@@ -4,8 +4,9 @@
 
 The file maps observations of the environment, shape (batch, k), to deterministic actions, (batch, n), float32
 both: the normalisation of observations and the limits of actions are inside. It is kept only if it gives the
-actions of the model it was made from. What it is for stands in its metadata (`hoof_env/saved_policy.py`).
-A .zip is a pickle and can run any code when it is loaded: give only files that you trust. ONNX is data.
+actions of the model it was made from. Its metadata describe the environment and the actions
+(`hoof_env/saved_policy.py`). A .zip is a pickle and can run any code when it is loaded: give only files that
+you trust. ONNX is data.
 """
 
 from __future__ import annotations
@@ -33,13 +34,15 @@ from hoof_env.records import check_place
 from hoof_env.saved_policy import INPUT, LISTS, OUTPUT, OnnxPolicy
 from hoof_env.saved_record import describe, environment_of, settings_of
 
-OPSET = 18  # of the file; onnxruntime reads it from 1.14 on
+OPSET = 18  # version of ONNX's operators; onnxruntime reads it from 1.14 on
 TRIED = 1000  # random observations on which file and model must agree
-TOLERANCE = 1e-5  # by how much an action may differ, as a part of the half range of the action space
+TOLERANCE = 1e-5  # largest difference of an action, in half ranges of the action space
 
 
 @dataclass(frozen=True)
 class Args:
+    """Arguments of the command."""
+
     model: Positional[Path]
     """run folder of agents.train, or a .zip of Stable-Baselines3"""
     out: Path
@@ -49,9 +52,15 @@ class Args:
 
 
 def export(model: Path, out: Path, env_id: str | None = None) -> float:
-    """Write the policy of a run folder or .zip to an .onnx, for `env_id` or what run.json says, and return
-    the largest difference of an action, as in `TOLERANCE`. `ParameterError`: another suffix, or no
-    environment known. `DataFileError`: no such model. Others as `write_policy`."""
+    """Write the policy of a run folder or .zip to an .onnx, for `env_id` or the id in run.json.
+
+    Returns:
+        The largest difference of an action, as in `TOLERANCE`.
+
+    Raises:
+        ParameterError: another suffix, or no environment known; others as `write_policy`.
+        DataFileError: there is no such model; others as `write_policy`.
+    """
     check_place(out, [".onnx"])
     saved = runs.SavedModel.find(model)
     env_id, kwargs = environment_of(saved.path, saved.record, env_id)
@@ -64,23 +73,29 @@ def export(model: Path, out: Path, env_id: str | None = None) -> float:
 
 
 def about(env: Any, env_id: str, env_kwargs: dict[str, Any], record: dict[str, Any]) -> dict[str, Any]:
-    """The metadata of a policy for an environment; `record` is the run.json of its training, or empty."""
+    """Return the metadata of a policy for an environment; `record` is the run.json of its training, or
+    empty."""
     known = {key: str(record[key]) for key in ("algo", "seed") if key in record}
     settings = record.get("settings") or settings_of(env)
     made_with = record.get("versions", {}).get("hoof-env", hoof_env.__version__)
-    here = {"env_id": env_id, "env_kwargs": env_kwargs, "settings": settings, "hoof_env": made_with}
-    return here | describe(env) | known
+    environment = {"env_id": env_id, "env_kwargs": env_kwargs, "settings": settings, "hoof_env": made_with}
+    return environment | describe(env) | known
 
 
 def write_policy(trained: runs.TrainedPolicy, out: Path, metadata: dict[str, Any]) -> float:
-    """Write a policy to `out`, an older file is replaced, and return the largest difference of an action.
-    `ParameterError`: it observes or does something else than vectors, or remembers. `DataFileError`: the file
-    does not act as the policy does; it is not kept. `HoofEnvError`: a package is missing."""
+    """Write a policy to `out`, replacing an older file, and return the largest difference of an action.
+
+    Raises:
+        ParameterError: it observes or does something else than vectors, or remembers.
+        DataFileError: the file does not act as the policy does; it is not kept.
+        HoofEnvError: a package is missing.
+    """
     observations = some_observations(trained.model.observation_space)
     module = module_of(trained)
     with staged(out.parent) as stage:
         write_onnx(module, observations[:2], stage / out.name, metadata)
         off = difference(trained, OnnxPolicy(stage / out.name).predict, observations)
+        # Written so that NaN is refused as well
         if not off <= TOLERANCE:
             raise DataFileError(
                 f"{out}: expected actions within {TOLERANCE:g} of the model's, got {off:.2g}; not kept"
@@ -89,8 +104,8 @@ def write_policy(trained: runs.TrainedPolicy, out: Path, metadata: dict[str, Any
 
 
 def statistics_of(normalize: Any) -> tuple[Any, Any, float] | None:
-    """What the `normalize` of a `TrainedPolicy` does, None for nothing: observations minus a mean by a scale,
-    shape (k,), float64, then within a limit of 0."""
+    """Return the normalisation in the `normalize` of a `TrainedPolicy`, None if there is none: mean and
+    scale, shape (k,), float64, and the limit to which (observation - mean) / scale is clipped."""
     from stable_baselines3.common.vec_env import VecNormalize
 
     source = getattr(normalize, "__self__", normalize)  # it may be a method of `VecNormalize`
@@ -104,7 +119,8 @@ def statistics_of(normalize: Any) -> tuple[Any, Any, float] | None:
 
 
 class Deterministic(torch.nn.Module):
-    """From observations to the deterministic actions of a `TrainedPolicy`, as its `predict` computes them."""
+    """Module from observations to the deterministic actions of a `TrainedPolicy`, as its `predict` computes
+    them."""
 
     low: Any
     high: Any
@@ -125,9 +141,11 @@ class Deterministic(torch.nn.Module):
             self.register_buffer("scale", torch.as_tensor(scale))
 
     def forward(self, observation: Any) -> Any:
+        """Return actions, shape (batch, n), for observations, shape (batch, k)."""
         if self.clip is not None:
             scaled = (observation.double() - self.mean) / self.scale
             observation = scaled.clamp(-self.clip, self.clip).float()
+        # From here on as `BasePolicy.predict`: squashed actions are scaled, others clipped
         action = self.policy._predict(observation, deterministic=True)
         if self.policy.squash_output:  # in [-1, 1]: to the limits of the space
             return self.low + 0.5 * (action + 1.0) * (self.high - self.low)
@@ -135,8 +153,8 @@ class Deterministic(torch.nn.Module):
 
 
 def module_of(trained: runs.TrainedPolicy) -> Any:
-    """The policy as a torch module that is ready to be traced; `ParameterError` for a recurrent one, or
-    actions that are not vectors."""
+    """Return the policy as a torch module that is ready to be traced; `ParameterError` for a recurrent one,
+    or actions that are not vectors."""
     policy = trained.model.policy
     space = trained.model.action_space
     if not isinstance(space, gym.spaces.Box) or len(space.shape) != 1 or hasattr(policy, "lstm_actor"):
@@ -146,23 +164,25 @@ def module_of(trained: runs.TrainedPolicy) -> Any:
 
 
 def some_observations(space: gym.Space[Any]) -> Any:
-    """`TRIED` random observations, a few of them far outside of what is usual, shape (TRIED, k), float32;
-    `ParameterError` for a space that is not of vectors."""
+    """Return `TRIED` random observations, shape (TRIED, k), float32, a tenth of them far outside the usual
+    range; `ParameterError` for a space that is not of vectors."""
     if not isinstance(space, gym.spaces.Box) or len(space.shape) != 1:
         raise ParameterError(f"model: expected one that observes vectors, got {space}")
     space.seed(0)
     rows = np.stack([space.sample() for _ in range(TRIED)]).astype(np.float32)
+    # Far outside, to test the limits of normalisation and actions
     rows[::10] *= 100
     return rows
 
 
 @contextmanager
 def _quietly() -> Iterator[None]:
-    """Without the exporter's notes and without the checks of distributions, which cannot be traced."""
+    """Suppress the exporter's notes, and torch's checks of distributions, which cannot be traced."""
     from torch.distributions import Distribution
 
     logger = logging.getLogger("torch.onnx")
     level = logger.level
+    # Torch has no getter; the setter changes this attribute of the class
     checked = Distribution._validate_args
     logger.setLevel(logging.ERROR)
     Distribution.set_default_validate_args(False)
@@ -184,10 +204,15 @@ def write_onnx(module: Any, example: Any, path: Path, metadata: dict[str, Any]) 
         raise HoofEnvError(f'writing ONNX needs {error.name}: pip install "hoof-env[train,onnx]"') from None
     with _quietly():
         program: Any = torch.onnx.export(
-            module, (torch.as_tensor(example),), dynamo=True, opset_version=OPSET, verbose=False,
-            input_names=[INPUT], output_names=[OUTPUT],
+            module,
+            (torch.as_tensor(example),),
+            dynamo=True,
+            opset_version=OPSET,
+            verbose=False,
+            input_names=[INPUT],
+            output_names=[OUTPUT],
             dynamic_shapes=({0: torch.export.Dim("batch")},),
-        )  # fmt: skip
+        )
     graph = program.model.graph
     for part in (graph, *graph, *graph.inputs, *graph.outputs, *graph.initializers.values()):
         part.metadata_props.clear()  # stack traces, with the folders of this machine
@@ -198,16 +223,19 @@ def write_onnx(module: Any, example: Any, path: Path, metadata: dict[str, Any]) 
 
 
 def difference(trained: Any, predict: Any, observations: Any) -> float:
-    """The largest difference of an action, many observations at once and one alone, NaN if one is none."""
+    """Return the largest difference of an action in half ranges, many observations at once and one alone; NaN
+    if an action is NaN."""
     space = trained.model.action_space
     half = (space.high - space.low) / 2
     wanted, _ = trained.predict(observations)
+    # A policy must act on one observation as on many: batch sizes are dynamic
     alone = [predict(row)[0].reshape(-1) for row in observations[:20]]
-    both = (predict(observations)[0], np.array(alone))
-    return float(max(np.max(np.abs(one - wanted[: len(one)]) / half) for one in both))
+    results = (predict(observations)[0], np.array(alone))
+    return float(max(np.max(np.abs(actions - wanted[: len(actions)]) / half) for actions in results))
 
 
 def main(argv: list[str] | None = None) -> None:
+    """Export, and print the difference."""
     import tyro
 
     args = tyro.cli(Args, args=argv, prog="python -m agents.export", description=__doc__)

@@ -1,12 +1,13 @@
-"""What a policy on the horse does at a commanded speed: forces, stances, slip, lag, cost of transport.
+"""Figures of a policy on the horse at a commanded speed: forces, stances, slip, lag, cost of transport.
 
-Most figures are made of the engine's sums over all episodes that did not end early. Those that need forces at
-every substep are of such among the first `WATCHED`, whose substeps are run again: the lag, the force over a
-stance, and its peaks of braking and propulsion, the highest horizontal force backward and forward of each
-whole stance (0 where there is none), averaged over stances.
+Most figures come from the engine's sums over all episodes that did not end early. Those that need forces at
+every substep are of such episodes among the first `WATCHED`, for which a record is kept: the lag, the force
+over a stance, and its peaks of braking and propulsion, the highest horizontal force backward and forward of
+each whole stance (0 if there is none), averaged over stances.
 
-Left and right legs of a pair are interchangeable in the plane: the lag is how long after a hind hoof the next
-fore hoof lands, over the stride and within half of one, so that 0 is a trot or a pace and 0.25 a walk.
+Left and right legs of a pair are interchangeable in the plane: the lag is the time from the landing of a hind
+hoof to the next landing of a fore hoof, over the stride and within half of one, so that 0 is a trot or a pace
+and 0.25 a walk.
 """
 
 from __future__ import annotations
@@ -31,13 +32,21 @@ SECONDS = 10.0  # length of an episode [s]
 WATCHED = 8  # episodes whose forces are kept at every substep
 SHORTEST = 0.05  # stance [s]
 DIP = 0.05  # least dip next to a peak, over the highest one [-]
-FORCES = ("toe_normal", "heel_normal", "toe_friction", "heel_friction")  # that are kept
+FORCES = ("toe_normal", "heel_normal", "toe_friction", "heel_friction")  # columns of a record that are kept
 HORIZONTAL = ("braking", "propulsion")  # forces backward and forward
 
 
 @dataclass
 class Stance:
-    """One stance: hoof, times [s], normal force and horizontal one, forward, [N] at every substep."""
+    """Stance of one hoof.
+
+    Attributes:
+        leg: number of the leg, as in `LEGS`.
+        began: time of landing [s].
+        ended: time of the last load [s].
+        force: normal force at every substep [N].
+        push: horizontal force, positive forward, at every substep [N].
+    """
 
     leg: int
     began: float
@@ -47,8 +56,8 @@ class Stance:
 
     @property
     def is_two_peaked(self) -> bool:
-        """Whether the force, smoothed over a tenth of the stance, has two peaks, neither one nor three. A
-        peak is within the stance and `DIP` of the highest force above what is on either side of it."""
+        """True if the force, smoothed over a tenth of the stance, has two peaks, neither one nor three. A
+        peak is within the stance and `DIP` of the highest force above the dips on either side of it."""
         from scipy.signal import find_peaks
 
         width = max(len(self.force) // 10, 1)
@@ -69,15 +78,15 @@ class Stance:
 
 @dataclass
 class Played:
-    """What episodes were from `SETTLED` on, n of them.
+    """Sums over n episodes from `SETTLED` on.
 
     Attributes:
-        seconds: that they are about [s].
-        sums: of the engine over this time, each shape (4, n).
-        travelled: [m], shape (n,).
-        turns: of the cranks [-], shape (4, n).
-        upright: which did not end early, shape (n,).
-        watched: of the first `WATCHED`, what `forces_of` takes.
+        seconds: time that they cover [s].
+        sums: sums of the engine over this time, each shape (4, n).
+        travelled: distance [m], shape (n,).
+        turns: turns of the cranks [-], shape (4, n).
+        upright: True for episodes that did not end early, shape (n,).
+        watched: records of the first `WATCHED` episodes, as `forces_of` takes them.
     """
 
     seconds: float
@@ -89,31 +98,34 @@ class Played:
 
 
 def stances_of(time: Floats, forces: Floats, pushes: Floats, lift_off: float) -> list[Stance]:
-    """Whole stances in a record, normal and horizontal forces of shape (n, 4)."""
-    found = []
+    """Return the whole stances in a record; normal and horizontal forces have shape (n, 4)."""
+    stances = []
     for leg in range(forces.shape[1]):
         loaded = np.concatenate([[False], forces[:, leg] > lift_off, [False]])
         begins = np.flatnonzero(np.diff(loaded.astype(int)) == 1)
         ends = np.flatnonzero(np.diff(loaded.astype(int)) == -1)
         for begin, end in zip(begins, ends, strict=True):
+            # A stance cut off by the record's ends has no duration; a short one is a bounce
             if begin > 0 and end < len(time) and time[end - 1] - time[begin] > SHORTEST:
                 when = slice(begin, end)
-                found.append(Stance(leg, time[begin], time[end - 1], forces[when, leg], pushes[when, leg]))
-    return found
+                stances.append(Stance(leg, time[begin], time[end - 1], forces[when, leg], pushes[when, leg]))
+    return stances
 
 
 def lag_of(stances: list[Stance], stride: float) -> float:
-    """From hind to fore hooves [strides], within half a stride, as a circular mean; NaN without any."""
-    fore = np.array([one.began for one in stances if one.leg < 2])
-    hind = np.array([one.began for one in stances if one.leg >= 2])
+    """Return the lag from hind to fore hooves [strides], within half a stride, as a circular mean; NaN
+    without landings. `stride` is the duration of a stride [s]."""
+    fore = np.array([stance.began for stance in stances if stance.leg < 2])
+    hind = np.array([stance.began for stance in stances if stance.leg >= 2])
     if not len(fore) or not len(hind):
         return float("nan")
+    # The next landing of either fore hoof: left and right are interchangeable
     gaps = [(fore[fore >= landed].min() - landed) / stride for landed in hind if (fore >= landed).any()]
     return mean_lag(gaps)
 
 
 def watch(envs: Any, policy: Any, speed: float, gait: Floats | None = None) -> Played:
-    """Play episodes at one commanded speed [m/s], perhaps around a gait of one's own, shape (16,)."""
+    """Play episodes at one commanded speed [m/s]; `gait`, shape (16,), replaces the reference gait."""
     seeds = [3_000_000 + k for k in range(envs.num_envs)]
     around = {} if gait is None else {"gait": gait}
     seen, _ = envs.reset(seed=seeds, options={**start_of(policy), "target_speed": speed, **around})
@@ -128,12 +140,13 @@ def watch(envs: Any, policy: Any, speed: float, gait: Floats | None = None) -> P
     settled = round(SETTLED / dt)
     steps = round(SECONDS / dt)
     for k in range(steps):
+        # All rows are asked together; a failed one plays on, but is not counted
         actions, state = policy.predict(seen, state, episode_start=start, deterministic=True)
         seen, _, failed, _, infos = envs.step(np.asarray(actions, np.float32))
         start = np.zeros(n, bool)
         upright = upright & ~failed
         measured = infos["measured"]
-        if k == settled - 1:  # where the first step that counts begins
+        if k == settled - 1:  # the first step that counts begins here
             began = _place(measured)
         if settled <= k < steps - 1:  # the last one may have started again
             for name, total in sums.items():
@@ -147,39 +160,43 @@ def watch(envs: Any, policy: Any, speed: float, gait: Floats | None = None) -> P
 
 
 def _place(measured: Any) -> Floats:
-    """Place [m] and crank angles [rad], shape (5, n)."""
+    """Return position [m] and crank angles [rad], shape (5, n)."""
     return np.array([measured[name] for name in ("x", *(f"{leg}_theta" for leg in LEGS))])
 
 
 def play(envs: Any, policy: Any, speed: float, gait: Floats | None = None) -> dict[str, Any]:
-    """Episodes at one commanded speed [m/s]: figures of each pair of legs, means over the episodes that did
-    not end early; and stances of those that are watched."""
+    """Play episodes at one commanded speed [m/s] and return their figures: of each pair of legs, as means
+    over the episodes that did not end early, and stances of watched ones."""
     played = watch(envs, policy, speed, gait)
     height = envs.batch.body.height
     kilograms = float(envs.weight[0]) / GRAVITY
     result: dict[str, Any] = {
-        "speed": speed, "froude": froude_of(speed, height), "fell": float(1 - played.upright.mean()),
-    }  # fmt: skip
+        "speed": speed,
+        "froude": froude_of(speed, height),
+        "fell": float(1 - played.upright.mean()),
+    }
     if not played.upright.any():
         return result
     return result | _from_sums(played, kilograms, height) | _from_stances(played, kilograms)
 
 
 def froude_of(speed: float, height: float) -> float:
-    """Froude number [-] of a speed [m/s] at a height of the hips [m]."""
+    """Return the Froude number [-] of a speed [m/s] at a height of the hips [m]."""
     return speed**2 / (GRAVITY * height)
 
 
 def _from_sums(played: Played, kilograms: float, height: float) -> dict[str, float]:
-    """Figures that the engine's sums have, of upright episodes of an animal with its hips at a height [m]."""
+    """Return the figures that the engine's sums give, over upright episodes of an animal with its hips at
+    `height` [m] and a mass of `kilograms`."""
     upright = played.upright
     travelled = played.travelled[played.upright]
-    found = stance_figures(played.sums, played.seconds, played.turns)
+    figures = stance_figures(played.sums, played.seconds, played.turns)
     pairs = {
         name: np.nanmean(values.reshape(2, 2, -1)[..., upright], axis=(1, 2))
-        for name, values in found.items()
+        for name, values in figures.items()
     }
     result: dict[str, float] = {}
+    # Forces by the mass of the animal, which makes sizes comparable
     for k, pair in enumerate(PAIRS):
         for name, of in (("peak", "peak"), ("mean", "mean"), *((f"mean_{x}", x) for x in HORIZONTAL)):
             result[f"{name}_{pair}"] = float(pairs[of][k]) / kilograms
@@ -199,54 +216,61 @@ def _from_sums(played: Played, kilograms: float, height: float) -> dict[str, flo
 
 
 def _from_stances(played: Played, kilograms: float) -> dict[str, Any]:
-    """Figures that need the forces at every substep, of watched episodes that are upright; NaN if none is."""
+    """Return the figures that need the forces at every substep, over watched episodes that are upright; NaN
+    if there are none."""
+    # Mean duration of a stride: turns of the cranks are strides
     period = played.seconds / float(played.turns.mean(0)[played.upright].mean())
     lift_off = LIFT_OFF * kilograms * GRAVITY / len(LEGS)
     stances = []
     lags = []
     footfall: list[list[float]] = []
-    for kept in (kept for env, kept in enumerate(played.watched) if played.upright[env]):
-        time, forces, pushes = forces_of(kept)
-        own = stances_of(time, forces, pushes, lift_off)
-        stances += own
-        lags.append(lag_of(own, period))
-        footfall = footfall or footfall_of(own, time[-1], 2 * period)
-    of_pairs = {pair: [one for one in stances if one.leg // 2 == k] for k, pair in enumerate(PAIRS)}
+    for env, records in enumerate(played.watched):
+        if not played.upright[env]:
+            continue
+        time, forces, pushes = forces_of(records)
+        of_episode = stances_of(time, forces, pushes, lift_off)
+        stances += of_episode
+        lags.append(lag_of(of_episode, period))
+        # Of the first upright episode
+        footfall = footfall or footfall_of(of_episode, time[-1], 2 * period)
+    of_pairs = {pair: [stance for stance in stances if stance.leg // 2 == k] for k, pair in enumerate(PAIRS)}
     result: dict[str, Any] = {
         "lag": mean_lag(lags) if lags else float("nan"),
-        "two_peaked": _mean([one.is_two_peaked for one in of_pairs["fore"]]),
+        "two_peaked": _mean([stance.is_two_peaked for stance in of_pairs["fore"]]),
         "footfall": footfall,
-        "curves": {pair: curve_of(own, kilograms) for pair, own in of_pairs.items()},
+        "curves": {pair: curve_of(of_pair, kilograms) for pair, of_pair in of_pairs.items()},
     }
-    for pair, own in of_pairs.items():
+    for pair, of_pair in of_pairs.items():
         for name in HORIZONTAL:
-            peaks = [getattr(one, f"peak_{name}") for one in own]
+            peaks = [getattr(stance, f"peak_{name}") for stance in of_pair]
             result[f"peak_{name}_{pair}"] = _mean(peaks) / kilograms
     return result
 
 
 def _mean(values: list[Any]) -> float:
+    """Return the mean, NaN without values."""
     return float(np.mean(values)) if values else float("nan")
 
 
 def footfall_of(stances: list[Stance], end: float, span: float) -> list[list[float]]:
-    """Leg, begin and end [s] of the stances in the last `span` [s] of a record that ends there."""
+    """Return leg, begin and end [s] of the stances in the last `span` [s] of a record that ends at `end`
+    [s]."""
     begin = end - span
     return [
-        [one.leg, round(max(one.began - begin, 0.0), 4), round(one.ended - begin, 4)]
-        for one in stances
-        if one.ended > begin
+        [stance.leg, round(max(stance.began - begin, 0.0), 4), round(stance.ended - begin, 4)]
+        for stance in stances
+        if stance.ended > begin
     ]
 
 
 def mean_lag(lags: list[float]) -> float:
-    """Of lags within half a stride, which is a whole turn."""
+    """Return the circular mean of lags within half a stride, which counts as a whole turn."""
     return float(np.angle(np.nanmean(np.exp(4j * np.pi * np.array(lags)))) / (4 * np.pi) % 0.5)
 
 
 def forces_of(records: list[dict[str, Floats]]) -> tuple[Floats, Floats, Floats]:
-    """Times, shape (n,), and normal and horizontal forces of the legs, shape (n, 4), of records one after the
-    other."""
+    """Return times, shape (n,), and normal and horizontal forces of the legs, shape (n, 4), of consecutive
+    records."""
     time, toe, heel, toe_push, heel_push = (
         np.concatenate([record[name] for record in records]) for name in ("time", *FORCES)
     )
@@ -254,7 +278,7 @@ def forces_of(records: list[dict[str, Floats]]) -> tuple[Floats, Floats, Floats]
 
 
 def curve_of(stances: list[Stance], mass: float) -> list[float]:
-    """Mean normal force [N/kg] at each hundredth of a stance."""
+    """Return the mean normal force [N/kg] at each hundredth of a stance."""
     grid = np.linspace(0, 1, 101)
-    curves = [np.interp(grid, np.linspace(0, 1, len(one.force)), one.force) for one in stances]
+    curves = [np.interp(grid, np.linspace(0, 1, len(stance.force)), stance.force) for stance in stances]
     return [round(float(x), 4) for x in np.mean(curves, 0) / mass] if curves else []

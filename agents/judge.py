@@ -1,17 +1,17 @@
-"""What policies on the horse look like beside living horses.
+"""Policies on the horse compared with living horses.
 
     python -m agents.judge reference
     python -m agents.judge runs/ppo-Horse-v0-s0 runs/ppo-Horse-v0-s1 --out runs/judge
 
-A policy is what agents.score takes. It is asked for one speed after the other, each kept for a whole episode;
-the first two seconds do not count. `agents/judges.json` has the horse's figures, their sources and the bars;
+A policy is what agents.score takes. It is given one speed after the other, each kept for a whole episode; the
+first two seconds do not count. `agents/judges.json` has the horse's figures, their sources and the bars;
 nothing in it may enter a reward, a search or a choice of settings.
 
-A horse's figure at a Froude number stands beside that of the gait whose speed comes nearest. Ours counts only
-where the policy falls in a tenth of the episodes at most and keeps the commanded speed to 15 %, where the
-hooves slip less than 0.10 m a stance and land 0.95 to 1.05 times a turn of their crank, and where the Froude
-number of the speed that was reached is within 0.1 of the horse's. The last does not hold for the peaks of a
-trot: they stand beside the trot-like gait nearest Froude number 1, but not below 0.35, where horses walk.
+A horse's figure at a Froude number is compared with that of the gait at the nearest speed. Ours counts only
+if the policy falls in a tenth of the episodes at most and keeps the commanded speed to 15 %, the hooves slip
+less than 0.10 m a stance and land 0.95 to 1.05 times a turn of their crank, and the Froude number of the
+speed that was reached is within 0.1 of the horse's. The last does not hold for the peaks of a trot: they are
+compared with the trot-like gait nearest Froude number 1, but not below 0.35: slower horses walk.
 
 Of several policies, as the seeds of an algorithm, there is a table of all, too: means with 95 % intervals.
 """
@@ -29,7 +29,6 @@ from tyro.conf import Positional
 
 from agents import runs
 from agents.command import run
-from agents.conditions import NEAR, distance, rejection_reason
 from agents.gait_figures import SECONDS, mean_lag, play
 from agents.horse_gaits import speed_of
 from agents.judge_pictures import draw
@@ -42,7 +41,13 @@ from hoof_env.tasks.horse import HIP_HEIGHT
 from hoof_env.tasks.horse_gaits import PAIRS
 
 ENV_ID = "hoof_env/Horse-v0"
-TROT = 0.05  # largest lag of what counts as one
+TROT = 0.05  # largest lag of a trot or a pace [strides]
+
+MOST_FALLS = 0.10  # share of episodes; survivors of more falls are a biased sample
+MOST_OFF = 0.15  # largest difference from the commanded speed, over that [-]
+MOST_SLIP = 0.10  # largest slip of a stance [m]
+TURNS = (0.95, 1.05)  # stances a turn
+NEAR = 0.1  # largest difference between the Froude numbers reached and of the horse
 
 
 @dataclass
@@ -61,71 +66,107 @@ class Args:
     """folder for figures.json, table.md, forces.png, footfall.png and speeds.png"""
 
 
+# When figures count: the policy stays up, keeps its speed and does not slip, and hooves land once a turn
+
+
+def rejection_reason(figures: dict[str, Any], pairs: Sequence[str]) -> str:
+    """Return why the figures of these pairs of legs do not count at any speed; an empty text if they do."""
+    reasons = []
+    if figures["fell"] > MOST_FALLS:
+        reasons.append(f"fell in {100 * figures['fell']:.3g} % of episodes")
+    # Written so that NaN is a reason, too
+    speed_ratio = figures["reached"] / figures["speed"]
+    if not abs(speed_ratio - 1) <= MOST_OFF:
+        reasons.append(f"{speed_ratio:.2f} of the commanded speed")
+    for pair in pairs:
+        slip = figures[f"slip_{pair}"]
+        stances = figures[f"stances_per_turn_{pair}"]
+        if not slip < MOST_SLIP:
+            reasons.append(f"{pair} hooves slip {slip:.2f} m")
+        if not TURNS[0] <= stances <= TURNS[1]:
+            reasons.append(f"{stances:.2f} {pair} stances a turn")
+    return ", ".join(reasons)
+
+
+def distance(figures: dict[str, Any], froude: float) -> float:
+    """Return the distance between the Froude number that was reached and another."""
+    return abs(float(figures["froude_reached"]) - froude)
+
+
 # The judges
 
 
 @dataclass(frozen=True)
 class Gait:
-    """What a judge looks at: a gait at one speed, or why there is none, or why it is not comparable."""
+    """Gait at one speed that is judged, or why there is none, or why it is not comparable."""
 
     figures: dict[str, Any] | None
     flaw: str = ""
 
 
-def at_speed(froude: float, some: list[dict[str, Any]], what: str = "gait", near: float = NEAR) -> Gait:
-    """The gait whose speed comes nearest a Froude number; flawed where that is not near."""
-    if not some:
+def at_speed(froude: float, gaits: list[dict[str, Any]], what: str = "gait", near: float = NEAR) -> Gait:
+    """Return the gait with the speed nearest a Froude number; it has a flaw if that is not near."""
+    if not gaits:
         return Gait(None, f"there is no {what}")
-    one = min(some, key=lambda one: distance(one, froude))
-    return Gait(one, "" if distance(one, froude) < near else f"no {what} is near Froude number {froude:g}")
+    nearest = min(gaits, key=lambda gait: distance(gait, froude))
+    flaw = "" if distance(nearest, froude) < near else f"no {what} is near Froude number {froude:g}"
+    return Gait(nearest, flaw)
 
 
 def trots_of(standing: list[dict[str, Any]]) -> list[dict[str, Any]]:
-    """Gaits whose lag is that of a trot or a pace."""
-    return [one for one in standing if min(one["lag"], 0.5 - one["lag"]) < TROT]
+    """Return the gaits with the lag of a trot or a pace."""
+    return [gait for gait in standing if min(gait["lag"], 0.5 - gait["lag"]) < TROT]
 
 
 def pairs_of(name: str) -> Sequence[str]:
-    """The pairs of legs that a figure is about."""
+    """Return the pairs of legs that a figure is about."""
     if name == "two_peaked":
         return PAIRS[:1]
-    own = name.rpartition("_")[2]
-    return [own] if own in PAIRS and name != "impulse_fore" else PAIRS
+    last_word = name.rpartition("_")[2]
+    # The share of the impulse is about both pairs, whatever its name ends in
+    return [last_word] if last_word in PAIRS and name != "impulse_fore" else PAIRS
 
 
 def judged(
     title: str, gait: Gait, name: str, judge: dict[str, Any], bars: list[tuple[float, float]]
 ) -> tuple[str, ...]:
-    """A row of the table, of a figure by its name; without bars its distance is reported."""
+    """Return a row of the table for a figure; without bars its distance from the horse's is reported."""
     ours = float((gait.figures or {}).get(name, "nan"))
     known = bool(np.isfinite(ours))
     flaws = [gait.flaw, rejection_reason(gait.figures, pairs_of(name)) if gait.figures else ""]
     why = ", ".join(filter(None, flaws))
+    # A reason comes before a missing figure: a gait that falls has no figures
     if not known:
         verdict = why or "not measured"
+    elif bars and why:
+        verdict = f"does not count: {why}"
     elif bars:
-        met = any(low <= ours <= high for low, high in bars)
-        verdict = f"does not count: {why}" if why else "met" if met else "missed"
+        verdict = "met" if any(low <= ours <= high for low, high in bars) else "missed"
     else:
         verdict = f"off by {ours / judge['horse'] - 1:+.0%}" + (f", does not count: {why}" if why else "")
     return (
-        title, "-" if gait.figures is None else f"{gait.figures['froude_reached']:.2f}", str(judge["horse"]),
+        title,
+        "-" if gait.figures is None else f"{gait.figures['froude_reached']:.2f}",
+        str(judge["horse"]),
         " or ".join(f"{low:g} to {high:g}" for low, high in bars) or "none",
-        f"{ours:.3g}" if known else "-", verdict, judge["source"],
-    )  # fmt: skip
+        f"{ours:.3g}" if known else "-",
+        verdict,
+        judge["source"],
+    )
 
 
 def verdicts(figures: list[dict[str, Any]]) -> list[tuple[str, ...]]:
-    """Rows of the table: what is judged, at which Froude number, the horse's figure, the bar, ours, the
-    verdict or why there is none, and the source. Empty where the policy falls at every speed."""
+    """Return rows of the table: figure, Froude number, the horse's figure, the bar, ours, the verdict or why
+    there is none, and the source. Empty if the policy falls at every speed."""
     judges = read_judges()
-    standing = [one for one in figures if "lag" in one]
+    standing = [gait for gait in figures if "lag" in gait]
     if not standing:
         return []
     return [*_walk(judges, standing), *_trot(judges, standing), *_reported(judges, standing)]
 
 
 def _walk(judges: dict[str, Any], standing: list[dict[str, Any]]) -> Iterator[tuple[str, ...]]:
+    """Yield rows of the walk."""
     walk = at_speed(judges["walk"]["froude"], standing)
     for name in ("lag", "duty_fore", "duty_hind", "two_peaked", "peak_fore", "peak_hind"):
         judge = judges["walk"]["duty" if name.startswith("duty") else name]
@@ -133,9 +174,11 @@ def _walk(judges: dict[str, Any], standing: list[dict[str, Any]]) -> Iterator[tu
 
 
 def _trot(judges: dict[str, Any], standing: list[dict[str, Any]]) -> Iterator[tuple[str, ...]]:
+    """Yield rows of the trot: peaks, and duty factors at several speeds."""
     trots = trots_of(standing)
     lowest = judges["reported"]["walk_to_trot"]["horse"]
-    quick = [one for one in trots if one["froude_reached"] >= lowest]  # where a horse trots, too
+    # Slower ones would be compared with peaks that no horse has at a walk's speed
+    quick = [trot for trot in trots if trot["froude_reached"] >= lowest]
     what = f"trot-like gait from Froude number {lowest:g} on"
     trot = at_speed(judges["trot"]["froude"], quick, what, near=np.inf)
     for pair in PAIRS:
@@ -144,6 +187,7 @@ def _trot(judges: dict[str, Any], standing: list[dict[str, Any]]) -> Iterator[tu
     source = judges["duty"]["source"]
     for froude, judge in of_speeds(judges["duty"]):
         gait = at_speed(froude, trots, "trot-like gait")
+        # Published mean of each source, plus and minus the spread
         bars = [(x - judge["bar"], x + judge["bar"]) for x in judge["horse"]]
         for pair in PAIRS:
             title = f"trot-like at {froude}: duty_{pair}"
@@ -151,58 +195,83 @@ def _trot(judges: dict[str, Any], standing: list[dict[str, Any]]) -> Iterator[tu
 
 
 def _reported(judges: dict[str, Any], standing: list[dict[str, Any]]) -> Iterator[tuple[str, ...]]:
+    """Yield rows of figures that are reported without a bar."""
     for name, judge in judges["reported"].items():
         if "froude" in judge:
             yield judged(name, at_speed(judge["froude"], standing), name, judge, [])
         else:
-            counting = [one for one in trots_of(standing) if not rejection_reason(one, PAIRS)]
-            first = min(counting, key=lambda one: float(one["froude_reached"]), default=None)
+            counting = [trot for trot in trots_of(standing) if not rejection_reason(trot, PAIRS)]
+            first = min(counting, key=lambda trot: float(trot["froude_reached"]), default=None)
             gait = Gait(first, "" if first else "there is no trot-like gait that counts")
             yield judged(name, gait, "froude_reached", judge, [])
 
 
 HEAD = ("judge", "Froude number reached", "horse", "bar", "ours", "verdict", "source")
 SHOWN = (
-    "reached", "froude_reached", "fell", "peak_fore", "peak_hind", "peak_over_mean_fore",
-    "peak_over_mean_hind", "duty_fore", "duty_hind", "stances_per_turn_fore", "stances_per_turn_hind",
-    "slip_fore", "slip_hind", "lag", "two_peaked", "peak_braking_fore", "peak_propulsion_fore",
-    "peak_braking_hind", "peak_propulsion_hind", "mean_braking_fore", "mean_propulsion_fore",
-    "mean_braking_hind", "mean_propulsion_hind", "stride_over_hip", "impulse_fore", "transport",
-)  # fmt: skip
+    "reached",
+    "froude_reached",
+    "fell",
+    "peak_fore",
+    "peak_hind",
+    "peak_over_mean_fore",
+    "peak_over_mean_hind",
+    "duty_fore",
+    "duty_hind",
+    "stances_per_turn_fore",
+    "stances_per_turn_hind",
+    "slip_fore",
+    "slip_hind",
+    "lag",
+    "two_peaked",
+    "peak_braking_fore",
+    "peak_propulsion_fore",
+    "peak_braking_hind",
+    "peak_propulsion_hind",
+    "mean_braking_fore",
+    "mean_propulsion_fore",
+    "mean_braking_hind",
+    "mean_propulsion_hind",
+    "stride_over_hip",
+    "impulse_fore",
+    "transport",
+)
 
 
 def pool(each: list[list[dict[str, Any]]]) -> list[dict[str, Any]]:
-    """Figures of several policies at each speed as one: means, and under "intervals" their 95 % intervals as
-    text. Policies that do not stand at a speed are left out there, but for "fell"."""
-    found = []
-    for same in zip(*each, strict=True):
-        standing = [one for one in same if "lag" in one]
-        one: dict[str, Any] = {name: same[0][name] for name in ("speed", "froude")}
-        one["intervals"] = {}
+    """Return figures of several policies at each speed as one: means, and under "intervals" their 95 %
+    intervals as text. Policies that do not stay up at a speed are left out there, except for "fell"."""
+    pooled = []
+    for at_this_speed in zip(*each, strict=True):
+        standing = [policy for policy in at_this_speed if "lag" in policy]
+        mean_figures: dict[str, Any] = {name: at_this_speed[0][name] for name in ("speed", "froude")}
+        mean_figures["intervals"] = {}
         for name in SHOWN if standing else ("fell",):
-            who = same if name == "fell" else standing
-            values = [other[name] for other in who if np.isfinite(other[name])]
+            counted = at_this_speed if name == "fell" else standing
+            values = [policy[name] for policy in counted if np.isfinite(policy[name])]
             if not values:  # none that was watched stayed up
                 continue
+            # An arithmetic mean of 0.01 and 0.49 would be a walk
             if name == "lag":  # a trot may be just before 0 or just after
                 middle = mean_lag(values)
                 values = [middle + (x - middle + 0.25) % 0.5 - 0.25 for x in values]
             interval = estimate(values)
-            one[name] = interval.mean % 0.5 if name == "lag" else interval.mean
-            one["intervals"][name] = interval.text(3)
-        found.append(one)
-    return found
+            mean_figures[name] = interval.mean % 0.5 if name == "lag" else interval.mean
+            mean_figures["intervals"][name] = interval.text(3)
+        pooled.append(mean_figures)
+    return pooled
 
 
 def table_of(name: str, figures: list[dict[str, Any]]) -> str:
-    """Verdicts and all figures of a policy, Markdown."""
-    head = ("figure", *(f"Fr {one['froude']:.3g}, {one['speed']:.2f} m/s" for one in figures), "horse")
+    """Return verdicts and all figures of a policy, Markdown."""
+    speeds = (f"Fr {gait['froude']:.3g}, {gait['speed']:.2f} m/s" for gait in figures)
+    head = ("figure", *speeds, "horse")
     reported = read_judges()["reported"]
     body = []
     for key in SHOWN:
-        ours = (
-            one.get("intervals", {}).get(key) or (f"{one[key]:.3g}" if key in one else "-") for one in figures
-        )
+        ours = []
+        for gait in figures:
+            measured = f"{gait[key]:.3g}" if key in gait else "-"
+            ours.append(gait.get("intervals", {}).get(key) or measured)
         body.append((key, *ours, str(reported.get(key, {}).get("horse", ""))))
     verdict = markdown_table(HEAD, verdicts(figures))
     units = "Forces in N/kg, slip in m, lag in strides."
@@ -232,6 +301,7 @@ def main(argv: list[str] | None = None) -> None:
             f"episode_seconds: expected {SECONDS:g} or more, for that long is judged, got"
             f" {envs.batch.episode_seconds:g}"
         )
+    # An animal of another size reaches a Froude number at another speed
     pace = envs.batch.body.height / HIP_HEIGHT  # Froude numbers are of the animal's own hips
     with runs.make_env(ENV_ID, **env_kwargs) as env:
         for name in args.policies:

@@ -5,8 +5,8 @@
     python -m agents.evaluate --policy run runs/open_loop/HorseLeg-v0-constant.json
 
 Families: "constant", the paper's gaits, four gait parameters that are held; "clocked", each of the four with
-a first harmonic of one clock beside it, which starts with the episode, thirteen numbers. An episode starts in
-a gait of its own, and goes from there to the one that was found as fast as is allowed. The best of several
+a first harmonic of one clock as well, which starts with the episode, thirteen numbers. An episode starts in a
+gait of its own, and goes from there to the one that was found as fast as is allowed. The best of several
 searches is chosen by starts that none has met and scored with yet others, the episodes of agents.evaluate.
 The file is written after every search; searches that are in it are not made again. `agents.horse_gaits` finds
 the gaits of the horse.
@@ -29,11 +29,12 @@ from numpy.typing import NDArray
 
 from agents import runs
 from agents.command import parse_pairs, run
+from agents.evolution import generations, make_strategy, mean_costs, require
 from agents.score import make_rows, play_rows
 from agents.statistics import estimate
 from hoof_env._output import check_folder
 from hoof_env.envs.policies import FORM, open_loop, open_loop_record
-from hoof_env.errors import DataFileError, HoofEnvError, ParameterError, check_number, parse_json
+from hoof_env.errors import DataFileError, ParameterError, check_number, parse_json
 from hoof_env.gait import PARAMETERS
 from hoof_env.tasks.observation import HALF_RANGE, MIDDLE
 
@@ -41,10 +42,10 @@ Floats = NDArray[np.float64]
 Episodes = list[dict[str, float]]
 
 SIZES = {"constant": 4, "clocked": 13}  # numbers of a gait, by family
-# of the clock [Hz]; the crank turns at 2 Hz at most
+# Frequencies of the clock [Hz]; the crank turns at 2 Hz at most
 SLOWEST = 0.2
 FASTEST = 4.0
-# candidates of a generation and random starts that each meets
+# Candidates of a generation and random starts that each meets
 POPULATION = 16
 STARTS = 16
 ROWS = POPULATION * STARTS
@@ -52,29 +53,36 @@ FINALISTS = 4  # candidates of a search that meet more starts at its end
 
 STEP = 0.3
 HARMONIC = 0.3
-"""First standard deviation and largest first harmonic; the box of every number is 2 wide."""
+"""First standard deviation, and largest first harmonic of the screening; the box of every number is 2
+wide."""
 
 TEST_SEED = 1000
 SEARCH_SEED = 10_000_000
 """First seeds of the final score, `agents.evaluate`'s, and of the searches."""
 
-OPTIONS = {
-    "bounds": [-1, 1], "tolx": 1e-3, "tolfun": 0, "tolfunhist": 0, "tolstagnation": 10**9,
-    "verbose": -9, "verb_log": 0,
-}  # fmt: skip
-"""Of CMA-ES: it ends when the steps are small."""
+TOLERANCES = {"tolx": 1e-3, "tolfun": 0, "tolfunhist": 0, "tolstagnation": 10**9}
+"""Options of CMA-ES that end a search when its steps are small, and for no other reason."""
 
-EPISODES = {"constant": 10_240, "clocked": 30_720}  # of a search, by family
+EPISODES = {"constant": 10_240, "clocked": 30_720}  # episodes of a search, by family
 
 KEPT = (
-    "return", "speed_m_s", "stance_peak_n", "loading_rate_n_s", "cost_of_transport", "peak_grf_n",
-    "weight_share", "stances", "failed",
-)  # fmt: skip
-"""Figures of an episode whose means are kept."""
+    "return",
+    "speed_m_s",
+    "stance_peak_n",
+    "loading_rate_n_s",
+    "cost_of_transport",
+    "peak_grf_n",
+    "weight_share",
+    "stances",
+    "failed",
+)
+"""Figures of an episode that the file has the means of."""
 
 
 @dataclass(frozen=True)
 class Args:
+    """Arguments of the command."""
+
     env_id: str = "hoof_env/HorseLeg-v0"
     """registered environment of this package with many at once"""
     env_kwargs: tuple[str, ...] = ()
@@ -88,7 +96,7 @@ class Args:
     test_episodes: int = 512
     """of the final score, from seed 1000 on"""
     start: Path | None = None
-    """file of a gait whose constants every second search begins with"""
+    """file of a gait; every second search begins with its constants"""
     out: Path | None = None
     """file; otherwise runs/open_loop/ENV-FAMILY.json"""
 
@@ -104,8 +112,8 @@ PUBLISHED = Box()
 
 
 def decode(family: str, x: Floats, box: Box = PUBLISHED) -> dict[str, Floats]:
-    """Parameters of `open_loop` for points of [-1, 1], shape (..., SIZES[family]): the `box` is the range of
-    the gait parameters, and the unit of a harmonic is half of it."""
+    """Convert points of [-1, 1], shape (..., SIZES[family]), to parameters of `open_loop`: the `box` is the
+    range of the gait parameters, and the unit of a harmonic is half of it."""
     constant = box.middle + box.half * x[..., :4]
     if family == "constant":
         return {"constant": constant}
@@ -116,14 +124,22 @@ def decode(family: str, x: Floats, box: Box = PUBLISHED) -> dict[str, Floats]:
 
 
 def encode(constant: Sequence[float], box: Box = PUBLISHED) -> Floats:
-    """Inverse of `decode` for a constant gait, shape (4,), within the box."""
+    """Convert a constant gait, shape (4,), to a point within the box; the inverse of `decode`."""
     return np.clip((np.asarray(constant, float) - box.middle) / box.half, -1.0, 1.0)
 
 
 class Objective:
-    """Scores candidates of a family by episodes in the rows of one vector environment; `leg` is a single one
-    like them, `spent` counts episodes. `ParameterError`: no such environment, one without many at once, or
-    one that is not of one leg."""
+    """Costs of candidates of a family, from episodes in the rows of one vector environment.
+
+    Attributes:
+        leg: a single environment with the same settings.
+        envs: the vector environment.
+        spent: episodes so far.
+
+    Raises:
+        ParameterError: there is no such environment, it has no native vector environment, or it is not of one
+            leg.
+    """
 
     def __init__(self, env_id: str, env_kwargs: dict[str, Any], family: str) -> None:
         self.leg: Any = runs.make_env(env_id, **env_kwargs).unwrapped
@@ -143,13 +159,13 @@ class Objective:
         return decode(self.family, x, self.box)
 
     def costs(self, x: Floats, seeds: Sequence[int]) -> list[float]:
-        """Minus the mean returns of candidates, shape (n, size), that meet the same starts; n * len(seeds) is
-        `ROWS`."""
+        """Return minus the mean returns of candidates, shape (n, size), that meet the same starts; n *
+        len(seeds) is `ROWS`."""
         episodes = self._play(self.decode(np.repeat(x, len(seeds), axis=0)), [*seeds] * len(x))
-        returns = np.reshape([one["return"] for one in episodes], (len(x), len(seeds)))
-        return [-float(np.mean(some)) for some in returns]
+        return mean_costs(np.array([episode["return"] for episode in episodes]), len(seeds))
 
     def test(self, parameters: dict[str, Any], count: int) -> Episodes:
+        """Return `count` episodes of the final score."""
         episodes: Episodes = []
         while len(episodes) < count:
             first = TEST_SEED + len(episodes)
@@ -157,6 +173,7 @@ class Objective:
         return episodes[:count]
 
     def _play(self, parameters: dict[str, Any], seeds: Sequence[int]) -> Episodes:
+        """Play an episode for each seed."""
         self.spent += len(seeds)
         return play_rows(self.envs, open_loop(parameters, self.leg), seeds)
 
@@ -168,16 +185,22 @@ def search(
     tick: Callable[[int, float], Any],
     start: Sequence[float] | None = None,
 ) -> tuple[Floats, float, bool]:
-    """One CMA-ES from the best point of a random screening, or from the constant gait `start`, shape (4,).
+    """Search by CMA-ES from the best of random points, or from the constant gait `start`; return the best
+    point, its cost over starts that the search had not met, and True if Ctrl-C ended it.
 
     Candidates of a generation meet the same starts, those of the next and other searches others. At the end
-    the mean of the distribution, the luckiest candidate and the best of the last generation meet more. About
-    `episodes` are spent; `tick` is called with their number and the lowest cost in them. Returns the best
-    point, its cost over starts that the search had not met, and whether Ctrl-C ended it; `KeyboardInterrupt`:
-    it did before anything was found.
-    """
-    import cma
+    the mean of the distribution, the luckiest candidate and the best of the last generation meet more.
 
+    Args:
+        objective: costs of candidates.
+        seed: seed of the search and of its starts.
+        episodes: episodes that it takes, about.
+        tick: called with a number of episodes and the lowest cost in them.
+        start: constant gait, shape (4,).
+
+    Raises:
+        KeyboardInterrupt: Ctrl-C came before anything was found.
+    """
     generator = np.random.default_rng([seed, 6])
     fresh = SEARCH_SEED * (seed + 1)
 
@@ -192,49 +215,58 @@ def search(
     step = STEP
     if start is not None:
         first = np.array([*encode(start, objective.box), *[0.0] * (size - len(start))])
+        # A start that was found before needs a search around it only
         step = STEP / 3
     else:
+        # A quarter of the starts for each point: many poor points are told from good ones by few episodes
         screened = generator.uniform(-1, 1, (ROWS // 4, size))
         screened[:, 4:12] *= HARMONIC
         first = screened[np.argmin(costs(screened, 4))]
-    options = OPTIONS | {"popsize": POPULATION, "seed": int(generator.integers(1, 2**31))}
-    strategy = cma.CMAEvolutionStrategy(first, step, options)
+    strategy = make_strategy(first, step, POPULATION, int(generator.integers(1, 2**31)), **TOLERANCES)
     best = [first]
     interrupted = False
     try:
-        for _ in range(episodes // ROWS - 2):
-            if strategy.stop():
-                break
-            candidates = strategy.ask()
-            values = costs(candidates, STARTS)
-            strategy.tell(candidates, values)
+        count = episodes // ROWS - 2  # the screening and the finalists take the other two
+        for candidates, values in generations(strategy, lambda points: costs(points, STARTS), count):
             lowest = [candidates[k] for k in np.argsort(values)[: FINALISTS - 2]]
             best = [strategy.result.xfavorite, strategy.result.xbest, *lowest]
+            if strategy.stop():
+                break
     except KeyboardInterrupt:
         interrupted = True
+    # Rounded before the last score, so that the score is that of the numbers in the file
     finalists = np.clip(np.round((best * FINALISTS)[:FINALISTS], 5), -1.0, 1.0)
     final = costs(finalists, ROWS // FINALISTS)
     return finalists[np.argmin(final)], min(final), interrupted
 
 
 def optimise(args: Args) -> dict[str, Any]:
-    """Search, and write the file after every search; returns what it holds. `HoofEnvError`: no CMA-ES is
-    installed. `DataFileError`: the file is of something else. `KeyboardInterrupt`: what was found is in the
-    file."""
+    """Search, and write the file after every search; return its content.
+
+    Raises:
+        HoofEnvError: no CMA-ES is installed.
+        DataFileError: the file is of something else.
+        KeyboardInterrupt: Ctrl-C; the results so far are in the file.
+    """
     episodes = check(args)
     from tqdm import tqdm
 
     path = place(args)
     about: dict[str, Any] = {
-        "env_id": args.env_id, "env_kwargs": parse_pairs("--env-kwargs", args.env_kwargs),
-        "form": FORM, "family": args.family, "objective": "return",
-        "episodes_of_a_search": episodes, "test_episodes": args.test_episodes,
+        "env_id": args.env_id,
+        "env_kwargs": parse_pairs("--env-kwargs", args.env_kwargs),
+        "form": FORM,
+        "family": args.family,
+        "objective": "return",
+        "episodes_of_a_search": episodes,
+        "test_episodes": args.test_episodes,
         "start": open_loop_record(args.start)["parameters"]["constant"] if args.start else None,
-    }  # fmt: skip
+    }
     restarts = earlier(path, about)
     check_folder(path.parent)
     objective = Objective(args.env_id, about["env_kwargs"], args.family)
-    left = [seed for seed in range(args.restarts) if seed not in [one["seed"] for one in restarts]]
+    done = {restart["seed"] for restart in restarts}
+    left = [seed for seed in range(args.restarts) if seed not in done]
     with tqdm(total=episodes * len(left), unit=" episodes", leave=False, disable=None) as bar:
         for k, seed in enumerate(left):
             bar.set_description(f"{path.stem}, search {seed}")
@@ -247,14 +279,8 @@ def optimise(args: Args) -> dict[str, Any]:
 
 
 def check(args: Args) -> int:
-    """Refuse what does not fit; returns the episodes of a search."""
-    try:
-        import cma  # noqa: F401
-        import tqdm  # noqa: F401
-    except ModuleNotFoundError as error:
-        raise HoofEnvError(
-            f'agents.open_loop needs {error.name}: pip install "hoof-env[train,identify]"'
-        ) from None
+    """Check the arguments and return the episodes of a search."""
+    require("agents.open_loop", "cma", "tqdm")
     check_number("restarts", args.restarts, low=1, high=1000)
     check_number("test_episodes", args.test_episodes, low=2, high=1e6)
     episodes = args.episodes or EPISODES[args.family]
@@ -263,6 +289,7 @@ def check(args: Args) -> int:
 
 
 def search_once(objective: Objective, seed: int, about: dict[str, Any], bar: Any) -> dict[str, Any]:
+    """Search with one seed and return its entry of the file."""
     began = time.monotonic()
     used = time.process_time()
     objective.spent = 0
@@ -271,6 +298,7 @@ def search_once(objective: Objective, seed: int, about: dict[str, Any], bar: Any
         bar.update(count)
         bar.set_postfix(cost=f"{lowest:.3f}")
 
+    # Every second one: a start may lie in a valley without the best gait
     start = about["start"] if seed % 2 else None
     x, cost, interrupted = search(objective, seed, about["episodes_of_a_search"], tick, start)
     parameters = {key: value.tolist() for key, value in objective.decode(x).items()}
@@ -287,19 +315,20 @@ def search_once(objective: Objective, seed: int, about: dict[str, Any], bar: Any
 
 
 def means(episodes: Episodes) -> dict[str, float | None]:
-    figures = {key: float(np.mean([one[key] for one in episodes])) for key in KEPT}
+    """Return the means of `KEPT`, None for one that is infinite."""
+    figures = {key: float(np.mean([episode[key] for episode in episodes])) for key in KEPT}
     return {key: value if math.isfinite(value) else None for key, value in figures.items()}
 
 
 def write(
     path: Path, about: dict[str, Any], objective: Objective, restarts: list[dict[str, Any]]
 ) -> dict[str, Any]:
-    """Write the best of the searches, scored, and all of them; returns what the file holds."""
-    best = min(restarts, key=lambda one: one["cost"])
+    """Write the best of the searches, scored, and all of them; return the content of the file."""
+    best = min(restarts, key=lambda restart: restart["cost"])
     episodes = objective.test(best["parameters"], about["test_episodes"])
     score: dict[str, Any] = {"first_seed": TEST_SEED, "mean": means(episodes), "interval95": {}}
     for key, mean in score["mean"].items():
-        interval = estimate([one[key] for one in episodes]) if mean is not None else None
+        interval = estimate([restart[key] for restart in episodes]) if mean is not None else None
         score["interval95"][key] = [interval.low, interval.high] if interval else None
     content = {
         **about,
@@ -307,8 +336,8 @@ def write(
         "gait": dict(zip(PARAMETERS, best["parameters"]["constant"], strict=True)),
         "dt": objective.leg.dt,
         "score": score,
-        "episodes": sum(one["episodes"] for one in restarts),
-        **{key: round(sum(one[key] for one in restarts), 1) for key in ("wall_s", "cpu_s")},
+        "episodes": sum(restart["episodes"] for restart in restarts),
+        **{key: round(sum(restart[key] for restart in restarts), 1) for key in ("wall_s", "cpu_s")},
         "command": runs.command(),
         "versions": {**runs.versions(), "cma": version("cma")},
         "restarts": restarts,
@@ -318,31 +347,32 @@ def write(
 
 
 def earlier(path: Path, about: dict[str, Any]) -> list[dict[str, Any]]:
-    """The searches of a file that were not interrupted; none if there is no file. `DataFileError`: the file
-    is of something else."""
+    """Return the searches of a file that were not interrupted, an empty list if there is no file;
+    `DataFileError` if the file is of something else."""
     if not path.is_file():
         return []
     with suppress(OSError, ValueError, KeyError, TypeError, AttributeError):
         content = parse_json(path.read_text(encoding="utf-8"))
         if all(content.get(key) == value for key, value in about.items()):
-            return [one for one in content["restarts"] if not one.get("interrupted")]
+            return [restart for restart in content["restarts"] if not restart.get("interrupted")]
     raise DataFileError(f"{path}: expected searches with {about} to go on with; name another --out")
 
 
 def place(args: Args) -> Path:
+    """Return the path of the file."""
     name = f"{args.env_id.rpartition('/')[2]}-{args.family}.json"
     return args.out or Path("runs/open_loop", name)
 
 
 def main(argv: list[str] | None = None) -> None:
+    """Search, and print the searches and the score."""
     import tyro
 
     args = tyro.cli(Args, args=argv, prog="python -m agents.open_loop", description=__doc__)
     content = optimise(args)
-    for one in content["restarts"]:
-        print(
-            f"search {one['seed']}: cost {one['cost']:.3f}, {one['episodes']} episodes, {one['wall_s']:.0f} s"
-        )
+    for restart in content["restarts"]:
+        spent = f"{restart['episodes']} episodes, {restart['wall_s']:.0f} s"
+        print(f"search {restart['seed']}: cost {restart['cost']:.3f}, {spent}")
     for key, mean in content["score"]["mean"].items():
         bounds = content["score"]["interval95"][key]
         print(f"{key:18} " + (f"{mean:.3f} [{bounds[0]:.3f}, {bounds[1]:.3f}]" if bounds else "infinite"))

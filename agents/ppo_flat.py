@@ -1,12 +1,11 @@
-"""Proximal policy optimisation (PPO) in one file, for small networks and fast environments.
+"""Proximal policy optimisation (PPO) for small networks and fast environments.
 
     python -m agents.train --algo ppo_flat
     python -m agents.train --algo ppo_flat --env-id hoof_env/HorseLegFixed-v0 --steps 100000
 
-Read `FlatPPO` first: it plays a rollout, estimates what its actions were worth, improves the networks. It is
-Stable-Baselines3's PPO with networks of tanh and without what they do not need; training loop, buffer,
-policy and files are that library's. What takes time is written out: the gradient of such networks is a dozen
-products of small matrices, and torch spends more time between them than in them.
+Read `FlatPPO` first: it plays a rollout, estimates the advantages of its actions, improves the networks. It
+is Stable-Baselines3's PPO with networks of tanh and without what they do not need; training loop, buffer,
+policy and files are that library's. The kernels of networks and gradient are in agents/perceptrons.py.
 
 Three things differ. Rewards are scaled by all returns up to the end of the rollout, not of the step. Among
 the `locals` of a step a callback finds `new_obs`, `rewards`, `dones`, `infos` and `clipped_actions`, but no
@@ -18,7 +17,6 @@ from __future__ import annotations
 import copy
 import inspect
 from collections.abc import Iterator
-from dataclasses import dataclass
 from typing import Any, ClassVar
 
 import numpy as np
@@ -30,209 +28,32 @@ from stable_baselines3.common.on_policy_algorithm import OnPolicyAlgorithm
 from stable_baselines3.common.policies import ActorCriticPolicy
 from stable_baselines3.common.vec_env import VecNormalize
 from torch import nn
-from torch.nn.utils import parameters_to_vector, vector_to_parameters
 
+from agents.perceptrons import ACTIONS, ADVANTAGE, CHUNK, Floats, Weights, compiled_gradient
 from hoof_env.errors import ParameterError
-from hoof_env.simd.compile import inline_llvm, kernel
 from hoof_env.simd.threads import check_threads, limit_threads, run_together
 
-Floats = NDArray[np.float32]
-
-CHUNK = 1000
-"""Most steps of a batch whose gradient is computed at once, by one thread: their numbers stay in the cache.
-The gradients are added up in order, so any number of threads gives the same bits."""
-
-# of Adam
+# Decay rates of the moments, and the term that keeps Adam from dividing by 0
 BETA1 = 0.9
 BETA2 = 0.999
 EPSILON = 1e-5
 
 LARGEST = np.float32(10.0)
-"""Reward after `Scale`, as in Stable-Baselines3: one failure in a rollout is not to hide all else."""
+"""Largest reward after `Scale`, as in Stable-Baselines3: one failure in a rollout must not hide all else."""
 
 POLICY_KWARGS = {"net_arch", "activation_fn", "log_std_init", "ortho_init"}
-
-LOG_PROB = 0
-ADVANTAGE = 1
-TARGET = 2
-ACTIONS = 3
-"""Columns of what is learnt from, with the actions from the last one on."""
-
-ZERO, HALF, ONE, FAR = (np.float32(number) for number in (0.0, 0.5, 1.0, 100.0))
-C0, A1, A2, A3 = (np.float32(number) for number in (34459425, 4729725, 135135, 990))
-B1, B2, B3, B4 = (np.float32(number) for number in (16216200, 945945, 13860, 45))
-
-
-# Networks, perceptrons with tanh: matrices, shape (outputs, inputs) each, and biases
-
-
-@inline_llvm
-def tanh(x):  # type: ignore[no-untyped-def]
-    """Lambert's continued fraction, the first nine terms, within 8e-6: without a call, so that the compiler
-    does many at once."""
-    x = min(max(x, -FAR), FAR)
-    s = x * x
-    above = x * (C0 + s * (A1 + s * (A2 + s * (A3 + s))))
-    y = above / (C0 + s * (B1 + s * (B2 + s * (B3 + s * B4))))
-    return min(max(y, -ONE), ONE)
-
-
-@inline_llvm
-def forward(x, matrices, biases, outputs):  # type: ignore[no-untyped-def]
-    """What each layer gives for rows of inputs, the hidden ones behind a tanh."""
-    for k in range(len(matrices)):
-        y = outputs[k]
-        bias = biases[k]
-        np.dot(x if k == 0 else outputs[k - 1], matrices[k].T, y)
-        if k < len(matrices) - 1:
-            for i in range(y.shape[0]):
-                for j in range(y.shape[1]):
-                    y[i, j] = tanh(y[i, j] + bias[j])
-        else:
-            for i in range(y.shape[0]):
-                for j in range(y.shape[1]):
-                    y[i, j] += bias[j]
-
-
-@inline_llvm
-def backward(x, matrices, outputs, slopes, by_matrices, by_biases):  # type: ignore[no-untyped-def]
-    """The derivatives by matrices and biases from those by the last outputs, in the last of `slopes`; the
-    others are room for those by the hidden layers."""
-    for k in range(len(matrices) - 1, -1, -1):
-        slope = slopes[k]
-        by_bias = by_biases[k]
-        if k < len(matrices) - 1:
-            np.dot(slopes[k + 1], matrices[k + 1], slope)
-            y = outputs[k]
-            for i in range(slope.shape[0]):
-                for j in range(slope.shape[1]):
-                    slope[i, j] *= ONE - y[i, j] * y[i, j]
-        by_bias[:] = ZERO
-        for i in range(slope.shape[0]):
-            for j in range(slope.shape[1]):
-                by_bias[j] += slope[i, j]
-        np.dot(slope.T, x if k == 0 else outputs[k - 1], by_matrices[k])
-
-
-@inline_llvm
-def loss_of(  # type: ignore[no-untyped-def]
-    means, values, log_std, steps, clip_range, vf_coef, ent_coef, count,
-    by_means, by_values, by_log_std, losses,
-):  # fmt: skip
-    """The loss of Schulman et al. 2017 (Eq. 9) of some of `count` steps, and its derivatives. The columns of
-    `steps` are as `LOG_PROB` and so on say. The entropy is the sum of `log_std`, but for a constant."""
-    by_log_std[:] = -ent_coef * np.float32(len(steps)) / count
-    losses[:] = ZERO
-    for i in range(len(steps)):
-        log_prob = ZERO
-        for k in range(ACTIONS, steps.shape[1]):
-            z = (steps[i, k] - means[i, k - ACTIONS]) * np.exp(-log_std[k - ACTIONS])
-            log_prob -= HALF * z * z + log_std[k - ACTIONS]
-        ratio = np.exp(log_prob - steps[i, LOG_PROB])
-        advantage = steps[i, ADVANTAGE]
-        held = min(max(ratio, ONE - clip_range), ONE + clip_range)
-        losses[0] -= min(ratio * advantage, held * advantage) / count
-        weight = -ratio * advantage / count if ratio * advantage <= held * advantage else ZERO
-        for k in range(len(log_std)):
-            z = (steps[i, ACTIONS + k] - means[i, k]) * np.exp(-log_std[k])
-            by_means[i, k] = weight * z * np.exp(-log_std[k])
-            by_log_std[k] += weight * (z * z - ONE)
-        error = values[i, 0] - steps[i, TARGET]
-        losses[1] += error * error / count
-        by_values[i, 0] = (vf_coef + vf_coef) * error / count
-
-
-def gradient_of(  # type: ignore[no-untyped-def]
-    observations, steps, rows, scale, x, own, actor, critic, log_std,
-    clip_range, vf_coef, ent_coef, count, losses,
-):  # fmt: skip
-    """The loss of these rows, some of the `count` of a batch, and its derivatives, into the rooms of `actor`
-    and `critic`: tuples of matrices, biases, outputs, slopes, and derivatives by matrices and biases.
-    Advantages are normalised by `scale`, their mean and deviation."""
-    for i in range(len(rows)):
-        x[i] = observations[rows[i]]
-        own[i] = steps[rows[i]]
-        own[i, ADVANTAGE] = (own[i, ADVANTAGE] - scale[0]) / scale[1]
-    forward(x, actor[0], actor[1], actor[2])
-    forward(x, critic[0], critic[1], critic[2])
-    loss_of(
-        actor[2][-1], critic[2][-1], log_std[0], own, clip_range, vf_coef, ent_coef, count,
-        actor[3][-1], critic[3][-1], log_std[1], losses,
-    )  # fmt: skip
-    backward(x, actor[0], actor[2], actor[3], actor[4], actor[5])
-    backward(x, critic[0], critic[2], critic[3], critic[4], critic[5])
-
-
-def outputs_of(x, matrices, biases, outputs):  # type: ignore[no-untyped-def]
-    """As `forward`."""
-    forward(x, matrices, biases, outputs)
-
-
-compiled_gradient: Any = kernel(gradient_of, threads=True)
-compiled_outputs: Any = kernel(outputs_of)
-
-
-@dataclass(frozen=True)
-class Network:
-    """Matrices and biases of a perceptron with tanh, views of a vector."""
-
-    matrices: tuple[Floats, ...]
-    biases: tuple[Floats, ...]
-
-    def room(self, rows: int) -> tuple[Floats, ...]:
-        """For what each layer gives."""
-        return tuple(np.zeros((rows, len(bias)), np.float32) for bias in self.biases)
-
-    def __call__(self, x: Floats) -> Floats:
-        """Outputs for rows of inputs, shape (..., inputs)."""
-        rows = x.reshape(-1, x.shape[-1])
-        outputs = []
-        for begin in range(0, len(rows), CHUNK):
-            part = rows[begin : begin + CHUNK]
-            room = self.room(len(part))
-            compiled_outputs(part, self.matrices, self.biases, room)
-            outputs.append(room[-1])
-        return np.concatenate(outputs).reshape(*x.shape[:-1], -1)
-
-
-@dataclass(frozen=True)
-class Weights:
-    """All weights of a policy as one vector, and by name as views of it."""
-
-    vector: Floats
-    actor: Network
-    critic: Network
-    log_std: Floats
-
-    @classmethod
-    def of(cls, policy: Any) -> Weights:
-        """Those of a policy, whose parameters are views of the vector from now on."""
-        vector = parameters_to_vector(policy.parameters()).detach()
-        vector_to_parameters(vector, policy.parameters())
-
-        def network(hidden: nn.Sequential, last: nn.Linear) -> Network:
-            layers = [*(layer for layer in hidden if isinstance(layer, nn.Linear)), last]
-            return Network(
-                tuple(layer.weight.detach().numpy() for layer in layers),
-                tuple(layer.bias.detach().numpy() for layer in layers),
-            )
-
-        hidden = policy.mlp_extractor
-        actor = network(hidden.policy_net, policy.action_net)
-        critic = network(hidden.value_net, policy.value_net)
-        return cls(vector.numpy(), actor, critic, policy.log_std.detach().numpy())
 
 
 # Experience
 
 
 def flat(observations: Any, kept: int = 1) -> Floats:
-    """Observations with all axes but the first ones as one."""
+    """Return observations with all axes but the first `kept` as one."""
     return np.asarray(observations, np.float32).reshape(*observations.shape[:kept], -1)
 
 
 class Scale:
-    """The standard deviation of discounted returns so far, from the first step of an episode to each."""
+    """Standard deviation of the discounted returns so far, from the first step of an episode to each."""
 
     def __init__(self, gamma: float) -> None:
         self.gamma = gamma
@@ -242,12 +63,13 @@ class Scale:
         self.restart()
 
     def restart(self) -> None:
-        """All episodes begin anew."""
+        """Begin all episodes anew."""
         self.returns = np.float32(0.0)
 
     def after(self, rewards: Floats, ended: NDArray[np.bool_]) -> np.float32:
-        """The scale when these steps are counted, too, shape (T, n) both."""
+        """Return the scale that includes these steps; `rewards` and `ended` have shape (T, n)."""
         returns = np.empty_like(rewards)
+        # An episode that has ended contributes nothing to the next return
         goes_on = np.float32(self.gamma) * ~ended
         for t in range(len(rewards)):
             returns[t] = self.returns + rewards[t]
@@ -255,32 +77,35 @@ class Scale:
         count = self.count + returns.size
         mean = float(returns.mean(dtype=np.float64))
         gap = mean - self.mean
-        own = float(returns.var(dtype=np.float64))
+        variance = float(returns.var(dtype=np.float64))
+        # Chan et al.: variances of two samples, pooled with the gap of their means
         between = gap**2 * self.count * returns.size / count
-        self.square = (self.square * self.count + own * returns.size + between) / count
+        self.square = (self.square * self.count + variance * returns.size + between) / count
         self.mean = self.mean + gap * returns.size / count
         self.count = count
         return np.float32(np.sqrt(self.square + 1e-8))
 
 
 class UnusedAdam(torch.optim.Adam):
-    """Torch's Adam in name: `FlatPPO.descend` takes its steps. Making a real one loads torch's compiler, a
-    third of the time from the start of Python to the first step."""
+    """Torch's Adam in name only: `FlatPPO.descend` takes its steps. Making a real one loads torch's compiler,
+    a third of the time from the start of Python to the first step."""
 
     def __init__(self, params: Any, lr: float = 1e-3, **kwargs: Any) -> None:
         usual = inspect.signature(torch.optim.Adam.__init__).parameters
-        defaults = {name: one.default for name, one in usual.items() if name not in ("self", "params")}
+        defaults = {
+            name: parameter.default for name, parameter in usual.items() if name not in ("self", "params")
+        }
         self.defaults = {**defaults, "lr": lr, **kwargs}
         self.state: Any = {}
         self.param_groups = [{"params": list(params), **self.defaults}]
 
     def state_dict(self) -> dict[str, Any]:
-        """That of an Adam that has not taken a step."""
+        """Return the state of an Adam that has not taken a step."""
         (group,) = self.param_groups
         return {"state": {}, "param_groups": [{**group, "params": list(range(len(group["params"])))}]}
 
     def load_state_dict(self, state_dict: Any) -> None:
-        """Take nothing: there is nothing to go on with."""
+        """Ignore the state: there is nothing to go on with."""
 
 
 class FlatPolicy(ActorCriticPolicy):
@@ -291,7 +116,7 @@ class FlatPolicy(ActorCriticPolicy):
 
 
 class FlatPPO(OnPolicyAlgorithm):
-    """PPO; arguments as those of Stable-Baselines3's, which its policies are loaded as.
+    """PPO with the arguments of Stable-Baselines3's, as which its policies are loaded.
 
     Args:
         norm_reward: divide rewards by a `Scale`, as `VecNormalize` would.
@@ -337,6 +162,7 @@ class FlatPPO(OnPolicyAlgorithm):
             raise ParameterError(f"policy_kwargs: expected some of {known}, got {', '.join(unknown)}")
         if batch_size < 2:
             raise ParameterError(f"batch_size: expected 2 or more, for its advantages, got {batch_size!r}")
+        # A reward scaled twice would have the wrong size
         if norm_reward and isinstance(env, VecNormalize) and env.norm_reward:
             raise ParameterError("norm_reward: expected False where `normalize` does it, got both")
         self.batch_size = batch_size
@@ -346,12 +172,25 @@ class FlatPPO(OnPolicyAlgorithm):
         self.num_threads = None if num_threads is None else check_threads(num_threads)
         self.random = np.random.default_rng(seed)
         self.scale = Scale(gamma)
-        self.moments: Floats | None = None  # of the gradient, for Adam
+        self.moments: Floats | None = None  # moments of the gradient, for Adam
         super().__init__(
-            policy, env, learning_rate, n_steps, gamma, gae_lambda, ent_coef, vf_coef, max_grad_norm,
-            use_sde=False, sde_sample_freq=-1, policy_kwargs=kwargs, seed=seed, device="cpu",
-            _init_setup_model=_init_setup_model, supported_action_spaces=(spaces.Box,),
-        )  # fmt: skip
+            policy,
+            env,
+            learning_rate,
+            n_steps,
+            gamma,
+            gae_lambda,
+            ent_coef,
+            vf_coef,
+            max_grad_norm,
+            use_sde=False,
+            sde_sample_freq=-1,
+            policy_kwargs=kwargs,
+            seed=seed,
+            device="cpu",
+            _init_setup_model=_init_setup_model,
+            supported_action_spaces=(spaces.Box,),
+        )
 
     def _setup_model(self) -> None:
         super()._setup_model()
@@ -365,10 +204,10 @@ class FlatPPO(OnPolicyAlgorithm):
     def _setup_learn(self, total_timesteps: int, callback: Any = None, *args: Any, **kwargs: Any) -> Any:
         self._load_kernels()
         before = self._last_obs
-        found = super()._setup_learn(total_timesteps, callback, *args, **kwargs)
+        setup = super()._setup_learn(total_timesteps, callback, *args, **kwargs)
         if self._last_obs is not before:  # the environments were reset
             self.scale.restart()
-        return found
+        return setup
 
     def _load_kernels(self) -> None:
         """Have the kernels compiled, or loaded, before a training's clock starts; nothing is learned."""
@@ -382,8 +221,8 @@ class FlatPPO(OnPolicyAlgorithm):
     def collect_rollouts(
         self, env: Any, callback: BaseCallback, rollout_buffer: Any, n_rollout_steps: int
     ) -> bool:
-        """Go on from the last observation for so many steps and fill the buffer; False where the callback
-        ends the training."""
+        """Play `n_rollout_steps` steps from the last observation and fill the buffer; return False if the
+        callback ends the training."""
         box = self.action_space
         weights = self.weights
         buffer = rollout_buffer
@@ -391,7 +230,8 @@ class FlatPPO(OnPolicyAlgorithm):
         buffer.reset()
         callback.on_rollout_start()
         ended = np.zeros(buffer.rewards.shape, bool)
-        cut_off = []  # by a time limit: step, environment and its last observation
+        cut_off = []  # episodes cut off by a time limit: step, environment and its last observation
+        # All of a rollout at once, which is one call instead of one a step
         noise = self.random.standard_normal(buffer.actions.shape, np.float32)
         buffer.log_probs[:] = -0.5 * np.square(noise).sum(-1) - weights.log_std.sum()
         noise *= np.exp(weights.log_std)
@@ -421,8 +261,10 @@ class FlatPPO(OnPolicyAlgorithm):
             scale = self.scale.after(buffer.rewards, ended)
             buffer.rewards[:] = np.clip(buffer.rewards / scale, -LARGEST, LARGEST)
         if cut_off:
+            # Bootstrap of episodes that a time limit cut off, as Stable-Baselines3 does it
             times, envs, last = zip(*cut_off, strict=True)
             buffer.rewards[[*times], [*envs]] += np.float32(self.gamma) * critic(flat(np.array(last)))[:, 0]
+        # All at once, after the rollout: a call for each step would cost more than its product
         buffer.values[:] = critic(flat(buffer.observations, 2))[..., 0]
         buffer.compute_returns_and_advantage(torch.from_numpy(critic(flat(new_obs))), dones)
         callback.update_locals(locals())
@@ -430,11 +272,11 @@ class FlatPPO(OnPolicyAlgorithm):
         return True
 
     def train(self) -> None:
-        """Steps of Adam on shuffled batches."""
+        """Take steps of Adam on shuffled batches."""
         buffer = self.rollout_buffer
         progress = self._current_progress_remaining
         columns = (buffer.log_probs, buffer.advantages, buffer.returns)
-        steps = np.concatenate([*(one[..., None] for one in columns), buffer.actions], 2)
+        steps = np.concatenate([*(column[..., None] for column in columns), buffer.actions], 2)
         steps = steps.reshape(-1, steps.shape[-1])
         observations = buffer.observations.reshape(len(steps), -1)
         rate = self.lr_schedule(progress)
@@ -452,14 +294,15 @@ class FlatPPO(OnPolicyAlgorithm):
         self.logger.record("train/learning_rate", rate)
 
     def batches(self, count: int) -> Iterator[NDArray[np.int64]]:
-        """All of `count` steps in a random order, `batch_size` at a time."""
+        """Yield all of `count` steps in a random order, `batch_size` at a time."""
         order = self.random.permutation(count)
         for begin in range(0, count, self.batch_size):
             if count - begin > 1:  # advantages are normalised over a batch
                 yield order[begin : begin + self.batch_size]
 
     def descend(self, gradient: Floats, rate: float) -> None:
-        """A step of Adam (Kingma & Ba 2015), the gradient scaled down to `max_grad_norm`."""
+        """Take a step of Adam (Kingma & Ba 2015), the gradient scaled down to `max_grad_norm`."""
+        # As torch's clip_grad_norm_
         gradient *= min(1.0, self.max_grad_norm / (float(np.linalg.norm(gradient)) + 1e-6))
         self._n_updates += 1
         assert self.moments is not None
@@ -472,7 +315,11 @@ class FlatPPO(OnPolicyAlgorithm):
 
 
 class Gradient:
-    """The gradient of the loss over a batch, `vector`."""
+    """Gradient of the loss over a batch.
+
+    Attributes:
+        vector: the gradient, in the order of the weights' vector.
+    """
 
     def __init__(self, model: FlatPPO, clip_range: float) -> None:
         self.model = model
@@ -480,34 +327,40 @@ class Gradient:
         self.parts: dict[tuple[int, int], tuple[Any, ...]] = {}  # rooms, by chunk and its size
 
     def compute(self, observations: Floats, steps: Floats, chosen: NDArray[np.int64]) -> Floats:
-        """Compute it for the chosen rows; returns the losses of policy and value."""
+        """Compute the gradient for the chosen rows; return the losses of policy and value."""
         model = self.model
         log_std = self.model.weights.log_std
         advantages = steps[chosen, ADVANTAGE]
         scale = np.array([advantages.mean(), advantages.std(ddof=1) + 1e-8], np.float32)
         numbers = (self.clip_range, model.vf_coef, model.ent_coef, len(chosen))
         constants = [np.float32(number) for number in numbers]
+        # The number of chunks depends on the batch alone, never on threads
         chunks = np.array_split(chosen, -(-len(chosen) // CHUNK))
         parts = [self.part(k, len(rows)) for k, rows in enumerate(chunks)]
         calls = [
-            (observations, steps, rows, scale, *room, (log_std, own.log_std), *constants, losses)
-            for rows, (own, room, losses) in zip(chunks, parts, strict=True)
+            (observations, steps, rows, scale, *room, (log_std, derivatives.log_std), *constants, losses)
+            for rows, (derivatives, room, losses) in zip(chunks, parts, strict=True)
         ]
         threads = limit_threads(model.num_threads or torch.get_num_threads())
         run_together(compiled_gradient, calls, threads)
-        self.vector = np.sum([own.vector for own, _, _ in parts], 0)
+        # In the order of the chunks, whichever thread was first: the same bits on any number of threads
+        self.vector = np.sum([derivatives.vector for derivatives, _, _ in parts], 0)
         return np.sum([losses for *_, losses in parts], 0)
 
     def part(self, number: int, rows: int) -> tuple[Any, ...]:
-        """Room for a chunk of a batch: derivatives, what is between, losses."""
+        """Return the arrays of a chunk of a batch: derivatives, intermediate results, losses."""
         if (number, rows) not in self.parts:
             model = self.model
-            own = Weights.of(copy.deepcopy(self.model.policy))
+            # A copy of the policy has the layout of its derivatives
+            derivatives = Weights.of(copy.deepcopy(self.model.policy))
             widths = model.weights.actor.matrices[0].shape[1], ACTIONS + model.weights.log_std.size
             room: list[Any] = [np.zeros((rows, width), np.float32) for width in widths]
             room += [
                 (net.matrices, net.biases, net.room(rows), net.room(rows), by.matrices, by.biases)
-                for net, by in ((model.weights.actor, own.actor), (model.weights.critic, own.critic))
+                for net, by in (
+                    (model.weights.actor, derivatives.actor),
+                    (model.weights.critic, derivatives.critic),
+                )
             ]
-            self.parts[number, rows] = own, room, np.zeros(2, np.float32)
+            self.parts[number, rows] = derivatives, room, np.zeros(2, np.float32)
         return self.parts[number, rows]

@@ -1,4 +1,4 @@
-"""The folder of one training run: what stands in it, how it is written and how a model is read back.
+"""Folder of one training run: its files, how they are written and how a model is read back.
 
     policy.*          the trained policy as plain data (hoof_env/saved_policy.py): this is what is loaded
     model.zip         the trained model (Stable-Baselines3); vecnormalize.pkl: statistics, if normalised
@@ -45,7 +45,7 @@ CONFIG = "config.yml"
 RECORD = "run.json"
 MONITOR = "monitor.csv"
 FILES = (MODEL, WEIGHTS, ABOUT, CONFIG, RECORD, MONITOR)
-"""What a run without normalisation leaves, TensorBoard's files aside."""
+"""Files of a finished run without normalisation, except TensorBoard's."""
 
 DEFAULT_ENV = "hoof_env/HorseLeg-v0"
 
@@ -54,11 +54,13 @@ PACKAGES = ("hoof-env", "numpy", "gymnasium", "numba", "stable-baselines3", "sb3
 
 @contextmanager
 def alone(folder: Path) -> Iterator[None]:
-    """The folder is there and nobody else works in it meanwhile, else `OutputError`; a process that is killed
-    leaves it free. A block that fails before it has written anything leaves nothing behind."""
+    """Create the folder and hold its lock, so that no other process works in it, else `OutputError`; a
+    process that is killed leaves it free. A block that fails before it has written anything leaves nothing
+    behind."""
     from filelock import FileLock, Timeout
 
-    made = [path for path in (folder / ".lock", folder, *folder.parents) if not path.exists()]
+    # What does not exist yet, deepest first: exactly this is removed again if nothing comes of it
+    missing = [path for path in (folder / ".lock", folder, *folder.parents) if not path.exists()]
     check_folder(folder)
     folder.mkdir(parents=True, exist_ok=True)
     lock = FileLock(folder / ".lock")
@@ -66,13 +68,13 @@ def alone(folder: Path) -> Iterator[None]:
         lock.acquire(timeout=0)
     except Timeout:
         raise OutputError(f"{folder}: another process is at work there; choose another folder") from None
-    except NotImplementedError:  # of filelock, where a system has none
+    except NotImplementedError:  # filelock raises it if a system has no locks
         warnings.warn(f"{folder}: a file system that has no locks; keep other processes out", stacklevel=3)
     try:
         yield
     except BaseException:
         with suppress(OSError):  # a folder that holds something stays
-            for path in made:
+            for path in missing:
                 path.rmdir() if path.is_dir() else path.unlink()
         raise
     finally:
@@ -80,7 +82,7 @@ def alone(folder: Path) -> Iterator[None]:
 
 
 def make_env(env_id: str, **kwargs: Any) -> gym.Env[Any, Any]:
-    """`gymnasium.make`; `ParameterError` for an unknown id, or an argument that the environment does not
+    """Call `gymnasium.make`; `ParameterError` for an unknown id, or an argument that the environment does not
     take."""
     try:
         return gym.make(env_id, **kwargs)
@@ -89,9 +91,11 @@ def make_env(env_id: str, **kwargs: Any) -> gym.Env[Any, Any]:
 
 
 def make_vec_env(env_id: str, n_envs: int, num_threads: int = 1, **kwargs: Any) -> Any:
-    """Environments side by side as Stable-Baselines3's `VecEnv`: in one call and on so many threads where the
-    id has a vector environment of this package, else one after the other. A pipe to another process would
-    cost more."""
+    """Return environments side by side as Stable-Baselines3's `VecEnv`.
+
+    They are stepped in one call and on `num_threads` threads if the id has a vector environment of this
+    package, else one after the other. A pipe to another process would cost more.
+    """
     with make_env(env_id, **kwargs) as env:
         spec = env.spec
     if spec is not None and str(spec.vector_entry_point).startswith("hoof_env."):
@@ -103,20 +107,23 @@ def make_vec_env(env_id: str, n_envs: int, num_threads: int = 1, **kwargs: Any) 
         return many
     from stable_baselines3.common.vec_env import DummyVecEnv
 
+    # Checks are for a first look at an environment, and slow
     return DummyVecEnv([lambda: make_env(env_id, disable_env_checker=True, **kwargs)] * n_envs)
 
 
 def warm_up(env: gym.Env[Any, Any]) -> None:
+    """Compile or load the kernels by one step."""
     env.reset(seed=0)
     env.step(env.action_space.sample())
 
 
 def command() -> str:
+    """Return the command that runs, as a user would type it."""
     return shlex.join(["python", *sys.orig_argv[1:]])
 
 
 def versions() -> dict[str, str]:
-    """Python, platform, the packages that a result depends on, and the git commit where there is one."""
+    """Return Python, platform, the packages that a result depends on, and the git commit if there is one."""
     packages = {"python": platform.python_version(), "platform": f"{platform.system()} {platform.machine()}"}
     for package in PACKAGES:
         with suppress(PackageNotFoundError):
@@ -148,16 +155,18 @@ def write_csv(
 
 
 def write_record(folder: Path, record: dict[str, Any]) -> None:
+    """Write run.json."""
     write_text(folder / RECORD, json.dumps(record, indent=2) + "\n")
 
 
 def read_episodes(folder: Path) -> NDArray[np.float64]:
-    """The episodes of a training, from monitor.csv: steps of the training when each ended, its return and the
-    seconds of the training by then, shape (episodes, 3)."""
+    """Read the episodes of a training from monitor.csv, shape (episodes, 3): steps of the training at the end
+    of each, its return, and the seconds of the training by then."""
     with (folder / MONITOR).open(encoding="utf-8", newline="") as file:
         next(file)  # a comment
         rows = [(float(row["l"]), float(row["r"]), float(row["t"])) for row in csv.DictReader(file)]
     episodes = np.array(rows, dtype=float).reshape(-1, 3)
+    # Lengths to steps of the training
     episodes[:, 0] = episodes[:, 0].cumsum()
     return episodes
 
@@ -170,7 +179,7 @@ def save_model(model: Any, path: Path) -> None:
 
 
 def write_model(model: Any, folder: Path, name: str = MODEL) -> None:
-    """As `save_model`, straight into `folder`."""
+    """Write the files of `save_model` straight into `folder`."""
     model.save(folder / name)
     save_policy(model, folder)
     if model.get_vec_normalize_env() is not None:

@@ -56,8 +56,8 @@ def play(
     seeds: Sequence[int],
     tick: Any = lambda: None,
 ) -> list[dict[str, float]]:
-    """One episode per seed, which starts as the policy wants it; its return and its summary. `tick` is called
-    after each."""
+    """Play one episode per seed, with the start of the policy; return the return and the summary of each.
+    `tick` is called after each."""
     episodes = []
     for seed in seeds:
         observation, info = env.reset(seed=seed, options=start_of(policy))
@@ -67,7 +67,7 @@ def play(
         while not done:
             action, _ = policy.predict(observation, episode_start=start, deterministic=True)
             observation, reward, terminated, truncated, info = env.step(action)
-            total += float(np.asarray(reward).sum())  # of a vector, all objectives
+            total += float(np.asarray(reward).sum())  # a vector reward: the sum of all objectives
             start = np.zeros(1, bool)
             done = terminated or truncated
         episodes.append({"return": total, **_with_stance_peak(info.get("episode_summary", {}))})
@@ -76,10 +76,20 @@ def play(
 
 
 def score_vector(policy: Any, env_id: str, seeds: Sequence[int], **env_kwargs: Any) -> list[dict[str, float]]:
-    """One episode per seed, as `play` gives it, in batches of the native vector environment where the id has
-    one. The policy, or the name or path of one as `find_policy` takes them, has Stable-Baselines3's `predict`
-    for many observations, shape (n, k), and `episode_start`, shape (n,). `ParameterError`, `DataFileError`:
-    unknown environment or policy, or one that does not fit."""
+    """Play one episode per seed, as `play` does, in batches of the native vector environment if the id has
+    one.
+
+    Args:
+        policy: one with Stable-Baselines3's `predict` for many observations, shape (n, k), and
+            `episode_start`, shape (n,), or its name or path as `find_policy` takes them.
+        env_id: id of the environment.
+        seeds: seeds of the episodes.
+        **env_kwargs: arguments of the environment.
+
+    Raises:
+        ParameterError: unknown environment or policy.
+        DataFileError: a model that does not fit.
+    """
     with runs.make_env(env_id, **env_kwargs) as env:
         if isinstance(policy, str):
             policy = find_policy(policy, env, env_id)
@@ -89,6 +99,7 @@ def score_vector(policy: Any, env_id: str, seeds: Sequence[int], **env_kwargs: A
         envs = None
         for first in range(0, len(seeds), ROWS):
             batch = list(seeds[first : first + ROWS])
+            # The last batch may be smaller
             if envs is None or envs.num_envs != len(batch):
                 envs = make_rows(env_id, len(batch), **env_kwargs)
             episodes += play(env, policy, batch) if envs is None else play_rows(envs, policy, batch)
@@ -96,7 +107,7 @@ def score_vector(policy: Any, env_id: str, seeds: Sequence[int], **env_kwargs: A
 
 
 def make_rows(env_id: str, num_envs: int, **env_kwargs: Any) -> HorseLegVectorEnv | None:
-    """The native vector environment of an id; None where there is none."""
+    """Return the native vector environment of an id, None if there is none."""
     with suppress(gym.error.Error):
         many: dict[str, Any] = {"num_envs": num_envs, "vectorization_mode": "vector_entry_point"}
         envs = gym.make_vec(env_id, **many, **env_kwargs).unwrapped
@@ -106,7 +117,7 @@ def make_rows(env_id: str, num_envs: int, **env_kwargs: Any) -> HorseLegVectorEn
 
 
 def play_rows(envs: HorseLegVectorEnv, policy: Any, seeds: Sequence[int]) -> list[dict[str, float]]:
-    """`score_vector` with an environment that is there already, one row for each seed."""
+    """Play as `score_vector` does in an environment with one row for each seed."""
     observation, _ = envs.reset(seed=list(seeds), options=start_of(policy))
     start = np.ones(envs.num_envs, bool)
     going = np.ones(envs.num_envs, bool)
@@ -123,18 +134,20 @@ def play_rows(envs: HorseLegVectorEnv, policy: Any, seeds: Sequence[int]) -> lis
             summary = {key: float(x[row]) for key, x in columns.items() if not key.startswith("_")}
             episodes[row] = {"return": float(total[row]), **_with_stance_peak(summary)}
         going &= ~ended
+        # A row that has ended begins a new episode, which a policy with a memory must know
         start = terminated | truncated
     return episodes
 
 
 def _with_stance_peak(summary: Mapping[str, float]) -> dict[str, float]:
+    """Return a summary with the mean of the stances' highest forces [N]."""
     if "stances" not in summary:
         return dict(summary)
     return {**summary, "stance_peak_n": summary["stance_peak_sum_n"] / max(summary["stances"], 1.0)}
 
 
 def is_model(name: str) -> bool:
-    """Whether a policy's name is the path of a model rather than that of a scripted policy or of a gait."""
+    """True if a policy's name is the path of a model, not that of a scripted policy or of a gait."""
     is_path = (
         name.lower().endswith((".zip", ".onnx"))
         or Path(name).name != name
@@ -144,7 +157,7 @@ def is_model(name: str) -> bool:
 
 
 def read_policy_record(name: str) -> dict[str, Any]:
-    """What a policy's file says of itself, env_id and env_kwargs among it; empty for a scripted policy.
+    """Return the record in a policy's file, env_id and env_kwargs among it; empty for a scripted policy.
     `DataFileError`: no such model or gait."""
     if name.endswith(".json"):
         return open_loop_record(Path(name))
@@ -152,8 +165,12 @@ def read_policy_record(name: str) -> dict[str, Any]:
 
 
 def find_policy(name: str, env: gym.Env[Any, Any], env_id: str) -> Any:
-    """A policy as `hoof_env.records.find_policy` takes it, or a model of any environment by its path.
-    `ParameterError`: unknown name. `DataFileError`: no such model or gait, or one that does not fit."""
+    """Return a policy as `hoof_env.records.find_policy` does, or a model of any environment by its path.
+
+    Raises:
+        ParameterError: unknown name.
+        DataFileError: no such model or gait, or one that does not fit.
+    """
     if is_model(name):
         return find_saved(Path(name)).load(env, env_id)
     if not hasattr(env.unwrapped, "gaits"):
@@ -168,6 +185,8 @@ def find_policy(name: str, env: gym.Env[Any, Any], env_id: str) -> Any:
 
 @dataclass(frozen=True)
 class Args:
+    """Arguments of the command."""
+
     policy: Positional[tuple[str, ...]]
     """names of scripted policies, paths of gaits and trained models, or MODULE:NAME"""
     env_id: str | None = None
@@ -180,7 +199,7 @@ class Args:
 
 @dataclass(frozen=True)
 class Function:
-    """A policy from a Python function of observations, shape (n, k), that returns actions, a row each."""
+    """Policy from a Python function of observations, shape (n, k), that returns actions, a row each."""
 
     name: str
     act: Callable[[Any], Any]
@@ -189,7 +208,8 @@ class Function:
     def predict(
         self, observation: Any, state: Any = None, episode_start: Any = None, deterministic: bool = True
     ) -> tuple[Any, Any]:
-        """Actions for observations, shape (n, k) or (k,)."""
+        """Return actions for observations, shape (n, k) or (k,); `ParameterError` if the function does not
+        fit."""
         rows = np.atleast_2d(observation)
         try:
             actions = np.asarray(self.act(rows), np.float32)
@@ -207,13 +227,15 @@ class Function:
 
 
 def is_function(name: str) -> bool:
+    """True if a policy's name has the form MODULE:NAME."""
     module, _, function = name.partition(":")
     return function.isidentifier() and all(part.isidentifier() for part in module.split("."))
 
 
 def find_function(name: str, actions: int) -> Function:
-    """The function MODULE:NAME, of this folder or installed. `ParameterError` if there is none."""
+    """Return the function MODULE:NAME, of this folder or installed; `ParameterError` if there is none."""
     module, _, function = name.partition(":")
+    # MODULE may lie in the working folder, which not every interpreter searches
     if "" not in sys.path:
         sys.path.insert(0, "")
     try:
@@ -226,10 +248,11 @@ def find_function(name: str, actions: int) -> Function:
 
 
 def find_same(name: str, env: gym.Env[Any, Any], env_id: str) -> Any:
-    """A policy that was made for just this environment, or for none. `DataFileError`: for another id, leg,
-    setting or version."""
+    """Return a policy that was made for just this environment, or for none; `DataFileError` if it was made
+    for another id, leg, setting or version."""
     if is_function(name):
         return find_function(name, gym.spaces.flatdim(env.action_space))
+    # What is a warning for a player is an error for a score
     with warnings.catch_warnings():
         warnings.filterwarnings("error", ".*(trained with|found for)", UserWarning)
         try:
@@ -239,8 +262,13 @@ def find_same(name: str, env: gym.Env[Any, Any], env_id: str) -> Any:
 
 
 def score(args: Args) -> list[tuple[str, list[dict[str, float]]]]:
-    """The episodes of each policy; says where they are played. `ParameterError`, `DataFileError`: an argument
-    or a policy does not fit; then nothing has been played. `OutputError`: the file cannot be written."""
+    """Play the episodes of each policy, and print where they are played.
+
+    Raises:
+        ParameterError: an argument or a policy does not fit; nothing has been played.
+        DataFileError: a model does not fit; nothing has been played.
+        OutputError: the file cannot be written.
+    """
     from tqdm import tqdm
 
     if args.csv:
@@ -251,10 +279,10 @@ def score(args: Args) -> list[tuple[str, list[dict[str, float]]]]:
     for name in filter(is_model, read):
         if not read[name].get("env_id"):
             warnings.warn(f"policy {name}: nothing says what it was trained for", stacklevel=2)
-    file, record = next(((name, one) for name, one in read.items() if one), ("", {}))
-    asked, own = environment_of(file, record, args.env_id)
+    file, record = next(((name, record_of) for name, record_of in read.items() if record_of), ("", {}))
+    asked, trained_kwargs = environment_of(file, record, args.env_id)
     env_id = asked or runs.DEFAULT_ENV
-    env_kwargs = parse_pairs("--env-kwargs", args.env_kwargs) or own
+    env_kwargs = parse_pairs("--env-kwargs", args.env_kwargs) or trained_kwargs
     with runs.make_env(env_id, **env_kwargs) as env:
         policies = {name: find_same(name, env, env_id) for name in args.policy}
     with_what = f" with {env_kwargs}" if env_kwargs else ""
@@ -264,28 +292,30 @@ def score(args: Args) -> list[tuple[str, list[dict[str, float]]]]:
 
 
 def lines(scored: Sequence[tuple[str, list[dict[str, float]]]]) -> str:
-    """The table: a line for each policy, with intervals over episodes, and one for all trained ones, the
-    interquartile mean over these with its interval."""
+    """Return the table: a line for each policy, with intervals over episodes, and one for all trained ones,
+    the interquartile mean over these with its interval."""
     rows = [Scored(name, over_episodes(episodes)) for name, episodes in scored]
     trained = [mean_figures(episodes) for name, episodes in scored if is_model(name)]
+    # Scripted policies and gaits are no seeds of an algorithm
     if len(trained) > 1:
         rows.append(Scored(f"IQM of {len(trained)}", over_seeds(trained), trained))
     titles = ["policy", "return", *(title for title, *_ in TABLE.values())]
-    return markdown_table(titles, [[one.name, one.intervals["return"].text(), *cells(one)] for one in rows])
+    return markdown_table(titles, [[row.name, row.intervals["return"].text(), *cells(row)] for row in rows])
 
 
 def main(argv: list[str] | None = None) -> None:
+    """Score, print and write."""
     import tyro
 
     args = tyro.cli(Args, args=argv, prog="python -m agents.score", description=__doc__)
     scored = score(args)
     print(lines(scored))
     if args.csv:
-        rows = [
-            {"policy": name, "episode": seed, **{key: one[key] for key in PUBLISHED if key in one}}
-            for name, episodes in scored
-            for seed, one in zip(FINAL_SEEDS, episodes, strict=True)
-        ]
+        rows: list[dict[str, Any]] = []
+        for name, episodes in scored:
+            for seed, figures in zip(FINAL_SEEDS, episodes, strict=True):
+                published = {key: figures[key] for key in PUBLISHED if key in figures}
+                rows.append({"policy": name, "episode": seed, **published})
         runs.write_csv(args.csv, ("policy", "episode", *PUBLISHED), rows)
         print(f"written: {args.csv}")
 

@@ -19,7 +19,7 @@ Algorithm = Literal["ppo", "ppo_flat", "sac", "td3", "tqc"]  # `ALGORITHMS` and 
 
 
 def algorithm_class(name: str) -> Any:
-    """As `saved_policy.algorithm_class`, and `agents.ppo_flat`."""
+    """Return the class of an algorithm: those of `saved_policy.algorithm_class`, and `agents.ppo_flat`."""
     if name != "ppo_flat":
         return library_class(name)
     from agents.ppo_flat import FlatPPO
@@ -29,7 +29,7 @@ def algorithm_class(name: str) -> Any:
 
 @dataclass(frozen=True)
 class TrainingArgs:
-    """What every command that trains takes."""
+    """Arguments of every command that trains."""
 
     env_id: str = "hoof_env/HorseLeg-v0"
     """registered environment; module:id imports the module first"""
@@ -52,14 +52,18 @@ COUNTED = ("n_epochs", "n_steps", "batch_size", "buffer_size", "policy_delay")
 NORMALIZE = {"training": bool, "norm_obs": bool, "norm_reward": bool} | dict.fromkeys(
     ("clip_obs", "clip_reward", "gamma", "epsilon"), (int, float)
 )
-"""What the key `normalize` may hold: arguments of `VecNormalize` and their kinds."""
+"""Arguments of `VecNormalize` that the key `normalize` may hold, and their types."""
 SCHEDULED = ("learning_rate", "clip_range", "clip_range_vf")
 """Keys that may hold `lin_<x>`: falling linearly from x to zero over the training."""
 
 
 def load_settings(path: Path, env_id: str) -> dict[str, Any]:
-    """The entry of `env_id` in the YAML file at `path`, else its `default`, as plain data. `DataFileError`:
-    no such file, not YAML, or neither entry is a mapping with n_envs, n_timesteps and policy."""
+    """Return the entry of `env_id` in the YAML file at `path`, else its `default`, as plain data.
+
+    Raises:
+        DataFileError: there is no such file, it is not YAML, or neither entry is a mapping with n_envs,
+            n_timesteps and policy.
+    """
     try:
         entries = yaml.safe_load(path.read_text(encoding="utf-8"))
     except (OSError, UnicodeDecodeError, yaml.YAMLError, RecursionError) as error:
@@ -78,8 +82,12 @@ def load_settings(path: Path, env_id: str) -> dict[str, Any]:
 
 
 def model_arguments(settings: Mapping[str, Any], actions: int = 1) -> dict[str, Any]:
-    """The part of `settings` that the algorithm's constructor takes; schedules, noise on `actions` numbers
-    and network arguments are built. `DataFileError`: one of them, or a count, is not in the zoo's form."""
+    """Return the part of `settings` that the algorithm's constructor takes; schedules, noise on `actions`
+    numbers and network arguments are built.
+
+    Raises:
+        DataFileError: one of them, or a count, is not in the zoo's form.
+    """
     from stable_baselines3.common.utils import LinearSchedule
 
     arguments = {
@@ -97,6 +105,7 @@ def model_arguments(settings: Mapping[str, Any], actions: int = 1) -> dict[str, 
         arguments["action_noise"] = _action_noise(kind, spread, actions)
     for key in SCHEDULED:
         value = arguments.get(key)
+        # Numbers are constant, texts are schedules
         if isinstance(value, str):
             try:
                 kind, start = value.split("_")
@@ -113,21 +122,25 @@ def model_arguments(settings: Mapping[str, Any], actions: int = 1) -> dict[str, 
 
 
 def normalize_arguments(settings: Mapping[str, Any]) -> dict[str, Any] | None:
-    """Arguments of `VecNormalize` as the key `normalize` of `settings` has them; None where it is false.
-    `DataFileError`: it is neither true or false nor a mapping of such arguments."""
-    given = settings.get("normalize") or False
-    arguments = {} if isinstance(given, bool) else given
+    """Return the arguments of `VecNormalize` in the key `normalize` of `settings`, None if it is false.
+
+    Raises:
+        DataFileError: it is neither true or false nor a mapping of such arguments.
+    """
+    normalize = settings.get("normalize") or False
+    arguments = {} if isinstance(normalize, bool) else normalize
     if not isinstance(arguments, Mapping) or not all(
         isinstance(value, NORMALIZE.get(key, ())) for key, value in arguments.items()
     ):
         raise DataFileError(
             f"hyperparameter normalize: expected true, false or a mapping of {', '.join(NORMALIZE)}, "
-            f"got {given!r}"
+            f"got {normalize!r}"
         )
-    return {"gamma": settings.get("gamma", 0.99), **arguments} if given else None
+    return {"gamma": settings.get("gamma", 0.99), **arguments} if normalize else None
 
 
 def _action_noise(kind: Any, spread: Any, actions: int) -> Any:
+    """Return the noise on `actions` numbers; `DataFileError` if kind or spread is malformed."""
     from stable_baselines3.common.noise import NormalActionNoise, OrnsteinUhlenbeckActionNoise
 
     known = {"normal": NormalActionNoise, "ornstein-uhlenbeck": OrnsteinUhlenbeckActionNoise}
@@ -144,6 +157,7 @@ def _dict_call(text: str) -> dict[str, Any]:
     from torch import nn
 
     def value(node: ast.expr) -> Any:
+        # Literals and nn.<Module> only: nothing of a file is called
         match node:
             case ast.Call(func=ast.Name(id="dict"), args=[], keywords=keywords):
                 return {str(item.arg): value(item.value) for item in keywords}

@@ -5,8 +5,8 @@
 
 The best of an id is that with the highest mean return in episodes on which nothing is reported. Its folder
 agents/policies/NAME, written whole or not at all, holds the exported policy and its weights as plain data,
-how it was trained, its returns beside those of gaits and how far other machines may be off, a model card, a
-curve and a film. agents/policies/README.md lists all that are there.
+how it was trained, its returns with those of gaits and how far other machines may be off, a model card, a
+curve and a film. agents/policies/README.md lists all shipped policies.
 """
 
 from __future__ import annotations
@@ -25,10 +25,10 @@ import numpy as np
 from tyro.conf import Positional
 
 from agents import runs
-from agents.baselines_report import draw_learning_curve, render_template, training_length
 from agents.command import run
 from agents.evaluate import METRICS, Score, cell, to_json
 from agents.export import about, write_policy
+from agents.pages import draw_learning_curve, render_template, training_length
 from agents.score import FINAL_SEEDS as SCORE_SEEDS
 from agents.score import score_vector
 from agents.statistics import Interval
@@ -46,16 +46,17 @@ SHOWN = ("return", "distance_m", "stance_peak_n", "weight_share", "cost_of_trans
 """Columns of the card's table, keys of `METRICS`."""
 
 CHOOSING_SEEDS = range(500_000, 500_100)
-"""Episodes by which the best of several runs is chosen; no training and no reported score plays them."""
+"""Seeds of the episodes by which the best of several runs is chosen; no training and no reported score plays
+them."""
 
 CHECKED = 20
-"""Episodes, from the first of the score on, that are played again to check a shipped policy."""
+"""Number of episodes, from the first of the score on, that are played again to check a shipped policy."""
 
-GAITS = ("run", "walk", "carrying_walk", "reference", "open-loop")  # scored beside it, where an id has them
+GAITS = ("run", "walk", "carrying_walk", "reference", "open-loop")  # scored as well, if an id has them
 
 LIMIT = 1_000_000
 FILM_LIMIT = 750_000
-"""Bytes of a folder and of the film in it, which is made shorter where it is larger."""
+"""Largest size of a folder and of the film in it [bytes]; a film that is larger is made shorter."""
 
 FILM_SECONDS = 4.0
 
@@ -66,6 +67,8 @@ COPIED = (WEIGHTS, ABOUT, runs.CONFIG)
 
 @dataclass(frozen=True)
 class Args:
+    """Arguments of the command."""
+
     runs: Positional[Path]
     """a run folder of agents.train, or a folder with several beneath it"""
     ids: tuple[str, ...] = ()
@@ -76,25 +79,31 @@ class Args:
 
 @dataclass(frozen=True)
 class Choice:
-    """A run, and of how many it is the best."""
+    """Run that is shipped, and the number of runs of which it is the best."""
 
     saved: runs.SavedModel
     among: int = 1
 
 
 def find_runs(folder: Path) -> dict[str, list[runs.SavedModel]]:
-    """The trained models in or beneath a folder by environment, those with arguments of it left out.
-    `DataFileError`: there is none, or one lacks a file."""
+    """Return the trained models in or beneath a folder by environment, without those that have arguments of
+    it.
+
+    Raises:
+        DataFileError: there is none, or one lacks a file.
+    """
     models: dict[str, list[runs.SavedModel]] = {}
     is_run = (folder / runs.RECORD).is_file()
     for path in [folder] if is_run else sorted(record.parent for record in folder.rglob(runs.RECORD)):
         if not any((path / name).is_file() for name in (runs.MODEL, ABOUT)):
             print(f"passed over {path}: it is not through")
             continue
+        # A folder that is half copied must not be shipped
         needed = [runs.CONFIG, runs.MONITOR, *([WEIGHTS] if (path / ABOUT).is_file() else [])]
         if missing := [name for name in needed if not (path / name).is_file()]:
             raise DataFileError(f"run {path}: expected all of a training, found no {missing[-1]}")
         saved = runs.SavedModel.find(path)
+        # A policy for other arguments would play under the plain id
         if not saved.record.get("env_kwargs"):
             env_id, _ = environment_of(saved.path, saved.record)
             models.setdefault(str(env_id), []).append(saved)
@@ -104,22 +113,27 @@ def find_runs(folder: Path) -> dict[str, list[runs.SavedModel]]:
 
 
 def choose(saved: Sequence[runs.SavedModel], env_id: str) -> Choice:
-    """The run whose policy has the highest mean return in `CHOOSING_SEEDS`."""
+    """Return the run with the highest mean return in `CHOOSING_SEEDS`."""
     from tqdm import tqdm
 
     if len(saved) == 1:
         return Choice(saved[0])
     values = []
     with runs.make_env(env_id) as env:
-        for one in tqdm(saved, desc=f"runs of {env_id}", leave=False, disable=None):
-            episodes = score_vector(one.load(env, env_id), env_id, CHOOSING_SEEDS)
+        for model in tqdm(saved, desc=f"runs of {env_id}", leave=False, disable=None):
+            episodes = score_vector(model.load(env, env_id), env_id, CHOOSING_SEEDS)
             values.append(float(np.mean([episode["return"] for episode in episodes])))
     return Choice(saved[int(np.argmax(values))], len(saved))
 
 
 def ship(choice: Choice, env_id: str, out: Path) -> dict[str, Any]:
-    """Write the folder of one policy beneath `out`, for its own id or one that `STANDS_FOR` it; returns its
-    score.json. `DataFileError`: the model does not fit. `OutputError`: the folder gets too large."""
+    """Write the folder of one policy beneath `out`, for its own id or one that `STANDS_FOR` it; return its
+    score.json.
+
+    Raises:
+        DataFileError: the model does not fit.
+        OutputError: the folder gets too large.
+    """
     saved = choice.saved
     trained_on = own_id(choice.saved.record["env_id"])
     if not len(runs.read_episodes(saved.path.parent)):
@@ -133,7 +147,7 @@ def ship(choice: Choice, env_id: str, out: Path) -> dict[str, Any]:
     folder = out / env_id.rpartition("/")[2]
     with staged(folder) as stage:
         write_policy(trained, stage / FILE, metadata)
-        policy = OnnxPolicy(stage / FILE)  # what is shipped is what is scored
+        policy = OnnxPolicy(stage / FILE)  # the shipped file is scored, not the model
         scores = [Score("policy", score_vector(policy, trained_on, SCORE_SEEDS)), *gaits(trained_on)]
         score = score_record(policy, scores, env_id, trained_on)
         if env_id != trained_on:
@@ -144,7 +158,7 @@ def ship(choice: Choice, env_id: str, out: Path) -> dict[str, Any]:
         (stage / runs.RECORD).write_text(json.dumps(record, indent=2) + "\n", encoding="utf-8")
         text = json.dumps(score, indent=1, allow_nan=False)
         (stage / "score.json").write_text(text + "\n", encoding="utf-8")
-        no_name = {"Software": None}  # of the program that drew it
+        no_name = {"Software": None}  # the drawing program's name would change the file
         draw_learning_curve(saved.path.parent, scores, stage / "curve.png", dpi=90, metadata=no_name)
         shown = shared_film(stage, out / trained_on.rpartition("/")[2]) if env_id != trained_on else ""
         if not shown:
@@ -173,11 +187,13 @@ def film(folder: Path, env_id: str) -> None:
     seconds = FILM_SECONDS
     while not path.is_file() or path.stat().st_size > FILM_LIMIT:
         render_episode(path, policy, env_id, seed=SCORE_SEEDS[0], seconds=seconds, fps=20, size=(480, 270))
+        # The size is known only after the film is made
         seconds *= 0.75
 
 
 @cache
 def gaits(env_id: str) -> list[Score]:
+    """Score the gaits that an id has, on the episodes of the score."""
     scores = []
     for name in GAITS:
         with suppress(ParameterError, DataFileError):  # it has no such gait
@@ -186,10 +202,11 @@ def gaits(env_id: str) -> list[Score]:
 
 
 def score_record(policy: Any, scores: Sequence[Score], env_id: str, played_on: str) -> dict[str, Any]:
-    """What score.json holds: means and intervals of all, and the returns of the first, the policy."""
+    """Return the content of score.json: means and intervals of all, and the returns of the first, the
+    policy."""
     data = to_json(scores)["policies"]
-    for one in data.values():
-        del one["episodes"]
+    for of_policy in data.values():
+        del of_policy["episodes"]
     returns = [episode["return"] for episode in scores[0].episodes]
     return {
         "env_id": env_id,
@@ -204,28 +221,31 @@ def score_record(policy: Any, scores: Sequence[Score], env_id: str, played_on: s
 
 
 class NoisyPolicy:
-    """A policy whose actions are off by a millionth: another machine's arithmetic, exaggerated."""
+    """Policy with actions that are off by a millionth: another machine's arithmetic, exaggerated."""
 
     def __init__(self, policy: Any) -> None:
         self._policy = policy
         self._generator = np.random.default_rng(0)
 
     def predict(self, observation: Any, *args: Any, **kwargs: Any) -> tuple[Any, Any]:
+        """Return the policy's actions with noise."""
         actions, state = self._policy.predict(observation, *args, **kwargs)
         return actions + self._generator.uniform(-1e-6, 1e-6, actions.shape).astype(np.float32), state
 
 
 def tolerance(policy: Any, env_id: str, returns: Sequence[float]) -> float:
-    """By how much the mean return of the first `CHECKED` episodes may differ on another machine: four
-    standard errors of what a `NoisyPolicy` policy changes, and 1 % of the mean."""
+    """Return the largest difference of the mean return of the first `CHECKED` episodes on another machine:
+    four standard errors of what a `NoisyPolicy` changes, and 1 % of the mean."""
+    # Arithmetic differs in its last bits between processors; chaos makes more of it
     again = score_vector(NoisyPolicy(policy), env_id, SCORE_SEEDS[:CHECKED])
     off = np.array([episode["return"] for episode in again]) - returns[: len(again)]
     return float(4 * np.sqrt(np.mean(off**2) / len(off)) + 0.01 * abs(np.mean(returns)))
 
 
 def shown_command(command: str) -> str:
-    """A command without --out and without folders of this machine."""
+    """Return a command without --out and without folders of this machine."""
     words = shlex.split(command)
+    # It may stand twice
     while "--out" in words:
         del words[words.index("--out") : words.index("--out") + 2]
     shown = [word.removeprefix(f"{Path.cwd()}/") for word in words]
@@ -241,6 +261,7 @@ def write_card(
     choice: Choice,
     shown: str,
 ) -> None:
+    """Write card.md, the model card of a policy."""
     keys = [key for key in SHOWN if key in scores[0].estimates]
     with runs.make_env(env_id) as env:
         is_suspended = surroundings(env).trunk == "suspended"
@@ -260,8 +281,11 @@ def write_card(
         score=score,
         spread=float(np.std(score["returns"])),
         titles=[METRICS[key].title.replace("\n", " ") for key in keys],
-        rows=[(one.policy, [" ".join(cell(key, one.estimates[key])) for key in keys]) for one in scores],
-        estimates={one.policy: one.estimates for one in scores},
+        rows=[
+            (one_score.policy, [" ".join(cell(key, one_score.estimates[key])) for key in keys])
+            for one_score in scores
+        ],
+        estimates={one_score.policy: one_score.estimates for one_score in scores},
         choice=choice,
         film=shown,
         suspended=is_suspended,
@@ -273,37 +297,47 @@ def write_card(
 def write_index(folder: Path) -> None:
     """Write README.md, the table of the policies in `folder`."""
     rows = []
-    beside = ("open-loop", "run", "reference")
+    references = ("open-loop", "run", "reference")
     for path in sorted(folder.glob("*/score.json")):
         score = parse_json(path.read_text(encoding="utf-8"))
         algo = parse_json(path.with_name(runs.RECORD).read_text(encoding="utf-8"))["algo"]
         row = [f"`{score['env_id']}`", algo.upper()]
-        for name in ("policy", *beside):
-            one = score["policies"].get(name)
-            row.append(Interval(one["mean"]["return"], *one["interval95"]["return"]).text(2) if one else "")
+        for name in ("policy", *references):
+            of_policy = score["policies"].get(name)
+            if of_policy:
+                interval = Interval(of_policy["mean"]["return"], *of_policy["interval95"]["return"])
+                row.append(interval.text(2))
+            else:
+                row.append("")
         rows.append([*row, f"[card]({path.parent.name}/card.md)"])
     text = (
         "# Trained policies\n\n"
         "One for each id, made by `python -m agents.ship`; docs/agents.md says how to use them.\n"
         "Mean returns in the same episodes, and the bootstrap's 95 % interval.\n\n"
     )
-    titles = ["id", "policy", "return", *beside, "card"]
+    titles = ["id", "policy", "return", *references, "card"]
     runs.write_text(folder / "README.md", text + markdown_table(titles, rows) + "\n")
 
 
 def main(argv: list[str] | None = None) -> None:
+    """Choose and ship the policy of each id."""
     import tyro
 
     args = tyro.cli(Args, args=argv, prog="python -m agents.ship", description=__doc__)
     models = find_runs(args.runs)
     sources = {env_id: env_id for env_id in models}
-    sources |= {one: other for one, other in STANDS_FOR.items() if one not in models and other in models}
+    # An id without a training of its own may be played by another's policy
+    sources |= {
+        env_id: trained_on
+        for env_id, trained_on in STANDS_FOR.items()
+        if env_id not in models and trained_on in models
+    }
     ids = [check_choice("ids", env_id, sources) for env_id in args.ids] or list(sources)
     check_folder(args.out)
     choices = {source: choose(models[source], source) for source in {sources[env_id] for env_id in ids}}
     for env_id in ids:
         score = ship(choices[sources[env_id]], env_id, args.out)
-        means = {name: one["mean"]["return"] for name, one in score["policies"].items()}
+        means = {name: of_policy["mean"]["return"] for name, of_policy in score["policies"].items()}
         write_index(args.out)
         print(f"{env_id}: " + ", ".join(f"{name} {value:.2f}" for name, value in means.items()), flush=True)
 

@@ -1,7 +1,11 @@
-"""What episodes say: means, their intervals, and the columns of the tables.
+"""Statistics of episodes: means, their intervals, and the columns of the tables.
 
 Statistics over seeds: interquartile means with bootstrap 95 % intervals (Agarwal et al. 2021, Deep
 reinforcement learning at the edge of the statistical precipice).
+
+An agent dominates the scripted run if it is faster, its forces, its cost of transport and its loading rate
+are lower by at least what `LOWER` says, and it bears between the run's share of the weight and all of it:
+bearing less is a way to be soft, and with more the suspension pulls the animal down.
 """
 
 from __future__ import annotations
@@ -14,21 +18,30 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from hoof_env._output import markdown_table
+
 Floats = NDArray[np.float64]
 
-REPS = 5000  # of a bootstrap over seeds
+REPS = 5000  # resamples of a bootstrap over seeds
 
 FIGURES = (
-    "return", "speed_m_s", "peak_grf_n", "stance_peak_n", "loading_rate_n_s", "cost_of_transport",
-    "weight_share", "failed",
-)  # fmt: skip
-"""Figures whose means `mean_figures` gives."""
+    "return",
+    "speed_m_s",
+    "peak_grf_n",
+    "stance_peak_n",
+    "loading_rate_n_s",
+    "cost_of_transport",
+    "weight_share",
+    "failed",
+)
+"""Figures in the means that `mean_figures` gives."""
 
 TRANSPORT = ("distance_m", "drive_work_j", "mean_grf_n", "weight_share")
-"""What a cost of transport over several episodes is made of; the force by the share is the weight."""
+"""Figures from which the cost of transport over several episodes is computed; the force over the share is the
+weight."""
 
 PUBLISHED = tuple(dict.fromkeys((*FIGURES, *TRANSPORT)))
-"""Figures of an episode that all figures over several are made of."""
+"""Figures of an episode from which all figures over several are computed."""
 
 TABLE: Mapping[str, tuple[str, int, float]] = {
     "speed_m_s": ("speed m/s", 2, 1.0),
@@ -38,36 +51,37 @@ TABLE: Mapping[str, tuple[str, int, float]] = {
     "cost_of_transport": ("cost of transport", 2, 1.0),
     "weight_share": ("weight share", 2, 1.0),
 }
-"""Title, digits and factor of what the tables show."""
+"""Title, digits and factor of the columns of the tables."""
 
 
 @dataclass(frozen=True)
 class Interval:
-    """A mean and the bounds of its 95 % interval; NaN where there is none."""
+    """Mean and bounds of its 95 % interval; NaN bounds if there is none."""
 
     mean: float
     low: float = math.nan
     high: float = math.nan
 
     def parts(self, digits: int = 1, factor: float = 1.0) -> tuple[str, str]:
-        """Mean and interval as a person reads them; nothing for a mean that is NaN, and no interval where
-        there is none or it has no width."""
+        """Format mean and interval; an empty text for a mean that is NaN, and for an interval that is unknown
+        or has no width."""
         if not math.isfinite(self.mean):
             return "" if math.isnan(self.mean) else "∞", ""
         mean, low, high = (f"{factor * x:.{digits}f}" for x in (self.mean, self.low, self.high))
         return mean, "" if self.low == self.high or math.isnan(self.low) else f"[{low}, {high}]"
 
     def text(self, digits: int = 1, factor: float = 1.0) -> str:
+        """Format mean and interval in one text."""
         return " ".join(filter(None, self.parts(digits, factor)))
 
     def above(self, other: Interval) -> bool:
-        """Whether the whole interval lies above another; False where one is not known."""
+        """True if the whole interval is above another; False if one is not known."""
         return self.low > other.high
 
 
 @dataclass(frozen=True)
 class Scored:
-    """A policy without learning, or the seeds of an entry, on the episodes of the final score: figures over
+    """Policy without learning, or the seeds of an entry, on the episodes of the final score: figures over
     episodes or over seeds, and those of each seed."""
 
     name: str
@@ -76,18 +90,23 @@ class Scored:
 
 
 def mean_figures(episodes: Sequence[Mapping[str, float]]) -> dict[str, float]:
-    """Means over episodes of `FIGURES`, those that an id has; the cost of transport is that of the distance
-    and work of all of them, NaN if they do not get forward."""
-    means = {name: float(np.mean([one[name] for one in episodes])) for name in FIGURES if name in episodes[0]}
+    """Return means over episodes of `FIGURES`, those that an id has; the cost of transport is that of the
+    distance and work of all of them, NaN if they do not get forward."""
+    means = {
+        name: float(np.mean([episode[name] for episode in episodes]))
+        for name in FIGURES
+        if name in episodes[0]
+    }
     if "cost_of_transport" in means:
-        distance, work, force, share = (sum(one[name] for one in episodes) for name in TRANSPORT)
+        distance, work, force, share = (sum(episode[name] for episode in episodes) for name in TRANSPORT)
+        # Without progress the cost is not defined
         moved = share and distance > 0
         means["cost_of_transport"] = work * share / (force * distance) if moved else float("nan")
     return means
 
 
 def estimate(values: Sequence[float]) -> Interval:
-    """The mean of `values` and the bias-corrected bootstrap's 95 % interval of it."""
+    """Return the mean of `values` and the bias-corrected bootstrap's 95 % interval of it."""
     from scipy.stats import bootstrap
 
     sample = np.asarray(values, dtype=float)
@@ -101,21 +120,23 @@ def estimate(values: Sequence[float]) -> Interval:
 
 
 def over_episodes(episodes: Sequence[Mapping[str, float]]) -> dict[str, Interval]:
-    """The bootstrap's intervals around `mean_figures`; the cost of transport is one of sums, of which whole
-    episodes are drawn."""
+    """Return the bootstrap's intervals around `mean_figures`; the cost of transport is one of sums, of which
+    whole episodes are drawn."""
     from scipy.stats import bootstrap
 
     means = mean_figures(episodes)
-    intervals = {key: estimate([one[key] for one in episodes]) for key in means if key != "cost_of_transport"}
+    intervals = {
+        key: estimate([episode[key] for episode in episodes]) for key in means if key != "cost_of_transport"
+    }
     if "cost_of_transport" in means:
         mean = means["cost_of_transport"]
         intervals["cost_of_transport"] = Interval(mean)
         if math.isfinite(mean):
-            parts = np.array([[one[name] for one in episodes] for name in TRANSPORT])
+            parts = np.array([[episode[name] for episode in episodes] for name in TRANSPORT])
 
             def cost(drawn: Any, axis: int = -1) -> Any:
                 distance, work, force, share = parts[:, drawn].sum(axis)
-                with np.errstate(divide="ignore", invalid="ignore"):  # of a draw that gets nowhere
+                with np.errstate(divide="ignore", invalid="ignore"):  # a draw that gets nowhere divides by 0
                     return work * share / (force * distance)
 
             rng = np.random.default_rng(0)
@@ -126,15 +147,23 @@ def over_episodes(episodes: Sequence[Mapping[str, float]]) -> dict[str, Interval
 
 
 def iqm(scores: ArrayLike) -> Floats:
-    """Interquartile mean over seeds and the percentile bootstrap's interval of it, which draws whole seeds:
-    mean, low and high, shape (3,) or (3, n), of scores of shape (seeds,) or (seeds, n). Low and high are NaN
-    for one seed. The bootstrap draws the same seeds each time."""
+    """Return the interquartile mean over seeds and the percentile bootstrap's interval of it, which draws
+    whole seeds.
+
+    Args:
+        scores: scores of shape (seeds,) or (seeds, n).
+
+    Returns:
+        Mean, low and high, shape (3,) or (3, n). Low and high are NaN for one seed. The bootstrap draws the
+        same seeds each time.
+    """
     from scipy.stats import bootstrap, trim_mean
 
-    def middle(some: Floats, axis: int) -> Floats:
-        return np.asarray(trim_mean(some, 0.25, axis=axis))
+    def middle(sample: Floats, axis: int) -> Floats:
+        return np.asarray(trim_mean(sample, 0.25, axis=axis))
 
     values = np.asarray(scores, np.float64)
+    # trim_mean cuts a quarter of the seeds at either end
     mean = middle(values, axis=0)
     if len(values) < 2:
         return np.stack([mean, *[np.full_like(mean, np.nan)] * 2])
@@ -144,12 +173,57 @@ def iqm(scores: ArrayLike) -> Floats:
 
 
 def over_seeds(each: Sequence[Mapping[str, float]]) -> dict[str, Interval]:
-    """`iqm` of every figure that the seeds have in common, by name."""
-    names = [name for name in each[0] if all(name in one for one in each)]
-    columns = iqm([[one[name] for name in names] for one in each]).T
+    """Return `iqm` of every figure that the seeds have in common, by name."""
+    names = [name for name in each[0] if all(name in figures for figures in each)]
+    columns = iqm([[figures[name] for name in names] for figures in each]).T
     return {name: Interval(*map(float, column)) for name, column in zip(names, columns, strict=True)}
 
 
-def cells(one: Scored) -> list[str]:
-    known = one.intervals
-    return [known[key].text(digits, by) if key in known else "" for key, (_, digits, by) in TABLE.items()]
+def cells(policy: Scored) -> list[str]:
+    """Format the columns of `TABLE`; an empty cell for a figure that the id does not have."""
+    intervals = policy.intervals
+    return [
+        intervals[key].text(digits, by) if key in intervals else "" for key, (_, digits, by) in TABLE.items()
+    ]
+
+
+# Comparison with the paper's run
+
+
+LOWER = {"stance_peak_n": 0.75, "peak_grf_n": 0.85, "cost_of_transport": 0.7, "loading_rate_n_s": 1.0}
+"""Largest ratios to the run's figures for an agent that dominates; chosen values of this project."""
+
+
+def dominates(figures: Mapping[str, float], run: Mapping[str, float]) -> bool:
+    """True if means dominate those of the run: `LOWER`, a share of the weight between the run's and 1, a
+    higher speed."""
+    lower = all(figures[key] <= part * run[key] for key, part in LOWER.items())
+    # Neither softer by bearing less, nor pulled down by the suspension
+    bears = run["weight_share"] <= figures["weight_share"] <= 1.0
+    return lower and bears and figures["speed_m_s"] > run["speed_m_s"]
+
+
+def dominates_with_confidence(agent: Scored, run: Scored) -> bool:
+    """True if the 95 % intervals are apart, too; that of the weight share must lie neither below the run's
+    nor above 1."""
+    ours = agent.intervals
+    theirs = run.intervals
+    lower = all(theirs[key].above(ours[key]) for key in LOWER)
+    bears = not theirs["weight_share"].above(ours["weight_share"]) and ours["weight_share"].low <= 1.0
+    return lower and bears and ours["speed_m_s"].above(theirs["speed_m_s"])
+
+
+def compare(agents: Sequence[Scored], run: Scored) -> str:
+    """Return a table of the paper's run and of what is compared with it."""
+    means = {key: interval.mean for key, interval in run.intervals.items()}
+    lines = [["run", *cells(run)]]
+    for agent in agents:
+        mine = {key: interval.mean for key, interval in agent.intervals.items()}
+        parts = [f"{mine[key] / means[key]:.2f}" for key in LOWER]
+        verdict = "yes" if dominates(mine, means) and dominates_with_confidence(agent, run) else "no"
+        count = sum(dominates(seed, means) for seed in agent.seeds)
+        seeds = f"{count}/{len(agent.seeds)}" if agent.seeds else ""
+        lines.append([agent.name, *cells(agent), *parts, verdict, seeds])
+    of_run = [f"{TABLE[key][0].rpartition(' ')[0] or key} / run's" for key in LOWER]
+    titles = [title for title, *_ in TABLE.values()]
+    return markdown_table(["", *titles, *of_run, "dominates", "seeds that do"], lines)

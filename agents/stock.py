@@ -7,8 +7,8 @@
 PPO, SAC and TD3 are Stable-Baselines3's, TQC is sb3-contrib's, made as `PPO("MlpPolicy", env)` makes them. A
 policy is scored without its noise on 100 starts that no training meets. A training is one set of rows in
 curves.csv, written when it is through: after an interruption the same command goes on with those that are
-missing. Beside the curves stand what needs no learning: the zero action, which keeps the gait that an episode
-starts in, the scripted gait, and the best gait of `agents.open_loop`.
+missing. The curves are compared with policies that need no learning: the zero action, which keeps the gait
+that an episode starts in, the scripted gait, and the best gait of `agents.open_loop`.
 """
 
 from __future__ import annotations
@@ -32,11 +32,13 @@ from hoof_env.errors import ParameterError, check_choice, check_number
 from hoof_env.saved_policy import ALGORITHMS, algorithm_class
 
 OUT = Path(__file__).parents[1] / "docs" / "evidence" / "stock"
-"""Where the published curves are."""
+"""Folder of the published curves."""
 
 
 @dataclass(frozen=True)
 class Args:
+    """Arguments of the command."""
+
     env_id: str | None = None
     """only this id"""
     algo: str | None = None
@@ -55,19 +57,19 @@ class Args:
 
 @dataclass(frozen=True)
 class Job:
-    """One training."""
+    """Training of one algorithm on one id with one seed."""
 
     curves: Curves
     seed: int
 
     @property
     def key(self) -> tuple[str, str, int]:
-        """By which its rows are found."""
+        """Key of its rows in curves.csv."""
         return self.curves.env_id, self.curves.algo, self.seed
 
 
 def jobs(args: Args) -> list[Job]:
-    """The trainings that some arguments ask for.
+    """Return the trainings that the arguments select.
 
     Raises:
         ParameterError: an unknown id or algorithm, or a count out of range.
@@ -83,12 +85,15 @@ def jobs(args: Args) -> list[Job]:
     if not chosen:
         known = ", ".join(dict.fromkeys(f"{curves.algo} on {curves.env_id}" for curves in PLAN))
         raise ParameterError(f"expected one of {known}; got {args.algo} on {args.env_id}")
-    found = []
+    trainings = []
     for curves in chosen:
         steps = whole_rollouts(curves, args.steps) if args.steps else curves.steps
-        own = Curves(curves.env_id, curves.algo, args.seeds or curves.seeds, steps, min(curves.every, steps))
-        found += [Job(own, seed) for seed in range(own.seeds)]
-    return found
+        # Steps of the command's choice keep the distance of scores where they can
+        asked = Curves(
+            curves.env_id, curves.algo, args.seeds or curves.seeds, steps, min(curves.every, steps)
+        )
+        trainings += [Job(asked, seed) for seed in range(asked.seeds)]
+    return trainings
 
 
 def whole_rollouts(curves: Curves, steps: int) -> int:
@@ -102,10 +107,11 @@ def whole_rollouts(curves: Curves, steps: int) -> int:
 
 
 def train(job: Job) -> list[dict[str, Any]]:
-    """Train as a newcomer would; returns the rows of its curve."""
+    """Train with the library's defaults, or `TUNED` with its own settings; return the rows of the curve."""
     import torch
     from stable_baselines3.common.callbacks import BaseCallback
 
+    # Trainings share the cores; seconds are comparable only on one thread
     torch.set_num_threads(1)
     curves = job.curves
     envs = make_rows(curves.env_id, len(FINAL_SEEDS))
@@ -113,7 +119,7 @@ def train(job: Job) -> list[dict[str, Any]]:
     commit = runs.versions().get("commit", "")
 
     class Curve(BaseCallback):
-        """Scores the policy every so many steps."""
+        """Callback that scores the policy every `curves.every` steps and at the end."""
 
         began = 0.0
         scored = 0.0  # seconds that scores took
@@ -123,13 +129,15 @@ def train(job: Job) -> list[dict[str, Any]]:
 
         def _on_step(self) -> bool:
             if self.num_timesteps % curves.every == 0 or self.num_timesteps == curves.steps:
-                here = time.process_time()
-                spent = here - self.began - self.scored
+                # The clock of learning stops while the policy is scored
+                paused = time.process_time()
+                spent = paused - self.began - self.scored
                 add(self.model, self.num_timesteps, spent)
-                self.scored += time.process_time() - here
+                self.scored += time.process_time() - paused
             return True
 
     def add(model: Any, steps: int, seconds: float) -> None:
+        """Score a model and append the row."""
         figures = (steps, round(stock_page.mean_return(model, envs), 2), round(seconds, 1), commit)
         rows.append(dict(zip(COLUMNS, (*job.key, *figures), strict=True)))
 
@@ -141,13 +149,13 @@ def train(job: Job) -> list[dict[str, Any]]:
 
 
 def stock_model(job: Job) -> Any:
-    """The learner as its library makes it."""
+    """Return the learner as its library makes it."""
     env = runs.make_env(job.curves.env_id)
     return algorithm_class(job.curves.algo)("MlpPolicy", env, seed=job.seed, device="cpu")
 
 
 def tuned_model(job: Job) -> Any:
-    """The learner with the settings of agents/hyperparams, for as many steps."""
+    """Return the learner with the settings of agents/hyperparams, for as many steps."""
     curves = job.curves
     settings = load_settings(FOLDER / f"{curves.algo}.yml", curves.env_id) | {"n_timesteps": curves.steps}
     many = runs.make_vec_env(curves.env_id, settings["n_envs"])
@@ -155,22 +163,23 @@ def tuned_model(job: Job) -> Any:
 
 
 def trained(pending: Sequence[Job], workers: int) -> Iterator[list[dict[str, Any]]]:
-    """The rows of each training as it is through."""
+    """Yield the rows of each training when it is through."""
     if workers == 1:
         yield from map(train, pending)
         return
+    # A fresh process for each training: torch and numba keep nothing of the last one
     with multiprocessing.get_context("spawn").Pool(workers, maxtasksperchild=1) as pool:
         yield from pool.imap_unordered(train, pending)
 
 
 def has_run(rows: Sequence[dict[str, Any]], job: Job) -> bool:
-    """Say if a training's rows are there, up to its last step."""
+    """True if a training's rows are there, up to its last step."""
     steps = [row["steps"] for row in rows if (row["env_id"], row["algo"], row["seed"]) == job.key]
     return max(steps, default=-1) >= job.curves.steps
 
 
 def stock(args: Args) -> list[dict[str, Any]]:
-    """Train what is missing, then write table and picture; returns all rows.
+    """Train what is missing, then write table and picture; return all rows.
 
     Raises:
         ParameterError: an unknown id or algorithm, or a count out of range.
@@ -186,6 +195,7 @@ def stock(args: Args) -> list[dict[str, Any]]:
         print(f"{TUNED}: {steps} steps instead of {args.steps}, which are no whole rollouts", flush=True)
     for done, new in enumerate(trained(pending, args.workers), 1):
         key = tuple(new[0][name] for name in ("env_id", "algo", "seed"))
+        # A longer training replaces a shorter one of the same seed
         rows = [row for row in rows if (row["env_id"], row["algo"], row["seed"]) != key] + new
         rows.sort(key=lambda row: (row["env_id"], row["algo"], row["seed"], row["steps"]))
         runs.write_csv(args.out / "curves.csv", COLUMNS, rows)
@@ -198,6 +208,7 @@ def stock(args: Args) -> list[dict[str, Any]]:
 
 
 def main(argv: list[str] | None = None) -> None:
+    """Train and write the page."""
     import tyro
 
     args = tyro.cli(Args, args=argv, prog="python -m agents.stock", description=__doc__)

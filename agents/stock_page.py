@@ -1,5 +1,5 @@
-"""The page of `agents.stock`: learning curves as tables and as a picture, and the returns of what needs no
-learning."""
+"""Page of `agents.stock`: learning curves as tables and as a picture, and the returns of policies that need
+no learning."""
 
 from __future__ import annotations
 
@@ -19,96 +19,106 @@ from hoof_env._output import markdown_table, staged
 BEST = "best open loop"
 
 ANCHORS = ("zero action", "scripted gait", BEST)
-"""What stands beside the curves."""
+"""Policies that need no learning, which the curves are compared with."""
 
 
 def mean_return(policy: Any, envs: Any) -> float:
-    """Mean return of a policy on the starts of the final scores."""
-    return float(np.mean([one["return"] for one in play_rows(envs, policy, FINAL_SEEDS)]))
+    """Return the mean return of a policy on the starts of the final scores."""
+    return float(np.mean([episode["return"] for episode in play_rows(envs, policy, FINAL_SEEDS)]))
 
 
 def anchors(env_id: str) -> dict[str, float]:
-    """Returns of what needs no learning, by name, those that an id has."""
+    """Return the mean returns of policies that need no learning, by name, those that an id has."""
     envs = make_rows(env_id, len(FINAL_SEEDS))
     assert envs is not None
+    # One action for each row
     zero = np.zeros((len(FINAL_SEEDS), *(envs.single_action_space.shape or ())), np.float32)
 
     class Zero:
-        """The zero action."""
+        """Policy of zero actions."""
 
         def predict(self, *args: Any, **kwargs: Any) -> tuple[NDArray[np.float32], None]:
             return zero, None
 
-    found = {"zero action": mean_return(Zero(), envs)}
+    returns = {"zero action": mean_return(Zero(), envs)}
     with runs.make_env(env_id) as env:
         if envs.action_form == "rates":
             for title, name in (("scripted gait", envs.task.reference), (BEST, "open-loop")):
-                found[title] = mean_return(find_policy(name, env, env_id), envs)
-    return found
+                returns[title] = mean_return(find_policy(name, env, env_id), envs)
+    return returns
 
 
 AT_STEPS = (20_480, 61_440, 204_800, 400_000, 3_000_000)
 AT_SECONDS = (5.0, 20.0, 60.0, 180.0, 600.0)
-"""Where learners of HorseLeg-v0 are compared."""
+"""Steps and seconds [s] at which learners of HorseLeg-v0 are compared."""
 
 
 def at(rows: Sequence[dict[str, Any]], steps: int) -> list[float]:
-    """The returns of all seeds at the last score up to so many steps."""
+    """Return the returns of all seeds at the last score up to `steps`."""
     latest: dict[int, dict[str, Any]] = {}
     for row in rows:
+        # Rows need not be in order
         if row["steps"] <= steps and row["steps"] >= latest.get(row["seed"], row)["steps"]:
             latest[row["seed"]] = row
     return [row["return"] for row in latest.values()]
 
 
-def table(rows: Sequence[dict[str, Any]], beside: dict[str, dict[str, float]]) -> str:
-    """A line for each algorithm and id: interquartile mean, lowest and highest seed in the middle and at the
-    end, and what needs no learning."""
+def table(rows: Sequence[dict[str, Any]], references: dict[str, dict[str, float]]) -> str:
+    """Return a line for each algorithm and id: interquartile mean, lowest and highest seed in the middle and
+    at the end, and the returns of policies that need no learning."""
     lines = []
     for curves in PLAN:
-        own = [row for row in rows if (row["env_id"], row["algo"]) == (curves.env_id, curves.algo)]
-        if not own:
+        own_rows = [row for row in rows if (row["env_id"], row["algo"]) == (curves.env_id, curves.algo)]
+        if not own_rows:
             continue
-        last = max(row["steps"] for row in own)
+        last = max(row["steps"] for row in own_rows)
         cells = []
         for steps in (last // 2, last):
-            values = at(own, steps)
+            values = at(own_rows, steps)
             cells.append(f"{float(iqm(values)[0]):.1f} ({min(values):.1f} to {max(values):.1f})")
-        seconds = np.median([row["train_seconds"] for row in own if row["steps"] == last])
-        known = beside[curves.env_id]
-        references = [f"{known[name]:.1f}" if name in known else "" for name in ANCHORS]
+        seconds = np.median([row["train_seconds"] for row in own_rows if row["steps"] == last])
+        known = references[curves.env_id]
+        reference_cells = [f"{known[name]:.1f}" if name in known else "" for name in ANCHORS]
         above = ""
         if BEST in known:
-            finals = at(own, last)
+            finals = at(own_rows, last)
             above = f"{sum(value > known[BEST] for value in finals)} of {len(finals)}"
-        seeds = str(len({row["seed"] for row in own}))
+        seeds = str(len({row["seed"] for row in own_rows}))
         name = curves.env_id.rpartition("/")[2].removesuffix("-v0")
         own_cells = [name, curves.algo.upper(), seeds, *cells, f"{last:,}", f"{seconds:.0f}"]
-        lines.append([*own_cells, *references, above])
+        lines.append([*own_cells, *reference_cells, above])
     head = (
-        "id", "algorithm", "seeds", "return at half the steps", "return at the end", "steps", "seconds",
-        *ANCHORS, "seeds above it at the end",
-    )  # fmt: skip
+        "id",
+        "algorithm",
+        "seeds",
+        "return at half the steps",
+        "return at the end",
+        "steps",
+        "seconds",
+        *ANCHORS,
+        "seeds above it at the end",
+    )
     return markdown_table(head, lines)
 
 
 def compared(rows: Sequence[dict[str, Any]], column: str, places: Sequence[float]) -> str:
-    """A line for each learner of HorseLeg-v0: the interquartile mean of its last returns up to so many steps,
-    or so many seconds of learning; nothing where its trainings do not go so far."""
+    """Return a line for each learner of HorseLeg-v0: the interquartile mean of its last returns up to each
+    place of `column`, steps or seconds of learning; an empty cell if its trainings do not go so far."""
     lines = []
     for algo in dict.fromkeys(curves.algo for curves in PLAN if curves.env_id == LEG):
-        own = [row for row in rows if (row["env_id"], row["algo"]) == (LEG, algo)]
-        if not own:
+        own_rows = [row for row in rows if (row["env_id"], row["algo"]) == (LEG, algo)]
+        if not own_rows:
             continue
         ends: dict[int, float] = {}
-        for row in own:
+        for row in own_rows:
             ends[row["seed"]] = max(row[column], ends.get(row["seed"], 0.0))
         cells = []
         for place in places:
             latest: dict[int, dict[str, Any]] = {}
-            for row in own:
+            for row in own_rows:
                 if row[column] <= place and row["steps"] >= latest.get(row["seed"], row)["steps"]:
                     latest[row["seed"]] = row
+            # A training that ended before would be compared at its end
             is_reached = all(end >= 0.9 * place for end in ends.values())
             values = [row["return"] for row in latest.values()]
             cells.append(f"{float(iqm(values)[0]):.1f}" if is_reached else "")
@@ -117,13 +127,13 @@ def compared(rows: Sequence[dict[str, Any]], column: str, places: Sequence[float
 
 
 def title(algo: str) -> str:
-    """Name of a learner for people, with what its settings are."""
+    """Return the name of a learner with the kind of its settings."""
     return "ppo_flat, tuned, 16 environments" if algo == TUNED else f"{algo.upper()}, stock"
 
 
-def draw(rows: Sequence[dict[str, Any]], beside: dict[str, dict[str, float]], path: Path) -> None:
-    """A panel for each id: the median of all seeds and their range against steps, and lines for what needs no
-    learning."""
+def draw(rows: Sequence[dict[str, Any]], references: dict[str, dict[str, float]], path: Path) -> None:
+    """Draw a panel for each id: the median of all seeds and their range over steps, and lines for policies
+    that need no learning."""
     import matplotlib
     from matplotlib.figure import Figure
     from matplotlib.ticker import EngFormatter
@@ -132,7 +142,8 @@ def draw(rows: Sequence[dict[str, Any]], beside: dict[str, dict[str, float]], pa
 
     colours = {"ppo": BLUE, "sac": ORANGE, "td3": GREEN, "tqc": PURPLE}
     styles = dict(zip(ANCHORS, (":", "--", "-"), strict=True))
-    ids = [env_id for env_id in (LEG, *OTHERS) if any(row["env_id"] == env_id for row in rows)]
+    trained_on = {row["env_id"] for row in rows}
+    ids = [env_id for env_id in (LEG, *OTHERS) if env_id in trained_on]
     with matplotlib.rc_context(STYLE):
         across = min(3, len(ids))
         down = -(-len(ids) // across)
@@ -140,22 +151,29 @@ def draw(rows: Sequence[dict[str, Any]], beside: dict[str, dict[str, float]], pa
         panels = figure.subplots(down, across, squeeze=False).ravel()
         for panel, env_id in zip(panels, ids, strict=False):
             for algo, colour in colours.items():
-                own = [row for row in rows if (row["env_id"], row["algo"]) == (env_id, algo)]
-                steps = sorted({row["steps"] for row in own})
+                own_rows = [row for row in rows if (row["env_id"], row["algo"]) == (env_id, algo)]
+                steps = sorted({row["steps"] for row in own_rows})
                 if not steps:
                     continue
-                values = [[row["return"] for row in own if row["steps"] == step] for step in steps]
-                panel.plot(steps, [np.median(each) for each in values], color=colour, label=algo.upper())
+                values = [[row["return"] for row in own_rows if row["steps"] == step] for step in steps]
+                panel.plot(
+                    steps, [np.median(returns) for returns in values], color=colour, label=algo.upper()
+                )
                 panel.fill_between(
-                    steps, [min(each) for each in values], [max(each) for each in values], color=colour,
-                    alpha=0.2, linewidth=0,
-                )  # fmt: skip
-            for name, value in beside[env_id].items():
+                    steps,
+                    [min(returns) for returns in values],
+                    [max(returns) for returns in values],
+                    color=colour,
+                    alpha=0.2,
+                    linewidth=0,
+                )
+            for name, value in references[env_id].items():
                 panel.axhline(value, color=GREY, linewidth=0.8, linestyle=styles[name], label=name)
             panel.set_title(env_id.rpartition("/")[2])
             panel.set_xlabel("environment steps")
             panel.set_ylabel("return")
             panel.xaxis.set_major_formatter(EngFormatter(sep=""))
+        # The grid may have more panels than ids
         for panel in panels[len(ids) :]:
             panel.set_axis_off()
         panels[0].legend(loc="lower right")
@@ -191,13 +209,13 @@ Returns after so many seconds of the processor, on one thread:
 
 def write(out: Path, rows: Sequence[dict[str, Any]]) -> None:
     """Write table and picture of the curves that are there."""
-    beside = {env_id: anchors(env_id) for env_id in dict.fromkeys(row["env_id"] for row in rows)}
+    references = {env_id: anchors(env_id) for env_id in dict.fromkeys(row["env_id"] for row in rows)}
     with staged(out) as stage:
-        draw(rows, beside, stage / "stock.png")
+        draw(rows, references, stage / "stock.png")
         text = PAGE.format(
             starts=len(FINAL_SEEDS),
             commits=", ".join(sorted({f"`{row['commit'] or 'unknown'}`" for row in rows})),
-            table=table([row for row in rows if row["algo"] != TUNED], beside),
+            table=table([row for row in rows if row["algo"] != TUNED], references),
             by_steps=compared(rows, "steps", AT_STEPS),
             by_seconds=compared(rows, "train_seconds", AT_SECONDS),
         )

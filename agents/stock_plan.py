@@ -1,4 +1,4 @@
-"""What `agents.stock` trains, and the file of its learning curves."""
+"""Trainings of `agents.stock`, and the file of its learning curves."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from hoof_env.errors import DataFileError
 
 @dataclass(frozen=True)
 class Curves:
-    """Trainings of one algorithm on one id."""
+    """Trainings of one algorithm on one id, with a score every `every` steps."""
 
     env_id: str
     algo: str
@@ -22,7 +22,7 @@ class Curves:
 
 
 TUNED: Final = "ppo_flat"
-"""The one learner that is not stock, for comparison: its settings are those of agents/hyperparams."""
+"""Name of the one learner that is not stock, for comparison: its settings are those of agents/hyperparams."""
 
 LEG, RAIL, SPEED, TERRAIN, FIXED, HORSE = (
     f"hoof_env/{name}-v0"
@@ -39,16 +39,16 @@ PLAN = (
     Curves(LEG, TUNED, 10, 3_000_000, 40_960),
     *(Curves(env_id, "sac", 3, 60_000, 6_000) for env_id in OTHERS),
 )
-"""The published table, in the order in which it is trained."""
+"""Trainings of the published table, in the order of training."""
 
 
 COLUMNS = ("env_id", "algo", "seed", "steps", "return", "train_seconds", "commit")
 """Columns of curves.csv: a line for each score. The seconds are those of the processor for learning alone so
-far; the commit is that of the code that trained, empty where there is no git."""
+far; the commit is that of the code that trained, empty if there is no git."""
 
 
 def read_curves(folder: Path) -> list[dict[str, Any]]:
-    """The rows of curves.csv; none where there is no such file.
+    """Return the rows of curves.csv; an empty list if there is no such file.
 
     Raises:
         DataFileError: it cannot be read.

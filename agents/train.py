@@ -38,6 +38,8 @@ from hoof_env.saved_policy import WEIGHTS
 
 @dataclass(frozen=True)
 class Args(TrainingArgs):
+    """Arguments of the command."""
+
     seed: int = 0
     """of the environments, the network and the sampling"""
     n_envs: int | None = None
@@ -61,6 +63,8 @@ class Args(TrainingArgs):
 
 @dataclass(frozen=True)
 class Trained:
+    """Result of a training; `stopped_by` is the number of the signal that ended it, None if it is through."""
+
     folder: Path
     steps: int
     seconds: float
@@ -68,6 +72,7 @@ class Trained:
 
     @property
     def rate(self) -> float:
+        """Steps per second."""
         return self.steps / max(self.seconds, 1e-9)
 
     def __str__(self) -> str:
@@ -76,11 +81,18 @@ class Trained:
 
 
 def train(args: Args, *also: Any) -> Trained:
-    """Train as `args` say and fill the run folder; SIGINT, SIGTERM and the time limit end it early. `also`
-    are more callbacks of Stable-Baselines3; on a resume they begin anew. `ParameterError`, `DataFileError`:
-    something does not fit, or not the run to go on with. `OutputError`: the folder cannot be written, holds a
-    run already, or another process trains there. `DivergedError`: a loss or the policy is not finite any
-    more."""
+    """Train as `args` say and fill the run folder; SIGINT, SIGTERM and the time limit end it early.
+
+    Args:
+        args: the arguments of the command.
+        *also: more callbacks of Stable-Baselines3; on a resume they begin anew.
+
+    Raises:
+        ParameterError: something does not fit, or it is not the run to go on with.
+        DataFileError: a file of settings or a checkpoint cannot be read.
+        OutputError: the folder cannot be written, holds a run already, or another process trains there.
+        DivergedError: a loss or the policy is not finite any more.
+    """
     env_kwargs, settings = checked(args)
     check_threads(args.torch_threads)
     name = args.env_id.rpartition("/")[2]
@@ -90,8 +102,9 @@ def train(args: Args, *also: Any) -> Trained:
         with runs.alone(folder):
             return _train(args, folder, record, env_kwargs, settings, also)
     except HoofEnvError:
+        # An OutputError is an OSError, too, and says more than the one below
         raise
-    except OSError as error:  # as of monitor.csv on a full disk
+    except OSError as error:  # a full disk, for example, at monitor.csv
         raise OutputError(f"cannot write to {str(folder)!r}: {error.strerror or error}") from None
 
 
@@ -103,10 +116,11 @@ def _train(
     settings: dict[str, Any],
     also: tuple[Any, ...],
 ) -> Trained:
-    """`train` in a folder that nobody else works in."""
+    """Train as `train` does, in a folder that is locked."""
     earlier = find_earlier(args, folder, record, settings)
+    # The same command again: nothing to do
     if finished := earlier.get("finished"):
-        checkpoints.tidy(folder, keep=0)  # of a process that was killed before it did so
+        checkpoints.tidy(folder, keep=0)  # a process that was killed may have left them
         return Trained(folder, finished["steps"], finished["seconds"], None)
     checkpoints.tidy(folder)
     start = next(iter(checkpoints.checkpoints(folder)), None) if earlier else None
@@ -119,7 +133,7 @@ def _train(
         raise ParameterError(f"device: expected one that torch finds here, got {args.device!r}")
     torch.set_num_threads(args.torch_threads)
     config = yaml.safe_dump({args.env_id: settings}, sort_keys=False)  # the library adds to policy_kwargs
-    threads = args.torch_threads  # of the environments, too: they change no bit there
+    threads = args.torch_threads  # threads of the environments, too: they change no bit there
     envs = many = runs.make_vec_env(args.env_id, settings["n_envs"], threads, **env_kwargs)
     try:
         resumed = None
@@ -133,6 +147,7 @@ def _train(
         runs.write_text(folder / runs.CONFIG, config)
         if not resumed:
             checkpoints.write_episodes(envs, folder / runs.MONITOR)
+        # Curves of steps that are trained again are hidden
         model.set_logger(make_logger(folder / "tensorboard", model.num_timesteps + 1 if resumed else 0))
         return learn(args, folder, record, settings["n_timesteps"], model, resumed, also)
     finally:
@@ -148,6 +163,7 @@ def learn(
     resumed: checkpoints.Resumed | None,
     also: tuple[Any, ...],
 ) -> Trained:
+    """Train the model until it is through or asked to end, and save it."""
     from stable_baselines3.common.callbacks import CallbackList
 
     from agents.watch import EndedError, Watch, check_divergence, diverged, stop_on_signals
@@ -161,7 +177,8 @@ def learn(
             is_through = True
         except EndedError:
             callbacks.on_training_end()
-        except (ValueError, RuntimeError) as error:  # of torch or the environment: not finite
+        except (ValueError, RuntimeError) as error:
+            # Torch or the environment has refused numbers that are not finite
             check_divergence(model, folder)
             if "of distribution" in str(error):
                 raise diverged(model, folder, "the policy's actions have no distribution") from None
@@ -179,12 +196,13 @@ def learn(
 
 
 def checked(args: Args) -> tuple[dict[str, Any], dict[str, Any]]:
-    """Arguments of the environment, and settings; all checked before anything slow starts or is written."""
+    """Return arguments of the environment and settings; all are checked before anything slow starts or is
+    written."""
     env_kwargs = parse_pairs("--env-kwargs", args.env_kwargs)
     settings = load_settings(args.hyperparams or FOLDER / f"{args.algo}.yml", args.env_id)
     settings |= parse_pairs("--params", args.params)
-    given = {"n_timesteps": args.steps, "n_envs": args.n_envs}
-    settings |= {key: value for key, value in given.items() if value is not None}
+    overrides = {"n_timesteps": args.steps, "n_envs": args.n_envs}
+    settings |= {key: value for key, value in overrides.items() if value is not None}
     settings["n_envs"] = int(check_number("n_envs", settings["n_envs"], low=1, high=4096))
     settings["n_timesteps"] = int(check_number("steps", settings["n_timesteps"], low=1))
     check_number("seed", args.seed, low=0)
@@ -198,6 +216,8 @@ def checked(args: Args) -> tuple[dict[str, Any], dict[str, Any]]:
 
 
 def make_record(args: Args, env_kwargs: dict[str, Any]) -> dict[str, Any]:
+    """Return the content of run.json, without "finished"; `ParameterError` if the environment cannot be
+    trained on."""
     with runs.make_env(args.env_id, **env_kwargs) as env:
         if hasattr(env.unwrapped, "reward_space"):
             raise ParameterError(
@@ -225,16 +245,20 @@ def make_record(args: Args, env_kwargs: dict[str, Any]) -> dict[str, Any]:
 def find_earlier(
     args: Args, folder: Path, record: dict[str, Any], settings: dict[str, Any]
 ) -> dict[str, Any]:
-    """The record of the run in `folder` to go on with, empty if there is none. `OutputError`: there is a run,
-    but none to go on with. `ParameterError`: it was begun otherwise."""
+    """Return the record of the run in `folder` to go on with, empty if there is none.
+
+    Raises:
+        OutputError: there is a run, but none to go on with.
+        ParameterError: it was begun otherwise.
+    """
     earlier = runs.read_record(folder)
-    there = [name for name in (*runs.FILES, runs.STATISTICS, runs.CHECKPOINTS) if (folder / name).exists()]
-    if there and not earlier:
+    present = [name for name in (*runs.FILES, runs.STATISTICS, runs.CHECKPOINTS) if (folder / name).exists()]
+    if present and not earlier:
         raise OutputError(
-            f"{folder}: expected a new folder or one of a run, found {', '.join(there)} and no run.json; "
+            f"{folder}: expected a new folder or one of a run, found {', '.join(present)} and no run.json; "
             "choose another folder"
         )
-    held = {runs.MODEL, WEIGHTS, runs.CHECKPOINTS} & {*there}
+    held = {runs.MODEL, WEIGHTS, runs.CHECKPOINTS} & {*present}
     if held and not args.resume:
         raise OutputError(
             f"{folder} already holds a trained model; choose another folder, remove that one, or go on with "
@@ -242,14 +266,19 @@ def find_earlier(
         )
     if not args.resume or not held:
         return {}
+    # Everything that decides what is learnt
     keys = ("env_id", "env_kwargs", "settings", "observation_space", "action_space", "algo", "seed")
     pairs = {key: (earlier.get(key), record.get(key)) for key in keys}
+    # Another version may have other rewards or observations
     pairs["hoof-env"] = earlier.get("versions", {}).get("hoof-env"), record["versions"].get("hoof-env")
     used = load_settings(folder / runs.CONFIG, args.env_id)
     pairs |= {key: (used.get(key), settings.get(key)) for key in {**used, **settings}}
-    unlike = [f"{key}: {there!r} there, {now!r} here" for key, (there, now) in pairs.items() if there != now]
+    unlike = [
+        f"{key}: {theirs!r} there, {ours!r} here" for key, (theirs, ours) in pairs.items() if theirs != ours
+    ]
     if unlike:
         raise ParameterError(f"--resume: expected what {folder} was begun with; {'; '.join(unlike)}")
+    # A model without checkpoints cannot go on
     kept = earlier.get("finished") or checkpoints.checkpoints(folder)
     if not kept and earlier.get("args", {}).get("checkpoint_every") == 0:  # it would be lost
         raise OutputError(f"--resume: {folder} holds a model, but no checkpoint to go on from")
@@ -257,23 +286,27 @@ def find_earlier(
 
 
 def warn_of_bits(folder: Path, earlier: dict[str, Any], record: dict[str, Any]) -> None:
-    """Warn of what does not forbid to go on with a run, but the same bits."""
+    """Warn of differences under which a run may go on, but not with the same bits."""
     keys = ("python", "platform", *runs.PACKAGES, "torch_threads", "device")
-    there, here = ({**one.get("versions", {}), **one.get("args", {})} for one in (earlier, record))
-    pairs = {key: (there[key], here.get(key)) for key in keys if key in there}
+    theirs, ours = (
+        {**record_of.get("versions", {}), **record_of.get("args", {})} for record_of in (earlier, record)
+    )
+    pairs = {key: (theirs[key], ours.get(key)) for key in keys if key in theirs}
     unlike = [f"{key} {then} there, {now} here" for key, (then, now) in pairs.items() if then != now]
     if unlike:
         warnings.warn(f"--resume: {folder} goes on, but with other bits: {'; '.join(unlike)}", stacklevel=2)
 
 
 def make_model(args: Args, settings: dict[str, Any], many: Any) -> Any:
-    """The algorithm as `settings` build it, on environments with a `VecMonitor` that writes nothing yet."""
+    """Return the algorithm as `settings` build it, on environments with a `VecMonitor` that writes nothing
+    yet."""
     from stable_baselines3.common.vec_env import VecEnv, VecMonitor, VecNormalize
 
     envs: VecEnv = VecMonitor(many)
     normalize = normalize_arguments(settings)
     arguments = model_arguments(settings, int(np.prod(envs.action_space.shape or 1)))
     try:
+        # Outside of the monitor, which must see the rewards as they are
         envs = envs if normalize is None else VecNormalize(envs, **normalize)
         if "buffer_size" in arguments:  # more would stand empty in every checkpoint
             most = settings["n_timesteps"] + settings["n_envs"]
@@ -286,7 +319,8 @@ def make_model(args: Args, settings: dict[str, Any], many: Any) -> Any:
 
 
 def make_logger(folder: Path, hidden: int) -> Any:
-    """A logger for TensorBoard; of what an earlier process logged, steps from `hidden` on are not shown."""
+    """Return a logger for TensorBoard; of what an earlier process logged, steps from `hidden` on are not
+    shown."""
     from stable_baselines3.common.logger import Logger, TensorBoardOutputFormat
     from torch.utils.tensorboard import SummaryWriter
 
@@ -297,6 +331,7 @@ def make_logger(folder: Path, hidden: int) -> Any:
 
 
 def main(argv: list[str] | None = None) -> int:
+    """Train, and return the exit code."""
     import tyro
 
     trained = train(tyro.cli(Args, args=argv, prog="python -m agents.train", description=__doc__))

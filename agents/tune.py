@@ -37,6 +37,8 @@ SEEDS = range(1000, 1064)  # scored episodes; trainings start theirs from other 
 
 @dataclass(frozen=True)
 class Args(TrainingArgs):
+    """Arguments of the command."""
+
     trials: int = 20
     """that the study has in the end, those of earlier starts counted"""
     scores: int = 10
@@ -50,9 +52,12 @@ class Args(TrainingArgs):
 
 
 def load_space(path: Path, algo: str) -> dict[str, Any]:
-    """The ranges of `algo` in a file like agents/studies/spaces.yml: key to a list, or to a mapping with
-    "uniform" or "log" [low, high] and perhaps "lin". `DataFileError`: not such a file, or a range that is
-    none."""
+    """Return the ranges of `algo` in a file like agents/studies/spaces.yml: key to a list, or to a mapping
+    with "uniform" or "log" [low, high] and perhaps "lin".
+
+    Raises:
+        DataFileError: it is not such a file, or a range is malformed.
+    """
     try:
         space = yaml.safe_load(path.read_text(encoding="utf-8"))[algo]
         for key, how in space.items():
@@ -61,8 +66,14 @@ def load_space(path: Path, algo: str) -> dict[str, Any]:
                 if not low < high or ("log" in how and low <= 0):
                     raise ValueError(f"{key}: {how}")
     except (
-        OSError, yaml.YAMLError, KeyError, TypeError, ValueError, AttributeError, RecursionError
-    ) as error:  # fmt: skip
+        OSError,
+        yaml.YAMLError,
+        KeyError,
+        TypeError,
+        ValueError,
+        AttributeError,
+        RecursionError,
+    ) as error:
         raise DataFileError(
             f"search space {path}: expected for {algo} keys with lists, or uniform or log: [low, high]; "
             f"{type(error).__name__}: {error}"
@@ -71,7 +82,8 @@ def load_space(path: Path, algo: str) -> dict[str, Any]:
 
 
 def draw(trial: Any, space: Mapping[str, Any], base: Mapping[str, Any]) -> dict[str, Any]:
-    """Settings for an Optuna trial: drawn from `space`, the others of the same setting as in `base`."""
+    """Draw settings for an Optuna trial from `space`; the other arguments of a nested setting are those in
+    `base`."""
     chosen: dict[str, Any] = {}
     for key, how in space.items():
         value: Any
@@ -81,6 +93,7 @@ def draw(trial: Any, space: Mapping[str, Any], base: Mapping[str, Any]) -> dict[
                 value = parse_json(value)
         else:
             low, high = how["log"] if "log" in how else how["uniform"]
+            # Three digits are enough, and can be read in a table
             value = float(f"{trial.suggest_float(key, low, high, log='log' in how):.3g}")
             value = f"lin_{value:g}" if how.get("lin") else value
         name, _, inner = key.partition(".")
@@ -89,8 +102,19 @@ def draw(trial: Any, space: Mapping[str, Any], base: Mapping[str, Any]) -> dict[
 
 
 class TrialScorer(Scorer):
-    """Keeps the mean returns in `curve`, rows of (steps, mean return); `report(steps, score)` may say after
-    each but the last that the training is to end, which is then pruned."""
+    """Scorer that keeps the mean returns and may prune the training.
+
+    Args:
+        env_id: id of the environment.
+        env_kwargs: its arguments.
+        every: steps between two scores.
+        report: called as `report(steps, score)` after each score but the last; True ends the training, which
+            is then pruned.
+
+    Attributes:
+        curve: rows of (steps, mean return).
+        is_pruned: True if `report` ended the training.
+    """
 
     def __init__(
         self,
@@ -105,21 +129,26 @@ class TrialScorer(Scorer):
         self.curve: list[tuple[int, float]] = []
 
     def keep(self, episodes: list[dict[str, float]]) -> None:
-        mean = sum(one["return"] for one in episodes) / len(episodes)
+        mean = sum(episode["return"] for episode in episodes) / len(episodes)
         self.curve.append((self.num_timesteps, mean))
 
     def _on_rollout_start(self) -> None:
         before = len(self.curve)
         super()._on_rollout_start()
+        # At the end there is nothing left to prune
         if len(self.curve) > before and self.report(*self.curve[-1]):
             self.is_pruned = True
             raise EndedError
 
 
 def tune(args: Args) -> Any:
-    """Run the study of `args` until it has all trials; returns the Optuna study. `ParameterError`,
-    `DataFileError`: what was given does not fit, or the study in the folder was begun with others.
-    `KeyboardInterrupt`: Ctrl-C; finished trials stay."""
+    """Run the study of `args` until it has all trials; return the Optuna study.
+
+    Raises:
+        ParameterError: an argument does not fit, or the study in the folder was begun with others.
+        DataFileError: a file does not fit.
+        KeyboardInterrupt: Ctrl-C; finished trials stay.
+    """
     check_number("trials", args.trials, low=1)
     check_number("scores", args.scores, low=1)
     kwargs = parse_pairs("--env-kwargs", args.env_kwargs)
@@ -139,6 +168,7 @@ def tune(args: Args) -> Any:
 
     with runs.alone(folder):
         study = open_study(args, folder, {"env_kwargs": kwargs, "base": base, "space": space})
+        # Trials that failed do not count, so one call may not be enough
         while (left := args.trials - len(finished(study))) > 0:
             study.optimize(
                 lambda trial: run_trial(trial, args, folder, kwargs, base | draw(trial, space, base)),
@@ -152,7 +182,7 @@ def tune(args: Args) -> Any:
 def run_trial(
     trial: Any, args: Args, folder: Path, env_kwargs: dict[str, Any], settings: dict[str, Any]
 ) -> float:
-    """The last score of a training with `settings`; Optuna's `TrialPruned` for a bad one."""
+    """Return the last score of a training with `settings`; raise Optuna's `TrialPruned` for a bad one."""
     import optuna
 
     def report(steps: int, score: float) -> bool:
@@ -160,13 +190,19 @@ def run_trial(
         return bool(trial.should_prune())
 
     out = folder / "trials" / str(trial.number)
+    # A trial that was killed left a run of other settings
     shutil.rmtree(out, ignore_errors=True)
     trial.set_user_attr("settings", settings)
     scorer = TrialScorer(args.env_id, env_kwargs, -(-settings["n_timesteps"] // args.scores), report)
     training = TrainArgs(
-        env_id=args.env_id, algo=args.algo, env_kwargs=args.env_kwargs, out=out,
-        params=(json.dumps(settings),), seed=args.seed + trial.number, checkpoint_every=0,
-    )  # fmt: skip
+        env_id=args.env_id,
+        algo=args.algo,
+        env_kwargs=args.env_kwargs,
+        out=out,
+        params=(json.dumps(settings),),
+        seed=args.seed + trial.number,
+        checkpoint_every=0,
+    )
     try:
         trained = train(training, scorer)
     except DivergedError:  # no settings to go on with
@@ -181,19 +217,24 @@ def run_trial(
 
 
 def finished(study: Any) -> list[Any]:
+    """Return the trials that are through or pruned."""
     return [trial for trial in study.trials if trial.state.name in ("COMPLETE", "PRUNED")]
 
 
 def open_study(args: Args, folder: Path, about: dict[str, Any]) -> Any:
-    """The study in `folder`, made if need be; a trial that was killed is queued to be run again.
-    `ParameterError`: Optuna is missing, the settings do not fit the algorithm, or the study was begun with
-    others. `DataFileError`: study.db is not a study."""
+    """Return the study in `folder`, made if need be; a trial that was killed is queued to be run again.
+
+    Raises:
+        ParameterError: Optuna is missing, the settings do not fit the algorithm, or the study was begun with
+            others.
+        DataFileError: study.db is not a study.
+    """
     try:
         import optuna
         from sqlalchemy.exc import SQLAlchemyError
     except ModuleNotFoundError:
         raise ParameterError("agents.tune needs Optuna: pip install 'hoof-env[tune]'") from None
-    optuna.logging.set_verbosity(optuna.logging.ERROR)  # what ends a trial is raised, too
+    optuna.logging.set_verbosity(optuna.logging.ERROR)  # errors that end a trial are raised, too
     check_space(args, about)
     path = folder / "study.db"
     try:
@@ -218,6 +259,7 @@ def open_study(args: Args, folder: Path, about: dict[str, Any]) -> Any:
         raise ParameterError(
             f"{folder} holds a study with other {', '.join(unlike)}; choose another folder by --out"
         )
+    # No other process works on the study: a running trial was killed
     for trial in study.get_trials(states=[optuna.trial.TrialState.RUNNING]):
         study.tell(trial.number, state=optuna.trial.TrialState.FAIL)
         study.enqueue_trial(trial.params)
@@ -227,7 +269,7 @@ def open_study(args: Args, folder: Path, about: dict[str, Any]) -> Any:
 
 
 def check_space(args: Args, about: dict[str, Any]) -> None:
-    """Build a model with settings that are drawn once, which refuses a key that is none."""
+    """Build a model with settings that are drawn once, which refuses a key that is unknown."""
     import optuna
 
     drawn = about["base"] | draw(optuna.create_study().ask(), about["space"], about["base"])
@@ -238,6 +280,7 @@ def check_space(args: Args, about: dict[str, Any]) -> None:
 
 
 def write_best(study: Any, folder: Path, env_id: str) -> None:
+    """Write best.yml, the settings of the best trial that is through."""
     complete = [trial for trial in study.trials if trial.state.name == "COMPLETE"]
     if complete:
         best = max(complete, key=lambda trial: trial.value)
@@ -247,6 +290,7 @@ def write_best(study: Any, folder: Path, env_id: str) -> None:
 
 
 def main(argv: list[str] | None = None) -> None:
+    """Search, and print the number of trials."""
     import tyro
 
     args = tyro.cli(Args, args=argv, prog="python -m agents.tune", description=__doc__)

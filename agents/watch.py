@@ -1,5 +1,5 @@
-"""What looks after a training while it runs: progress, checkpoints, signals, the time limit, divergence, and
-scores on the way."""
+"""Callbacks of a training: progress, checkpoints, signals, the time limit, divergence, and scores on the
+way."""
 
 from __future__ import annotations
 
@@ -25,11 +25,11 @@ from hoof_env.errors import HoofEnvError
 
 
 class DivergedError(HoofEnvError, ArithmeticError):
-    """A loss or a parameter of the policy is out of all bounds: what follows is worth nothing."""
+    """Error of a loss or a parameter of the policy that is out of all bounds: later results are worthless."""
 
 
 class EndedError(Exception):
-    """The training was asked to end; it stands between two rollouts."""
+    """Signal that the training was asked to end; it is between two rollouts."""
 
 
 LARGEST = 1e10  # no parameter of a policy that learns comes near it
@@ -47,7 +47,7 @@ def check_divergence(model: Any, folder: Path) -> None:
 
 
 def diverged(model: Any, folder: Path, reason: str) -> DivergedError:
-    """The error that says where a training diverged, why, and what is left of it."""
+    """Return the error with the step and the reason of a divergence, and the last good checkpoint."""
     kept = checkpoints.checkpoints(folder)[:1]
     left = f"the last good checkpoint is {kept[0]}" if kept else "there is no checkpoint yet"
     return DivergedError(
@@ -57,9 +57,11 @@ def diverged(model: Any, folder: Path, reason: str) -> DivergedError:
 
 
 class Watch(BaseCallback):
-    """Between two rollouts it checks the model, keeps a checkpoint when one is due, `checkpoint_every`
-    seconds after the last (0: none), and ends the training by `EndedError`; it shows progress and logs gait
-    figures."""
+    """Callback that supervises a training.
+
+    Between two rollouts it checks the model, keeps a checkpoint when one is due, `checkpoint_every` seconds
+    after the last (0: none), and ends the training by `EndedError`; it shows progress and logs gait figures.
+    """
 
     def __init__(
         self,
@@ -80,24 +82,31 @@ class Watch(BaseCallback):
 
     @property
     def seconds(self) -> float:
+        """Seconds of training so far, those before a resume included."""
         return (self.resumed.seconds if self.resumed else 0.0) + time.monotonic() - self.started
 
     def _on_training_start(self) -> None:
         self.started = self.last_kept = time.monotonic()
         interval = 0.3 if sys.stderr.isatty() else 10.0  # seconds between two lines, where each is kept
         self.bar = tqdm(
-            total=self.steps, initial=self.num_timesteps, unit=" steps", unit_scale=True, smoothing=0.1,
+            total=self.steps,
+            initial=self.num_timesteps,
+            unit=" steps",
+            unit_scale=True,
+            smoothing=0.1,
             mininterval=interval,
-        )  # fmt: skip
+        )
         self.summaries: list[dict[str, float]] = []
         if self.resumed:
             self.resumed.start()
 
     def _on_rollout_start(self) -> None:
         is_first = self.num_timesteps == self.model._num_timesteps_at_start
+        # The library has drawn from the generators while it set up
         if self.resumed and is_first:
             self.resumed.start_rollout()
         check_divergence(self.model, self.folder)
+        # Only here, between two rollouts, is a checkpoint complete
         end = self.stopped_by is not None or time.monotonic() - self.started >= self.max_seconds
         due = end or time.monotonic() - self.last_kept >= self.checkpoint_every
         if self.checkpoint_every and due and not is_first:
@@ -123,14 +132,15 @@ class Watch(BaseCallback):
         self.summaries.clear()
 
     def close(self) -> None:
+        """Close the bar."""
         if self.bar is not None:
             self.bar.close()
 
 
 @contextmanager
 def stop_on_signals(watch: Watch) -> Iterator[None]:
-    """Let the first SIGINT or SIGTERM end the training in good order; the second acts as it always does. In
-    a thread other than the main one, where signals cannot be caught, nothing changes."""
+    """Let the first SIGINT or SIGTERM end the training in good order; the second acts as it always does. In a
+    thread other than the main one, in which signals cannot be caught, nothing changes."""
     previous: dict[int, Any] = {}
 
     def stop(number: int, frame: FrameType | None) -> None:
@@ -141,6 +151,7 @@ def stop_on_signals(watch: Watch) -> Iterator[None]:
         for number, handler in previous.items():
             signal.signal(number, handler)
 
+    # Python sets handlers in the main thread only
     if threading.current_thread() is threading.main_thread():
         for number in (signal.SIGINT, signal.SIGTERM):
             previous[number] = signal.signal(number, stop)
@@ -151,9 +162,13 @@ def stop_on_signals(watch: Watch) -> Iterator[None]:
 
 
 class Scorer(BaseCallback):
-    """Scores the policy in training on the same episodes each time: between two rollouts whenever `every`
-    more steps are done, and at the end. A subclass does something with them in `keep`. `wall_s` and `cpu_s`
-    are of training alone, scores left out; a subclass that resumes sets them."""
+    """Callback that scores the policy in training on the same episodes each time: between two rollouts
+    whenever `every` more steps are done, and at the end. A subclass implements `keep`.
+
+    Attributes:
+        wall_s: wall time of training alone, scores left out [s]; a subclass that resumes sets it.
+        cpu_s: processor time of the same [s].
+    """
 
     def __init__(self, env_id: str, env_kwargs: Mapping[str, Any], seeds: Sequence[int], every: int) -> None:
         super().__init__()
@@ -165,9 +180,10 @@ class Scorer(BaseCallback):
 
     @abstractmethod
     def keep(self, episodes: list[dict[str, float]]) -> None:
-        """Do something with a score: `episodes` as of `agents.score.play`."""
+        """Store or report a score; `episodes` are those of `agents.score.play`."""
 
     def score(self) -> None:
+        """Score the policy, with the clock stopped."""
         self.wall_s += time.monotonic() - self._since[0]
         self.cpu_s += time.process_time() - self._since[1]
         self.scored_at = self.num_timesteps

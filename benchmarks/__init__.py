@@ -1,1 +1,1 @@
-"""The same leg and the same horse in engines that nobody here wrote, to compare speed and results with."""
+"""The same leg and the same horse in independent engines, to compare speed and results with."""

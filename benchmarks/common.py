@@ -1,6 +1,7 @@
-"""What the peers share: links and pins of the leg, a pose to start from, ground forces from outside.
+"""Parts that all engines share: links and pins of the leg, a pose to start from, ground forces from outside.
 
-The peers take this project's world: x forward, y up, angles counter-clockwise; planar vectors are complex.
+The other engines take this project's world: x forward, y up, angles counter-clockwise; planar vectors are
+complex.
 """
 
 from __future__ import annotations
@@ -24,7 +25,7 @@ Pins = dict[tuple[str, str, str], list[tuple[int, int]]]
 
 @dataclass(frozen=True)
 class Assembly:
-    """The leg as rigid links and the pins between them.
+    """Leg as rigid links and the pins between them.
 
     Attributes:
         links: by name, the bodies of `linkage.BODIES` in each, zero-based.
@@ -36,14 +37,16 @@ class Assembly:
 
     @cached_property
     def pins(self) -> Pins:
-        """(point, link, other) with the rows of `linkage.JOINTS` in it and their signs: the force that `link`
-        feels from `other` is their signed sum."""
+        """Rows of `linkage.JOINTS` in each pin (point, link, other) and their signs: the force of `other` on
+        `link` is their signed sum."""
         link_of = {FRAME: "frame"} | {body: link for link, bodies in self.links.items() for body in bodies}
         pins: Pins = {}
         for row, joint in enumerate(JOINTS):
-            one, two = link_of[joint.i], link_of[joint.j]
+            one = link_of[joint.i]
+            two = link_of[joint.j]
             if one == two:
                 continue  # the inside of a rigid link
+            # Seen from the other link the force has the other sign
             if (joint.point, two, one) in pins:
                 pins[joint.point, two, one].append((row, -1))
             else:
@@ -52,21 +55,23 @@ class Assembly:
 
     @cached_property
     def carrier(self) -> dict[str, tuple[str, str]]:
-        """(carrier, pin) of each link."""
+        """Carrier and pin of each link."""
         return {link: (parent, point) for link, parent, point in self.tree}
 
     @cached_property
     def loops(self) -> tuple[tuple[str, str, str], ...]:
-        """The pins that the tree leaves open."""
+        """Pins that close loops, those outside the tree."""
         carrier = self.carrier
         return tuple(
             (point, one, two)
+            # A pin of the tree is one between a link and its carrier, whichever way round
             for point, one, two in self.pins
             if carrier[one] != (two, point) and carrier.get(two) != (one, point)
         )
 
     def pin_forces(self, joints: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Forces at the pins [N], shape (..., pins, 2), from those at the joints, shape (..., 20, 2)."""
+        """Return the forces at the pins [N], shape (..., pins, 2), from those at the joints, shape (..., 20,
+        2)."""
         signed = [sum(sign * joints[..., row, :] for row, sign in rows) for rows in self.pins.values()]
         return np.stack(signed, axis=-2)
 
@@ -95,7 +100,7 @@ RIGID = Assembly(
         ("hoof", "shank", "G"),
     ),
 )
-"""Both triangles and the locked shank each as one: 9 links, 13 pins, 4 loops."""
+"""Assembly with both triangles and the locked shank each as one link: 9 links, 13 pins, 4 loops."""
 
 _NAMES = {0: "crank", 6: "shank", 10: "hoof"}  # which the peers look for
 
@@ -118,21 +123,22 @@ ALL = Assembly(
         ("link 14", "link 13", "I"),
     ),
 )
-"""As the paper has it: 14 links, 20 pins, 6 loops and a lock."""
+"""Assembly of the paper: 14 links, 20 pins, 6 loops and a lock."""
 
 LOCKED = "link 10"
-"""The link of `ALL` that the lock holds to its carrier."""
+"""Link of `ALL` that the lock holds to its carrier."""
 
 
 @dataclass(frozen=True)
 class Start:
-    """How a horse begins, its trunk upright and at rest.
+    """State in which a horse begins, its trunk upright and at rest.
 
     Attributes:
-        crank, crank_speed: of each leg [rad, rad/s].
+        crank, crank_speed: angle and speed of each crank [rad, rad/s].
         swing: phi of each leg [rad].
-        swing_sin, swing_cos: how phi of all follows the crank from there, the gait's coefficients [rad].
-        position: of the trunk's point, x and y [m].
+        swing_sin, swing_cos: the gait's coefficients, by which phi of all legs follows the crank from there
+            [rad].
+        position: x and y of the trunk's point [m].
     """
 
     crank: tuple[float, ...]
@@ -144,17 +150,20 @@ class Start:
 
     @property
     def swings(self) -> bool:
-        """Whether phi moves at all."""
+        """True if phi moves at all."""
         return bool(self.swing_sin or self.swing_cos)
 
     def phi(self, leg: int, theta: float) -> tuple[float, float]:
-        """Swing of a leg at a crank angle, and its slope by the crank angle."""
-        a, b, begin = self.swing_sin, self.swing_cos, self.crank[leg]
-        s, c = math.sin(theta), math.cos(theta)
+        """Return the swing of a leg at a crank angle [rad], and its slope by the crank angle."""
+        a = self.swing_sin
+        b = self.swing_cos
+        begin = self.crank[leg]
+        s = math.sin(theta)
+        c = math.cos(theta)
         return self.swing[leg] + a * (s - math.sin(begin)) + b * (c - math.cos(begin)), a * c - b * s
 
     def poses(self, limbs: Sequence[Limb]) -> list[Pose]:
-        """Every point and body of each leg."""
+        """Return every point and body of each leg."""
         poses = []
         for i, limb in enumerate(limbs):
             rate = self.phi(i, self.crank[i])[1] * self.crank_speed[i]
@@ -166,13 +175,13 @@ class Start:
 
 @dataclass
 class Record:
-    """What a peer saw at each sample; rows are samples, columns legs.
+    """Results of an engine at each sample; rows are samples, columns legs.
 
     Attributes:
-        t: [s].
-        crank, crank_speed: [rad, rad/s].
+        t: time [s].
+        crank, crank_speed: angles and speeds of the cranks [rad, rad/s].
         body: x, y and pitch of the trunk and their rates, shape (samples, 6).
-        crank_torque, hip_torque: what drive and swing take, along theta and phi [N m].
+        crank_torque, hip_torque: torques of drive and swing, along theta and phi [N m].
         pins: forces [N], shape (samples, legs, pins, 2), in the order of the assembly's pins.
         closure: the widest gap of a loop [m].
     """
@@ -188,17 +197,18 @@ class Record:
 
     @classmethod
     def of(cls, rows: Sequence[tuple[Any, ...]]) -> Record:
-        """From one tuple a sample, in the order of the attributes."""
+        """Return a record from one tuple a sample, in the order of the attributes."""
         return cls(*(np.array(column) for column in zip(*rows, strict=True)))
 
 
 Outside = Callable[[int, int, float, complex, complex, bool], complex]
-"""force(limb, point, t, position, velocity, commit): what the world puts on toe (0) or heel (1) of a leg [N].
-Called with `commit` once for every whole step, and without it any number of times between."""
+"""Function force(limb, point, t, position, velocity, commit): the force of the world on toe (0) or heel (1)
+of a leg [N]. It is called with `commit` once for every whole step, and without it any number of times
+between."""
 
 
 class GroundForces:
-    """This project's ground as an `Outside`: contacts latch at whole steps only."""
+    """Ground of this project as an `Outside`: contacts latch at whole steps only."""
 
     def __init__(self, ground: Ground, legs: int) -> None:
         self._ground = ground.to_record()
@@ -208,10 +218,11 @@ class GroundForces:
         self, limb: int, point: int, t: float, position: complex, velocity: complex, commit: bool
     ) -> complex:
         kept = self.contacts[limb]
+        # Within a step an engine tries states that it may throw away: they must not latch
         contact = kept[point] if commit else kept.copy()[point]
         return complex(touch(contact, position, velocity, self._ground))
 
 
 def corners(limb: Limb) -> tuple[str, str]:
-    """Names of toe and heel."""
+    """Return the names of toe and heel."""
     return limb.geometry.toe, limb.geometry.heel

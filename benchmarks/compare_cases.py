@@ -1,7 +1,7 @@
-"""The cases of `compare`, as a script that knows only what every commit has: public names and ids.
+"""Cases of `compare`, as a script that knows only what every commit has: public names and ids.
 
-Its argument is how many runs of each case to time. Prints where the package is, and for each case the least
-processor time of a run [s].
+Its argument is the number of runs of each case. It prints the file of the package, and for each case the
+least processor time of a run [s].
 """
 
 from __future__ import annotations
@@ -23,13 +23,16 @@ BATCH = 1024
 
 
 def advance(hips: tuple[float, ...], trunk: str, count: int, steps: int, calls: int) -> Callable[[], object]:
-    """So many calls of so many steps of 1 ms of an engine with motors, each from the same state."""
-    leg, walk = load_geometry("identified"), load_gait("walk", "identified")
+    """Return a function of `calls` calls of `steps` steps of 1 ms of an engine with motors, each from the
+    same state."""
+    leg = load_geometry("identified")
+    walk = load_gait("walk", "identified")
+    # A fixed trunk hangs lower, or its hooves would hardly touch the ground
     low = 0.05 if trunk == "fixed" else 0.0
     body = Trunk(trunk, mass=200.0, pitch_inertia=150.0, height=leg.hip_height - low)
     limbs = [Limb(leg, hip=(x, 0.0), drive=Motor()) for x in hips]
     with warnings.catch_warnings():
-        warnings.simplefilter("ignore")  # of steps that are long for the ground
+        warnings.simplefilter("ignore")  # it warns of steps that are long for the ground
         engine = TrunkEngine(limbs, body, Ground(exponent=1.375), sim_dt=1e-3, substeps=1, num_envs=count)
     engine.reset(walk, theta=np.add.outer(np.arange(len(hips)) * np.pi, np.linspace(0.3, 6.5, count)))
     state = engine.get_state()
@@ -43,7 +46,8 @@ def advance(hips: tuple[float, ...], trunk: str, count: int, steps: int, calls: 
 
 
 def step(env: gym.Env, steps: int, size: float = 1.0) -> Callable[[], object]:
-    """So many steps of one environment with random actions up to a size, going on from the last."""
+    """Return a function of `steps` steps of one environment with random actions up to a size, going on from
+    the last."""
     shape: tuple[int, ...] = env.action_space.shape or ()
     actions = np.random.default_rng(0).uniform(-size, size, (steps, *shape)).astype(env.action_space.dtype)
     env.reset(seed=0)
@@ -58,8 +62,8 @@ def step(env: gym.Env, steps: int, size: float = 1.0) -> Callable[[], object]:
 
 
 def step_many(envs: Any, count: int, steps: int, size: float = 1.0) -> Callable[[], object]:
-    """So many steps of `count` environments that have been reset, of Gymnasium or EnvPool, with random
-    actions up to a size."""
+    """Return a function of `steps` steps of `count` environments that have been reset, of Gymnasium or
+    EnvPool, with random actions up to a size."""
     shape = (min(steps, 8), count, envs.action_space.shape[-1])
     actions = np.random.default_rng(0).uniform(-size, size, shape).astype(envs.action_space.dtype)
 
@@ -71,8 +75,8 @@ def step_many(envs: Any, count: int, steps: int, size: float = 1.0) -> Callable[
 
 
 def least_seconds(cases: dict[str, Callable[[], object]], runs: int) -> dict[str, float]:
-    """Least processor time [s] of each case, by turns, after one run of each that compiles and warms up: what
-    else the machine does adds to a run and takes nothing off."""
+    """Return the least processor time [s] of each case, by turns, after one run of each that compiles and
+    warms up: other work of the machine adds to a run and takes nothing off."""
     spent: dict[str, list[float]] = {name: [] for name in cases}
     for k in range(runs + 1):
         for name, run in cases.items():
@@ -85,7 +89,8 @@ def least_seconds(cases: dict[str, Callable[[], object]], runs: int) -> dict[str
 
 def main(runs: int) -> None:
     """Time all cases and print them."""
-    leg, terrain = "hoof_env/HorseLeg-v0", "hoof_env/HorseLegTerrain-v0"
+    leg = "hoof_env/HorseLeg-v0"
+    terrain = "hoof_env/HorseLegTerrain-v0"
     many = gym.make_vec(leg, num_envs=BATCH)
     many.reset(seed=0)
     cases = {

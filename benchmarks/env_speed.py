@@ -1,11 +1,11 @@
-"""How fast the environments are, beside Gymnasium's HalfCheetah-v5 and EnvPool's, on one thread.
+"""Speed of the environments compared with Gymnasium's HalfCheetah-v5 and EnvPool's, on one thread.
 
     python -m benchmarks.env_speed          writes env_speed.json and .md, where `benchmarks.speed` does
 
 An environment step is 20 substeps of 1 ms here and 5 of 10 ms there; `HorseLegFixed` takes 200 of 0.1 ms and
 has no bars. One process, random actions, observations, rewards and resets included, rounds interleaved; a
-ratio is taken within a round. EnvPool is measured where it is installed, with one thread and as many
-environments as serve it best; else HalfCheetah-v5 stands for it.
+ratio is taken within a round. EnvPool is measured if it is installed, with one thread and the number of
+environments that serves it best; else HalfCheetah-v5 stands for it.
 """
 
 from __future__ import annotations
@@ -31,9 +31,13 @@ from hoof_env._output import markdown_table
 
 OF_A_LEG = ((5.0,), (20.0, 35.0))
 BARS = {
-    "HorseLeg": OF_A_LEG, "HorseLegRail": OF_A_LEG, "HorseLegSpeed": OF_A_LEG, "HorseLegTerrain": OF_A_LEG,
-    "Horse": ((3.0,), (10.0,)), "HorseLegFixed": ((), ()),
-}  # fmt: skip
+    "HorseLeg": OF_A_LEG,
+    "HorseLegRail": OF_A_LEG,
+    "HorseLegSpeed": OF_A_LEG,
+    "HorseLegTerrain": OF_A_LEG,
+    "Horse": ((3.0,), (10.0,)),
+    "HorseLegFixed": ((), ()),
+}
 """Least ratios of each id, single and many at once."""
 SMALL = 0.1  # part of random actions that a horse takes, which falls within half a second under whole ones
 BATCH = 1024
@@ -49,24 +53,31 @@ of the widest vectors in the code that numba compiles; the others are as they co
 
 
 def measure(rounds: int, steps: int) -> dict[str, Any]:
-    """Rates and ratios."""
+    """Return rates and ratios."""
     cheetah = "HalfCheetah-v5, single"
-    runs, units = {cheetah: step(gym.make("HalfCheetah-v5"), steps)}, {cheetah: steps}
+    runs = {cheetah: step(gym.make("HalfCheetah-v5"), steps)}
+    units = {cheetah: steps}
+    # Many at once take fewer steps, so that rounds are about as long
     for name in BARS:
-        one, all_at_once, many = f"{name}, single", f"{name}, {BATCH} at once", max(steps // 20, 5)
-        env, envs = gym.make(f"hoof_env/{name}-v0"), gym.make_vec(f"hoof_env/{name}-v0", num_envs=BATCH)
+        single = f"{name}, single"
+        all_at_once = f"{name}, {BATCH} at once"
+        batch_steps = max(steps // 20, 5)
+        env = gym.make(f"hoof_env/{name}-v0")
+        envs = gym.make_vec(f"hoof_env/{name}-v0", num_envs=BATCH)
         envs.reset(seed=0)
         size = SMALL if name == "Horse" else 1.0
-        runs |= {one: step(env, steps, size), all_at_once: step_many(envs, BATCH, many, size)}
-        units |= {one: steps, all_at_once: many * BATCH}
+        runs |= {single: step(env, steps, size), all_at_once: step_many(envs, BATCH, batch_steps, size)}
+        units |= {single: steps, all_at_once: batch_steps * BATCH}
     if importlib.util.find_spec("envpool"):
         import envpool
 
         for size in POOLS:
             pool = envpool.make("HalfCheetah-v4", env_type="gymnasium", num_envs=size, num_threads=1)
             pool.reset()
-            title, few = f"EnvPool HalfCheetah-v4, {size} at once", max(4 * steps // size, 2)
-            runs[title], units[title] = step_many(pool, size, few), few * size
+            title = f"EnvPool HalfCheetah-v4, {size} at once"
+            few = max(4 * steps // size, 2)
+            runs[title] = step_many(pool, size, few)
+            units[title] = few * size
     clocked = {name: partial(timed, time.perf_counter, lambda: None, run) for name, run in runs.items()}
     seconds = interleave(clocked, rounds)
     rate = {name: units[name] / seconds[name] for name in runs}
@@ -74,18 +85,25 @@ def measure(rounds: int, steps: int) -> dict[str, Any]:
     best = max(pools, key=lambda name: float(np.median(rate[name])), default=cheetah)
     rows = []
     for name in rate:
-        is_single, bars = name.endswith("single"), BARS.get(name.split(",")[0], ((), ()))
-        beside = cheetah if is_single else best
+        # One is compared with one, many with the best pool
+        is_single = name.endswith("single")
+        bars = BARS.get(name.split(",")[0], ((), ()))
+        reference = cheetah if is_single else best
         rows.append(
-            {"case": name, "bits": vector_bits() if name.startswith("Horse") else None,
-             "rate": spread(rate[name]), "beside": beside, "ratio": spread(rate[name] / rate[beside]),
-             "bars": list(bars[0] if is_single else bars[1]) or None}
-        )  # fmt: skip
+            {
+                "case": name,
+                "bits": vector_bits() if name.startswith("Horse") else None,
+                "rate": spread(rate[name]),
+                "beside": reference,
+                "ratio": spread(rate[name] / rate[reference]),
+                "bars": list(bars[0] if is_single else bars[1]) or None,
+            }
+        )
     return {"machine": machine(), "bits": vector_bits(), "rounds": rounds, "rows": rows}
 
 
 def page(result: dict[str, Any]) -> str:
-    """The table as Markdown."""
+    """Return the table as Markdown."""
     lines = [
         [
             row["case"],
@@ -108,11 +126,11 @@ def main() -> None:
     parser.add_argument("--rounds", type=int, default=25)
     parser.add_argument("--steps", type=int, default=2000, help="of a single environment in a round")
     parser.add_argument("--out", type=Path, default=RESULTS, help="folder for those of all vector widths")
-    given = parser.parse_args()
-    result = measure(given.rounds, given.steps)
+    args = parser.parse_args()
+    result = measure(args.rounds, args.steps)
     print(page(result))
     rows = [(row["case"], row["beside"], row["ratio"], (row["bars"] or [None])[0]) for row in result["rows"]]
-    write(given.out, "env_speed", result, page(result), rows)
+    write(args.out, "env_speed", result, page(result), rows)
 
 
 if __name__ == "__main__":

@@ -25,17 +25,17 @@ from hoof_env.leg.linkage import BODIES, FRAME, JOINTS, LOCK
 eii: Any = exudyn.itemInterface  # its types ask for protocols that closures do not meet by name
 
 SPECTRAL_RADIUS = 0.6
-"""Of generalised alpha, below 1."""
+"""Spectral radius of generalised alpha, below 1."""
 
 SOLE = 13
 
 
 class ExudynLegs:
-    """A horse in Exudyn, ready to run once.
+    """Horse in Exudyn, ready to run once.
 
     Args:
         limbs, trunk: the horse.
-        start: its first pose; each crank keeps or is to keep the speed that it has there.
+        start: its first pose; each crank has the speed there, and keeps it or is driven to keep it.
         dt: time step [s].
         outside: forces at toe and heel; none if None. Called without `commit` within a step, with it after.
     """
@@ -50,11 +50,15 @@ class ExudynLegs:
         dt: float = 1e-3,
         outside: Outside | None = None,
     ) -> None:
-        self.limbs, self.trunk, self.start, self.dt, self.outside = tuple(limbs), trunk, start, dt, outside
+        self.limbs = tuple(limbs)
+        self.trunk = trunk
+        self.start = start
+        self.dt = dt
+        self.outside = outside
         self._container = exu.SystemContainer()
         self.mbs = self._container.AddSystem()
         self._reference: list[float] = []
-        self._rows: dict[int, int] = {}  # of bodies, among the coordinates
+        self._rows: dict[int, int] = {}  # rows of bodies among the coordinates
         self._ground = self.mbs.AddObject(eii.ObjectGround())
         self._still = self.mbs.AddMarker(
             eii.MarkerNodeCoordinate(nodeNumber=self.mbs.AddNode(eii.NodePointGround()), coordinate=0)
@@ -66,7 +70,7 @@ class ExudynLegs:
         self.mbs.Assemble()
 
     def run(self, duration: float, samples: int, fast: bool = False) -> Record:
-        """Simulate `duration` [s] and look `samples` times besides the beginning, evenly.
+        """Simulate `duration` [s] and look `samples` times after the beginning, evenly.
 
         `fast` is for timing: modified Newton and tolerances of 1e-6, which measured fastest.
 
@@ -89,7 +93,9 @@ class ExudynLegs:
 
         settings: Any = exu.SimulationSettings()
         time = settings.timeIntegration
-        time.numberOfSteps, time.endTime, time.verboseMode = steps, steps * self.dt, 0
+        time.numberOfSteps = steps
+        time.endTime = steps * self.dt
+        time.verboseMode = 0
         time.generalizedAlpha.spectralRadius = SPECTRAL_RADIUS
         time.newton.useModifiedNewton = fast
         time.newton.absoluteTolerance = time.newton.relativeTolerance = 1e-6 if fast else 1e-10
@@ -105,7 +111,8 @@ class ExudynLegs:
     # The parts
 
     def _body(self, mass: float, inertia: float, pose: Sequence[float], rates: Sequence[float]) -> int:
-        """A rigid body under its weight; all have three coordinates, in the order in which they are added."""
+        """Add a rigid body under its weight and return its number; all have three coordinates, in the order
+        in which they are added."""
         self._reference += pose
         node = self.mbs.AddNode(
             eii.NodeRigidBody2D(referenceCoordinates=list(pose), initialVelocities=list(rates))
@@ -118,21 +125,21 @@ class ExudynLegs:
         return int(body)
 
     def _coordinate(self, body: int, axis: int) -> int:
-        """Marker of one coordinate of a body; its value is the change since the start."""
+        """Add a marker of one coordinate of a body; its value is the change since the start."""
         node = self.mbs.GetObjectParameter(body, "nodeNumber")
         return int(self.mbs.AddMarker(eii.MarkerNodeCoordinate(nodeNumber=node, coordinate=axis)))
 
     def _hold(self, one: int, two: int, offset: Callable[[float], float] | None = None) -> int:
-        """Constraint: coordinate `two` less `one` is the offset."""
+        """Add a constraint: coordinate `two` less `one` is the offset."""
         law = {"offsetUserFunction": lambda mbs, t, item, _: offset(t)} if offset else {}
         return int(self.mbs.AddObject(eii.CoordinateConstraint(markerNumbers=[one, two], **law)))
 
     def _hang(self) -> None:
-        """What the trunk hangs from."""
+        """Add the supports of the trunk: constraints, drag, suspension."""
         trunk = self.trunk
         for axis in range(3):
             at = self._coordinate(self._trunk, axis)
-            if axis >= TRUNKS.index(trunk.kind):  # of x, y and pitch each kind leaves free one more
+            if axis >= TRUNKS.index(trunk.kind):  # each kind leaves free one more of x, y and pitch
                 self._hold(self._still, at)
             elif axis == 0:
                 self._spring(at, 0.0, trunk.drag, 0.0)
@@ -143,6 +150,7 @@ class ExudynLegs:
                 self.mbs.AddLoad(eii.LoadCoordinate(markerNumber=at, load=lift))
 
     def _spring(self, at: int, stiffness: float, damping: float, offset: float) -> None:
+        """Add a spring and a damper between the ground and a coordinate."""
         self.mbs.AddObject(
             eii.CoordinateSpringDamper(
                 markerNumbers=[self._still, at], stiffness=stiffness, damping=damping, offset=offset
@@ -150,24 +158,31 @@ class ExudynLegs:
         )
 
     def _point(self, body: int, x: float, y: float) -> int:
+        """Add a marker of a point of a body."""
         return int(self.mbs.AddMarker(eii.MarkerBodyPosition(bodyNumber=body, localPosition=[x, y, 0])))
 
     def _leg(self, i: int) -> dict[str, Any]:
-        limb, start = self.limbs[i], self.start
-        geometry, sigma = limb.geometry, limb.geometry.travel
+        """Add a leg: frame, bodies, joints, lock, drive, and forces from outside; return their numbers."""
+        limb = self.limbs[i]
+        start = self.start
+        geometry = limb.geometry
+        sigma = limb.geometry.travel
         pose = start.poses(self.limbs)[i]
         swing_rate = start.phi(i, start.crank[i])[1] * start.crank_speed[i]
         rates = (*pose.point_velocities[0], sigma * swing_rate)
         frame = self._body(0.0, 0.0, (*pose.point("O"), sigma * start.swing[i]), rates)
         bodies = [
             self._body(
-                float(geometry.body_masses[k]), float(geometry.body_inertias[k]),
-                (*pose.centres[k], pose.angles[k]), (*pose.centre_velocities[k], pose.angular_velocities[k]),
+                float(geometry.body_masses[k]),
+                float(geometry.body_inertias[k]),
+                (*pose.centres[k], pose.angles[k]),
+                (*pose.centre_velocities[k], pose.angular_velocities[k]),
             )
             for k in range(len(BODIES))
-        ]  # fmt: skip
+        ]
 
         def local(k: int, point: str) -> tuple[float, float]:
+            # The frame has its axes in the pose of the hip, bodies theirs at their centres of mass
             if k == FRAME:
                 return (sigma * geometry.pivot[0], geometry.pivot[1]) if point == "C" else (0.0, 0.0)
             out = complex(*(pose.point(point) - pose.centres[k])) * np.exp(-1j * pose.angles[k])
@@ -175,7 +190,8 @@ class ExudynLegs:
 
         hip = [self._point(self._trunk, *limb.hip), self._point(frame, 0.0, 0.0)]
         self.mbs.AddObject(eii.ObjectJointRevolute2D(markerNumbers=hip))
-        joints, ends = [], []
+        joints = []
+        ends = []
         for joint in JOINTS:
             pair = [(frame if k == FRAME else bodies[k], local(k, joint.point)) for k in (joint.j, joint.i)]
             markers = [self._point(body, *at) for body, at in pair]
@@ -196,9 +212,11 @@ class ExudynLegs:
         return {"frame": frame, "bodies": bodies, "joints": joints, "ends": ends, "corners": corners} | drives
 
     def _prescribe(self, i: int, axes: list[int]) -> dict[str, Any]:
-        """Crank and swing as functions of time."""
-        sigma, start = self.limbs[i].geometry.travel, self.start
-        theta, speed = start.crank[i], start.crank_speed[i]
+        """Add crank and swing as functions of time."""
+        sigma = self.limbs[i].geometry.travel
+        start = self.start
+        theta = start.crank[i]
+        speed = start.crank_speed[i]
 
         def swing(t: float) -> float:
             return sigma * (start.phi(i, theta + speed * t)[0] - start.swing[i])
@@ -207,37 +225,46 @@ class ExudynLegs:
         return {"swing": self._hold(axes[0], axes[1], swing), "driver": driver}
 
     def _motor(self, i: int, frame: int, crank: int, axes: list[int]) -> dict[str, Any]:
-        """A torque between frame and crank, the rotor, and the swing geared to the crank."""
-        limb, sigma, start = self.limbs[i], self.limbs[i].geometry.travel, self.start
+        """Add a torque between frame and crank, the rotor, and the swing geared to the crank."""
+        limb = self.limbs[i]
+        sigma = self.limbs[i].geometry.travel
+        start = self.start
         motor = limb.drive
         assert isinstance(motor, Motor)
 
         def torque(mbs: Any, t: float, item: int, u: float, v: float, *unused: float) -> float:
-            """On the crank, against the clock; Exudyn's force pulls marker 1 back."""
+            """Return the torque on the crank, against the clock; Exudyn's force pulls marker 1 back."""
             return sigma * self._servo(i, -sigma * v)
 
         nodes = [self.mbs.GetObjectParameter(body, "nodeNumber") for body in (self._trunk, frame, crank)]
         self.mbs.AddObject(
             eii.CoordinateSpringDamper(markerNumbers=[axes[1], axes[2]], springForceUserFunction=torque)
         )
-        turns = np.array([0, 0, 0, 0, 0, 1 - motor.gear_ratio, 0, 0, motor.gear_ratio])  # of the rotor
+        # Turns of the rotor, by coordinate of trunk, frame and crank
+        turns = np.array([0, 0, 0, 0, 0, 1 - motor.gear_ratio, 0, 0, motor.gear_ratio])
         rotor = self.mbs.AddObject(
             eii.ObjectGenericODE2(
-                nodeNumbers=nodes, massMatrix=motor.rotor_inertia * np.outer(turns, turns),
+                nodeNumbers=nodes,
+                massMatrix=motor.rotor_inertia * np.outer(turns, turns),
                 forceVector=np.zeros(9),
             )
-        )  # fmt: skip
+        )
+        # A held swing needs no gear
         if not start.swings:
             return {"swing": self._hold(axes[0], axes[1])}
         crank_at = self._reference[-3 * len(BODIES) + 2] - self._reference[-3 * len(BODIES) - 1]
 
         def swung(q: NDArray[np.float64]) -> tuple[float, float]:
+            """Return the swing of the leg and its slope by the crank angle."""
             return start.phi(i, start.crank[i] - sigma * (q[8] - q[5] - crank_at))
 
         def error(mbs: Any, t: float, item: int, q: Any, q_t: Any, velocity: bool) -> list[float]:
+            """Return the gap of the gear: swing of the frame against the trunk less that of the crank
+            angle."""
             return [q[5] - q[2] - sigma * swung(q)[0]]
 
         def jacobian(mbs: Any, t: float, item: int, q: Any, q_t: Any, velocity: bool) -> Any:
+            """Return the derivatives of the gap by the coordinates."""
             slope = swung(q)[1]  # sigma * d theta = d frame - d crank
             row = np.zeros((1, len(q)))
             row[0, [2, 5, 8]] = -1.0, 1.0 - slope, slope
@@ -249,13 +276,15 @@ class ExudynLegs:
             self.mbs.AddMarker(eii.MarkerNodeCoordinates(nodeNumber=fixed)),
         ]
         gear = eii.CoordinateVectorConstraint(
-            markerNumbers=markers, scalingMarker0=np.zeros((1, 9)), constraintUserFunction=error,
+            markerNumbers=markers,
+            scalingMarker0=np.zeros((1, 9)),
+            constraintUserFunction=error,
             jacobianUserFunction=jacobian,
-        )  # fmt: skip
+        )
         return {"swing": int(self.mbs.AddObject(gear))}
 
     def _servo(self, i: int, speed: float) -> float:
-        """Torque of a motor whose crank turns at `speed`, along theta [N m]."""
+        """Return the torque along theta [N m] of a motor with a crank that turns at `speed`."""
         motor: Any = self.limbs[i].drive
         asked = motor.speed_gain * (self.start.crank_speed[i] - speed)
         return float(np.clip(asked, -motor.torque_limit, motor.torque_limit))
@@ -263,7 +292,7 @@ class ExudynLegs:
     # The forces
 
     def _sole(self, body: int, x: float) -> tuple[complex, complex]:
-        """Place and velocity of a point on the sole."""
+        """Return position and velocity of a point on the sole."""
         values = [
             self.mbs.GetObjectOutputBody(body, kind, [x, 0, 0], exu.ConfigurationType.Current)
             for kind in (exu.OutputVariableType.Position, exu.OutputVariableType.Velocity)
@@ -271,7 +300,8 @@ class ExudynLegs:
         return complex(*values[0][:2]), complex(*values[1][:2])
 
     def _push(self, i: int, point: int) -> Callable[..., list[float]]:
-        """A connector's law, which Exudyn differentiates for Newton; its force pulls marker 1 back."""
+        """Return the law of a connector, which Exudyn differentiates for Newton; its force pulls marker 1
+        back."""
 
         def force(mbs: Any, t: float, item: int, at: Any, velocity: Any, *unused: Any) -> list[float]:
             assert self.outside is not None
@@ -281,6 +311,7 @@ class ExudynLegs:
         return force
 
     def _touch(self, t: float) -> None:
+        """Call the forces from outside at the end of a step, so that contacts latch."""
         assert self.outside is not None
         for i, leg in enumerate(self._legs):
             for point, x in enumerate(leg["corners"]):
@@ -289,12 +320,13 @@ class ExudynLegs:
     # What is to be seen
 
     def _look(self, t: float) -> tuple[Any, ...]:
-        """What `Record` has of the present instant."""
+        """Return the row of `Record` at the present instant."""
         system = self.mbs.systemData
         q = (np.array(self._reference) + system.GetODE2Coordinates()).reshape(-1, 3)
         v = np.array(system.GetODE2Coordinates_t()).reshape(-1, 3)
         tied = np.array(system.GetAECoordinates())
-        row, rows = self._rows, []
+        row = self._rows
+        rows = []
 
         def multiplier(item: int) -> Any:
             return -tied[list(system.GetObjectLTGAE(item))]
@@ -304,7 +336,8 @@ class ExudynLegs:
 
         for i, (limb, leg) in enumerate(zip(self.limbs, self._legs, strict=True)):
             sigma = limb.geometry.travel
-            frame, crank = row[leg["frame"]], row[leg["bodies"][0]]
+            frame = row[leg["frame"]]
+            crank = row[leg["bodies"][0]]
             start = self._reference[3 * crank + 2] - self._reference[3 * frame + 2]
             theta = self.start.crank[i] - sigma * (q[crank, 2] - q[frame, 2] - start)
             speed = -sigma * (v[crank, 2] - v[frame, 2])
@@ -313,7 +346,7 @@ class ExudynLegs:
                 torque = self._servo(i, speed)
             else:
                 torque = -sigma * float(multiplier(leg["driver"])[0])
-            gaps = [abs(place(*one) - place(*two)) for one, two in leg["ends"]]
+            gaps = [abs(place(*end_of_one) - place(*end_of_two)) for end_of_one, end_of_two in leg["ends"]]
             pins = np.array([multiplier(joint) for joint in leg["joints"]])
             rows.append((theta, speed, torque, swing, pins, max(gaps)))
         thetas, speeds, torques, swings, forces, widest = map(np.array, zip(*rows, strict=True))

@@ -1,4 +1,5 @@
-"""Every run's barred ratios with date, processor and vector width: a new run does not replace an old one.
+"""History of every run's barred ratios with date, processor and vector width: a new run does not replace an
+old one.
 
 A run adds rows to `speed.csv`; `speed.md` shows them all.
 """
@@ -15,7 +16,7 @@ from benchmarks.rounds import bar_text
 from hoof_env._output import markdown_table, staged
 
 RESULTS = Path(__file__).parent / "results"
-"""Holds a folder for each vector width, and the history of all."""
+"""Folder with one for each vector width, and the history of all."""
 
 RUN = ("date", "commit", "compiled for", "processor")
 COLUMNS = ("case", "beside", "bits", "ratio", "q1", "q3", "required", *RUN)
@@ -27,17 +28,18 @@ Written by `make bench`, which adds rows and replaces none. A ratio is the media
 its quartiles; bits are of the widest vectors that numba compiled. The last run of each width in full:"""
 
 Row = tuple[str, str, Mapping[str, float] | None, float | None]
-"""Case, what it is beside, the ratio's spread if it was measured, and the bar if there is one."""
+"""Case, the case that it is compared with, the ratio's spread if it was measured, and the bar if there is
+one."""
 
 
 def write(folder: Path, name: str, result: Mapping[str, Any], page: str, rows: Iterable[Row]) -> Path:
-    """Write a run and its page for its vector width, and `keep` its rows; returns the folder of the width."""
-    own = folder / f"{result['bits']}-bits"
-    with staged(own) as stage:
+    """Write a run and its page for its vector width, and `keep` its rows; return the folder of the width."""
+    width_folder = folder / f"{result['bits']}-bits"
+    with staged(width_folder) as stage:
         (stage / f"{name}.json").write_text(json.dumps(result, indent=1) + "\n")
         (stage / f"{name}.md").write_text(page)
     keep(folder, result["machine"], result["bits"], rows)
-    return own
+    return width_folder
 
 
 def keep(folder: Path, machine: Mapping[str, str], bits: int, rows: Iterable[Row]) -> None:
@@ -50,22 +52,23 @@ def keep(folder: Path, machine: Mapping[str, str], bits: int, rows: Iterable[Row
         rows: of one run.
     """
     run = {"bits": str(bits)} | {name: machine[name] for name in RUN}
-    kept = read(folder)
-    for case, beside, ratio, required in rows:
+    history = read(folder)
+    for case, reference, ratio, required in rows:
+        # Cases without a bar are in the run's own page only
         if ratio is not None and required is not None:
             numbers = {"ratio": ratio["median"], "q1": ratio["q1"], "q3": ratio["q3"], "required": required}
             texts = {name: f"{value:.3g}" for name, value in numbers.items()}
-            kept.append({"case": case, "beside": beside} | texts | run)
+            history.append({"case": case, "beside": reference} | texts | run)
     with staged(folder) as stage:
         with (stage / "speed.csv").open("w", newline="") as file:
             writer = csv.DictWriter(file, COLUMNS, lineterminator="\n")
             writer.writeheader()
-            writer.writerows(kept)
-        (stage / "speed.md").write_text(page(kept, folder))
+            writer.writerows(history)
+        (stage / "speed.md").write_text(page(history, folder))
 
 
 def read(folder: Path) -> list[dict[str, str]]:
-    """The rows of all runs so far."""
+    """Return the rows of all runs so far."""
     path = folder / "speed.csv"
     if not path.exists():
         return []
@@ -74,7 +77,7 @@ def read(folder: Path) -> list[dict[str, str]]:
 
 
 def page(rows: list[dict[str, str]], folder: Path) -> str:
-    """All runs as Markdown, case by case and each in order of time."""
+    """Return all runs as Markdown, case by case and each in order of time."""
     links = sorted(path.relative_to(folder) for path in folder.glob("*-bits/*.md"))
     listed = [f"* [{link.parent.name}, {link.stem}]({link.as_posix()})" for link in links]
     cases = list(dict.fromkeys(row["case"] for row in rows))

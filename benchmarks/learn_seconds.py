@@ -12,6 +12,7 @@ from __future__ import annotations
 
 import time
 
+# Before everything else: imports are timed, too
 BEGAN = time.perf_counter()
 
 import argparse  # noqa: E402
@@ -35,9 +36,9 @@ IMPORTED = time.perf_counter()
 
 ENV_ID = "hoof_env/HorseLeg-v0"
 STARTS = range(2_000_000, 2_000_064)
-STEPS = 1_300_000  # of a training of `ppo_flat`
-NEAR = 0.05  # of the final return
-STOCK_SECONDS = 60.0  # that a stock learner may take
+STEPS = 1_300_000  # steps of a training of `ppo_flat`
+NEAR = 0.05  # largest distance from the final return, as a share of it
+STOCK_SECONDS = 60.0  # most seconds of a stock learner
 
 Curve = list[tuple[float, int, float]]
 """Seconds, steps and return of each score."""
@@ -52,7 +53,7 @@ the mean of 64 starts; scores are not counted. Imports took {imports:.1f} s, loa
 
 
 class Timed(BaseCallback):
-    """Scores the policy after updates, with the clock stopped.
+    """Callback that scores the policy after updates, with the clock stopped.
 
     Attributes:
         curve: seconds, steps and return of each score.
@@ -75,15 +76,15 @@ class Timed(BaseCallback):
         self.score()
 
     def score(self) -> None:
-        """Score the policy where a score is due."""
+        """Score the policy if a score is due."""
         if self.num_timesteps < self._due:
             return
-        here = time.perf_counter()
+        paused = time.perf_counter()
         episodes = play_rows(self.envs, self.model, STARTS)
-        value = float(np.mean([one["return"] for one in episodes]))
-        self.curve.append((here - self._began - self._stopped, self.num_timesteps, value))
+        value = float(np.mean([episode["return"] for episode in episodes]))
+        self.curve.append((paused - self._began - self._stopped, self.num_timesteps, value))
         self._due = self.num_timesteps + self.steps_between
-        self._stopped += time.perf_counter() - here
+        self._stopped += time.perf_counter() - paused
 
     def _on_step(self) -> bool:
         seconds = time.perf_counter() - self._began - self._stopped
@@ -91,12 +92,12 @@ class Timed(BaseCallback):
 
 
 def first(curve: Curve, level: float) -> float:
-    """Seconds until a curve is above a level; infinite where it never is."""
+    """Return the seconds until a curve is above a level; infinite if it never is."""
     return next((seconds for seconds, _, value in curve if value > level), np.inf)
 
 
 def learn_flat(seed: int, envs: Any, threads: int, steps: int = STEPS) -> Curve:
-    """The curve of a training of `ppo_flat`, scored after every update at first, then after every eighth."""
+    """Train `ppo_flat` and return its curve, scored after every update at first, then after every eighth."""
     settings = load_settings(FOLDER / "ppo_flat.yml", ENV_ID)
     many = VecMonitor(runs.make_vec_env(ENV_ID, settings["n_envs"], 1))
     settings["n_timesteps"] = steps
@@ -104,7 +105,7 @@ def learn_flat(seed: int, envs: Any, threads: int, steps: int = STEPS) -> Curve:
     timed = Timed(envs, 0)
 
     class Sparser(BaseCallback):
-        """Scores less often later on."""
+        """Callback that scores less often later on."""
 
         def _on_step(self) -> bool:
             if self.num_timesteps > 200_000:
@@ -112,13 +113,14 @@ def learn_flat(seed: int, envs: Any, threads: int, steps: int = STEPS) -> Curve:
             return True
 
     model.learn(steps, callback=[timed, Sparser()])
+    # The last policy is scored, due or not
     timed._due = 0
     timed.score()
     return timed.curve
 
 
 def learn_stock(library: str, algo: str, seed: int, envs: Any, level: float) -> Curve:
-    """The curve of a stock learner, until it is above a level or its time is over."""
+    """Train a stock learner until it is above a level or its time is over, and return its curve."""
     algorithm = getattr(importlib.import_module(library), algo)
     with runs.make_env(ENV_ID) as env:
         model = algorithm("MlpPolicy", env, seed=seed)
@@ -128,7 +130,7 @@ def learn_stock(library: str, algo: str, seed: int, envs: Any, level: float) -> 
 
 
 def spread(values: list[float]) -> str:
-    """Median, lowest and highest."""
+    """Format median, lowest and highest."""
     shown = [f"{value:.1f}" if np.isfinite(value) else "never" for value in sorted(values)]
     return f"{np.median(values):.1f} ({shown[0]} to {shown[-1]})" if len(values) > 1 else shown[0]
 
@@ -148,7 +150,8 @@ def main() -> None:
     with runs.make_env(ENV_ID) as env:
         runs.warm_up(env)
         gait = find_policy("open-loop", env, ENV_ID)
-        level = float(np.mean([one["return"] for one in play_rows(envs, gait, STARTS)]))
+        level = float(np.mean([episode["return"] for episode in play_rows(envs, gait, STARTS)]))
+    # Outside of the clock of all trainings
     learn_flat(0, envs, args.threads, 4096)  # loads the trainer's kernels
     loading = time.perf_counter() - begin
     results: dict[str, list[Curve]] = {"ppo_flat": []}
@@ -165,7 +168,8 @@ def main() -> None:
             print(f"{name} {algo} done", flush=True)
     rows = []
     for name, curves in results.items():
-        near, final = "", ""
+        near = ""
+        final = ""
         if name == "ppo_flat":
             near = spread([first(curve, (1 - NEAR) * curve[-1][2]) for curve in curves])
             final = spread([curve[-1][2] for curve in curves])
@@ -177,8 +181,8 @@ def main() -> None:
     head = ("learner", "seeds", "seconds to the best open loop", "seconds to within 5 %", "final return")
     text = "\n\n".join([intro, markdown_table(head, rows), markdown_table(("what", ""), [*about.items()])])
     bits = vector_bits()
-    found = {"machine": about, "bits": bits, "open_loop": level, "curves": results}
-    write(args.out, "learn_seconds", found, text + "\n", [])
+    result = {"machine": about, "bits": bits, "open_loop": level, "curves": results}
+    write(args.out, "learn_seconds", result, text + "\n", [])
     print(text)
 
 

@@ -1,4 +1,4 @@
-"""What a benchmark ran on, and what numba compiled for there."""
+"""Description of the machine of a benchmark, and of the code that numba compiled for it."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ PACKAGES = ("hoof-env", "numba", "llvmlite", "numpy", "mujoco", "exudyn")
 
 
 def machine() -> dict[str, str]:
-    """Processor, vector width, system, versions, date and commit."""
+    """Return processor, vector width, system, versions, date and commit."""
     installed = {d.metadata["Name"]: d.version for d in metadata.distributions()}
     return {
         "processor": f"{_processor()}, {os.cpu_count()} cores",
@@ -35,13 +35,14 @@ def machine() -> dict[str, str]:
 
 
 def compiled_for() -> str:
-    """LLVM's name of the processor that numba compiles for; `NUMBA_CPU_NAME` can name another."""
+    """Return LLVM's name of the processor that numba compiles for; `NUMBA_CPU_NAME` can name another."""
     return str(cpu_target.target_context.codegen().magic_tuple()[1])
 
 
 @cache
 def vector_bits() -> int:
-    """Bits of the widest vectors in the code that numba makes here, read off the sum of eight lanes."""
+    """Return the bits of the widest vectors in the code that numba makes here, read off the sum of eight
+    lanes."""
 
     @numba.njit
     def add(x):  # type: ignore[no-untyped-def]
@@ -50,19 +51,23 @@ def vector_bits() -> int:
         write(one + one, address(x), 0, 1)
 
     add(np.zeros(8))
+    # Names of registers tell the width: numba may be told another processor than this one
     code = "".join(add.inspect_asm().values())
-    if registers := re.findall(r"%([xyz])mm", code):  # of x86
+    if registers := re.findall(r"%([xyz])mm", code):  # registers of x86
         return {"x": 128, "y": 256, "z": 512}[max(registers)]
     return 128 if re.search(r"\bv\d+\.2d", code) else 64
 
 
 def _processor() -> str:
+    """Return the name of the processor."""
     path = Path("/proc/cpuinfo")
     name = re.search(r"^model name\s*: (.*)$", path.read_text() if path.exists() else "", re.M)
     return name[1] if name else platform.processor() or "unknown"
 
 
 def _commit() -> str:
+    """Return the commit, and if the work tree differs from it."""
+
     def git(*arguments: str) -> str:
         here = Path(__file__).parent
         return subprocess.check_output(["git", *arguments], cwd=here, text=True, stderr=subprocess.DEVNULL)

@@ -33,14 +33,15 @@ FLYWHEEL = 1e9
 """Inertia that keeps a prescribed crank at its speed [kg m^2]: it is 1e10 times the leg's."""
 
 RADIUS = 0.01
-"""Of the balls at toe and heel [m]; the floor lies a radius deeper, so a ball touches when its point does."""
+"""Radius of the balls at toe and heel [m]; the floor lies a radius deeper, so a ball touches when its point
+does."""
 
 SLIDES = {"fixed": (), "rail": ("x",), "suspended": ("x", "y"), "free": ("x", "y", "pitch")}
 
 _SPEED = 'solver="Newton" jacobian="dense" integrator="Euler" iterations="5" tolerance="1e-8"'
-"""The fastest that holds the loops. One Newton iteration loses the horse, and so do 50 of CG; PGS is slower,
-a sparse Jacobian is, too, but for 14 hinges a leg on four legs, implicitfast by 3 %, elliptic
-cones by 20 % on four legs, and islands, which are off below, by 9 %."""
+"""Options of the fastest solver that holds the loops. One Newton iteration loses the horse, and so do 50 of
+CG; PGS is slower, a sparse Jacobian is, too, but for 14 hinges a leg on four legs, implicitfast by 3 %,
+elliptic cones by 20 % on four legs, and islands, which are off below, by 9 %."""
 
 _TRUTH = 'solver="Newton" jacobian="dense" integrator="RK4" iterations="50" tolerance="0"'
 
@@ -52,8 +53,10 @@ def _xyz(z: Any) -> str:
 def _leg(
     assembly: Assembly, limb: Limb, i: int, at: Pose, frame: NDArray[np.float64], contact: bool, rotor: float
 ) -> str:
-    """The bodies of a leg, each with the world's axes in the pose `at`; `frame` is the trunk's origin."""
-    masses, inertias = limb.geometry.body_masses, limb.geometry.body_inertias
+    """Return the XML of a leg's bodies, each with the world's axes in the pose `at`; `frame` is the trunk's
+    origin."""
+    masses = limb.geometry.body_masses
+    inertias = limb.geometry.body_inertias
 
     def body(link: str, parent_at: NDArray[np.float64]) -> str:
         pin = at.point(assembly.carrier[link][1])
@@ -62,7 +65,8 @@ def _leg(
         text += f'<joint name="{link} {i}" axis="0 0 {axis}" armature="{armature:.17g}"/>'
         for order, k in enumerate(assembly.links[link]):
             centre = _xyz((at.centres[k] - pin).tolist())
-            j, m = float(inertias[k]), float(masses[k])
+            j = float(inertias[k])
+            m = float(masses[k])
             inertial = f'mass="{m:.17g}" diaginertia="{j:.17g} {j:.17g} {j:.17g}"'
             if order == 0:
                 text += f'<inertial pos="{centre}" {inertial}/>'
@@ -86,22 +90,23 @@ def build_model(
     assembly: Assembly = RIGID,
     solref: tuple[float, float] | None = None,
 ) -> mujoco.MjModel:
-    """A horse in MuJoCo whose joints are at zero in the pose of `start`.
+    """Build a horse in MuJoCo with all joints at zero in the pose of `start`.
 
     Args:
         limbs, trunk: the horse. A prescribed crank is a flywheel that keeps its speed.
         start: its first pose.
         dt: time step [s].
-        contact: MuJoCo's own, of balls at toe and heel with the ground at y = 0.
-        assembly: which links are one body with a hinge; `RIGID` or `ALL`.
-        solref: of the loops; see the module's docstring.
+        contact: add MuJoCo's own contact, of balls at toe and heel with the ground at y = 0.
+        assembly: bodies that are one link; `RIGID` or `ALL`.
+        solref: time constant [s] and damping ratio of the loops; see the module's docstring.
 
     Raises:
         ValueError: the start asks for a swing that moves.
     """
     if start.swings:
         raise ValueError("MuJoCo's legs keep their swing: expected swing_sin and swing_cos of 0")
-    at, h = start.position, trunk.height - start.position[1]
+    at = start.position
+    h = trunk.height - start.position[1]
     solref = solref or ((2 if contact else 10) * dt, 1.0)
     spring = (trunk.damping, trunk.stiffness, h) if trunk.kind == "suspended" else (0.0, 0.0, 0.0)
     slides = "".join(
@@ -116,11 +121,17 @@ def build_model(
     )
     # A rotor on a trunk that pitches turns with it: an armature of the joint would leave that out.
     pitching = trunk.kind == "free" and not contact
-    legs, loops, locks, motors, rotors = "", "", "", "", ""
+    legs = ""
+    loops = ""
+    locks = ""
+    motors = ""
+    rotors = ""
     for i, (limb, pose) in enumerate(zip(limbs, start.poses(limbs), strict=True)):
-        drive, rotor = limb.drive, FLYWHEEL
+        drive = limb.drive
+        rotor = FLYWHEEL
         if isinstance(drive, Motor):
-            rotor, top = 0.0 if pitching else drive.reflected_inertia, drive.torque_limit
+            rotor = 0.0 if pitching else drive.reflected_inertia
+            top = drive.torque_limit
             motors += f'<velocity joint="crank {i}" kv="{drive.speed_gain:.17g}"'
             motors += f' forcerange="{-top:.17g} {top:.17g}"/>'
             if pitching:
@@ -160,13 +171,14 @@ def build_model(
   <actuator>{motors}</actuator>
 </mujoco>""")
     if not contact:
+        # Softness of the constraints scales with these weights; see the module's docstring
         model.body_invweight0[:] *= 1e-4
         model.dof_invweight0[:] *= 1e-4
     return model
 
 
 class MujocoLegs:
-    """A horse of `build_model` with its state, drives and forces from outside.
+    """Horse of `build_model` with its state, drives and forces from outside.
 
     Args:
         limbs, trunk, start, dt: as in `build_model`, which takes `build`, too.
@@ -184,7 +196,10 @@ class MujocoLegs:
         **build: Any,
     ) -> None:
         self.assembly = assembly
-        self.limbs, self.trunk, self.start, self.outside = tuple(limbs), trunk, start, outside
+        self.limbs = tuple(limbs)
+        self.trunk = trunk
+        self.start = start
+        self.outside = outside
         self.model = build_model(limbs, trunk, start, dt, assembly=assembly, **build)
         self.data = mujoco.MjData(self.model)
         joints = {self.model.joint(k).name: k for k in range(self.model.njnt)}
@@ -194,11 +209,12 @@ class MujocoLegs:
             {link: self.model.body(f"{link} {i}").id for link in assembly.links} for i in range(len(limbs))
         ]
         poses = start.poses(limbs)
-        self._arms = [  # of toe and heel from the ankle, in the hoof's axes
+        self._arms = [  # vectors of toe and heel from the ankle, in the hoof's axes
             [pose.point(name) - pose.point("G") for name in corners(limb)]
             for pose, limb in zip(poses, limbs, strict=True)
         ]
         for i, pose in enumerate(poses):
+            # MuJoCo's joints turn relative to the carrier
             spin = {"frame": 0.0}
             for link, parent, _ in assembly.tree:
                 spin[link] = pose.angular_velocities[assembly.links[link][0]]
@@ -223,7 +239,7 @@ class MujocoLegs:
             self.evaluate()
 
     def run(self, duration: float, samples: int) -> Record:
-        """Advance by `duration` [s] and look `samples` times besides the beginning, evenly."""
+        """Advance by `duration` [s] and look `samples` times after the beginning, evenly."""
         steps = round(duration / self.model.opt.timestep / samples)
         rows = [self.look()]
         for _ in range(samples):
@@ -232,14 +248,20 @@ class MujocoLegs:
         return Record.of(rows)
 
     def look(self) -> tuple[Any, ...]:
-        """What `Record` has of the present instant."""
+        """Return the row of `Record` at the present instant."""
         return (
-            self.data.time, self.crank, self.crank_speed, self.body, self.crank_torque, self.hip_torque,
-            self.pins(), self.closure(),
-        )  # fmt: skip
+            self.data.time,
+            self.crank,
+            self.crank_speed,
+            self.body,
+            self.crank_torque,
+            self.hip_torque,
+            self.pins(),
+            self.closure(),
+        )
 
     def evaluate(self) -> None:
-        """Accelerations and forces at the present state."""
+        """Evaluate accelerations and forces at the present state."""
         self._guarded(mujoco.mj_forward)
         mujoco.mj_rnePostConstraint(self.model, self.data)
 
@@ -255,21 +277,25 @@ class MujocoLegs:
             mujoco.set_mjcb_passive(None)
 
     def _load(self, commit: bool) -> None:
+        """Apply the forces from outside to the hooves, at their centres of mass."""
         assert self.outside is not None
         for i, bodies in enumerate(self._bodies):
             hoof = bodies["hoof"]
             turn = self.data.xmat[hoof].reshape(3, 3)
             spatial = np.zeros(6)
             mujoco.mj_objectVelocity(self.model, self.data, mujoco.mjtObj.mjOBJ_XBODY, hoof, spatial, 0)
-            spin, velocity = spatial[2], complex(spatial[3], spatial[4])
+            spin = spatial[2]
+            velocity = complex(spatial[3], spatial[4])
             centre = complex(*self.data.xipos[hoof][:2])
-            total, moment = 0j, 0.0
+            total = 0j
+            moment = 0.0
             for point, arm in enumerate(self._arms[i]):
                 out = turn[:2, :2] @ arm
                 lever = complex(*out)
                 at = complex(*self.data.xpos[hoof][:2]) + lever
                 force = self.outside(i, point, self.data.time, at, velocity + 1j * spin * lever, commit)
                 total += force
+                # MuJoCo applies forces at the centre of mass
                 moment += ((at - centre).conjugate() * force).imag
             self.data.xfrc_applied[hoof, [0, 1, 5]] = total.real, total.imag, moment
 
@@ -280,7 +306,7 @@ class MujocoLegs:
 
     @property
     def crank_speed(self) -> NDArray[np.float64]:
-        """Of each crank [rad/s]."""
+        """Speed of each crank [rad/s]."""
         return np.array(self.data.qvel[self._cranks])
 
     @property
@@ -294,18 +320,22 @@ class MujocoLegs:
 
     @property
     def crank_torque(self) -> NDArray[np.float64]:
-        """What the drives give [N m], along theta."""
+        """Torques of the drives [N m], along theta."""
+        # A flywheel keeps its speed: what slows it is the torque of the drive
         torque = -FLYWHEEL * self.data.qacc[self._cranks]
         torque[self._motors] = self.data.actuator_force
         return torque
 
     @property
     def hip_torque(self) -> NDArray[np.float64]:
-        """What holds each leg's frame about O [N m], along phi, against its pins, drive and rotor."""
-        torque, pins, spin = -self.crank_torque, self.pins(), self.data.qacc[self._cranks]
+        """Torques that hold each leg's frame about O [N m], along phi, against its pins, drive and rotor."""
+        torque = -self.crank_torque
+        pins = self.pins()
+        spin = self.data.qacc[self._cranks]
         pitch = self.data.qacc[self._slides[2]] if self.trunk.kind == "free" else 0.0
         for i, limb in enumerate(self.limbs):
-            sigma, (x, y) = limb.geometry.travel, limb.geometry.pivot
+            sigma = limb.geometry.travel
+            (x, y) = limb.geometry.pivot
             c = complex(sigma * x, y) * np.exp(1j * (self.body[2] + sigma * self.start.swing[i]))
             at_c = pins[i][[point == "C" for point, _, _ in self.assembly.pins]].sum(axis=0)
             torque[i] += sigma * cross(c, complex(*at_c))
@@ -315,13 +345,17 @@ class MujocoLegs:
         return torque
 
     def pins(self) -> NDArray[np.float64]:
-        """Forces at the pins [N], shape (legs, pins, 2), in the order of `assembly.pins`."""
-        pins, loops, carrier = self.assembly.pins, self.assembly.loops, self.assembly.carrier
+        """Return the forces at the pins [N], shape (legs, pins, 2), in the order of `assembly.pins`."""
+        pins = self.assembly.pins
+        loops = self.assembly.loops
+        carrier = self.assembly.carrier
         forces = np.empty((len(self.limbs), len(pins), 2))
         ties = np.asarray(self.data.efc_force[: 3 * len(loops) * len(self.limbs)])
         ties = ties.reshape(len(self.limbs), len(loops), 3)[..., :2]
         for i, bodies in enumerate(self._bodies):
             for k, (point, one, two) in enumerate(pins):
+                # Loops are constraints, all other pins joints between bodies, whose force is that on the
+                # child
                 if (point, one, two) in loops:
                     forces[i, k] = ties[i, loops.index((point, one, two))]
                 elif carrier[one] == (two, point):
@@ -331,7 +365,7 @@ class MujocoLegs:
         return forces
 
     def points(self, leg: int) -> dict[str, complex]:
-        """Where the pins that begin a link are, and the toe and the heel [m]."""
+        """Return the places of the pins that begin a link, and of toe and heel [m]."""
         bodies = self._bodies[leg]
         at = {point: complex(*self.data.xpos[bodies[link]][:2]) for link, _, point in self.assembly.tree}
         turn = complex(*self.data.xmat[bodies["hoof"]][[0, 3]])
@@ -340,6 +374,6 @@ class MujocoLegs:
         return at
 
     def closure(self) -> float:
-        """The widest gap of a loop [m]."""
+        """Return the widest gap of a loop [m]."""
         gaps = np.asarray(self.data.efc_pos[: 3 * len(self.assembly.loops) * len(self.limbs)]).reshape(-1, 3)
         return float(np.linalg.norm(gaps, axis=1).max())

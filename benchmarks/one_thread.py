@@ -1,4 +1,5 @@
-"""Imported first: every library that would start threads is told to keep to one."""
+"""Environment variables that keep every library to one thread; this module is imported before the
+libraries."""
 
 import os
 

@@ -1,4 +1,4 @@
-"""The animals that `speed` times: the same leg and the same horse in every engine.
+"""Animals that `speed` times: the same leg and the same horse in every engine.
 
 All walk: contact, motors, steps of 1 ms. MuJoCo's legs keep their swing, so here all legs do; the engine has
 no branch on a swing, so its cost is that of any gait. MuJoCo's contact is not in N/m: its time constant here
@@ -29,13 +29,13 @@ SPEED = 2 * np.pi
 
 @dataclass(frozen=True)
 class Scene:
-    """Legs on a trunk, as all engines get them.
+    """Legs on a trunk, the same for all engines.
 
     Attributes:
-        name: of the table's rows.
+        name: name in the table's rows.
         limbs, trunk: the animal.
-        cranks: angle of each at the start [rad].
-        swing: of all [rad].
+        cranks: angle of each crank at the start [rad].
+        swing: swing of all legs [rad].
         softness: time constant of MuJoCo's contact [s].
     """
 
@@ -48,14 +48,17 @@ class Scene:
 
     @property
     def start(self) -> Start:
+        """State in which it begins."""
         n = len(self.limbs)
         return Start(self.cranks, (SPEED,) * n, (self.swing,) * n, position=(0.0, self.trunk.height))
 
 
 def scenes(preset: str) -> dict[str, Scene]:
-    """The leg on a fixed trunk, the leg on a suspended one, and the horse."""
-    geometry, swing = load_geometry(preset), load_gait("walk", preset).swing_offset
-    high, one = geometry.hip_height, (Limb(geometry, drive=Motor()),)
+    """Return the leg on a fixed trunk, the leg on a suspended one, and the horse, by name."""
+    geometry = load_geometry(preset)
+    swing = load_gait("walk", preset).swing_offset
+    high = geometry.hip_height
+    one_limb = (Limb(geometry, drive=Motor()),)
     hips = ((0.6, 0.0), (0.6, 0.0), (-0.6, 0.0), (-0.6, 0.0))
     four = tuple(Limb(geometry, hip=hip, drive=Motor()) for hip in hips)
     trot = tuple(0.3 + x for x in (0.0, np.pi, np.pi, 0.0))
@@ -63,27 +66,27 @@ def scenes(preset: str) -> dict[str, Scene]:
     return {
         scene.name: scene
         for scene in (
-            Scene("leg", one, Trunk(kind="fixed", height=high - 0.05), (0.3,), swing, 1.0),
-            Scene("suspended leg", one, Trunk(kind="suspended", height=high), (0.3,), swing, 0.1),
+            Scene("leg", one_limb, Trunk(kind="fixed", height=high - 0.05), (0.3,), swing, 1.0),
+            Scene("suspended leg", one_limb, Trunk(kind="suspended", height=high), (0.3,), swing, 0.1),
             Scene("horse", four, big, trot, swing, 0.1),
         )
     }
 
 
 def with_springs(scene: Scene) -> Scene:
-    """The scene with springs at the hooves."""
+    """Return the scene with springs at the hooves."""
     spring = HoofSpring.with_ratio(4e4, 475.0 / 4)
     return replace(scene, limbs=tuple(replace(limb, spring=spring) for limb in scene.limbs))
 
 
 def engine(scene: Scene, preset: str, num_envs: int = 1, **options: Any) -> TrunkEngine:
-    """The scene in this project's engine, with crank angles all round the circle, in random order."""
+    """Return the scene in this project's engine, with crank angles all round the circle, in random order."""
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", StepWarning)  # the cost of a step is asked, not its error
-        made = TrunkEngine(
+        trunk_engine = TrunkEngine(
             scene.limbs, scene.trunk, load_ground(preset), sim_dt=DT, substeps=1, num_envs=num_envs, **options
         )
     turns = 2 * np.pi / num_envs * np.random.default_rng(0).permutation(num_envs)
     gait = GaitParameters(SPEED, scene.swing, 0.0, 0.0)
-    made.reset(gait, np.array(scene.cranks)[:, None] + turns)
-    return made
+    trunk_engine.reset(gait, np.array(scene.cranks)[:, None] + turns)
+    return trunk_engine

@@ -1,7 +1,7 @@
-"""How fast the engine is, beside MuJoCo and Exudyn on the same leg: `make bench`.
+"""Speed of the engine compared with MuJoCo and Exudyn on the same leg: `make bench`.
 
 Everything runs interleaved in one process on one thread. Writes speed.json and speed.md into a folder for the
-vector width, and a row for each barred case into speed.csv and speed.md beside it.
+vector width, and a row for each barred case into speed.csv and speed.md next to it.
 """
 
 from __future__ import annotations
@@ -37,8 +37,8 @@ ROUNDS = 40
 BATCH = 1024
 
 PRESET = "identified"
-"""With its swing held, its walk meets the ground under a fixed trunk too; that of
-`tests/data/first_fit.json` does not."""
+"""Leg and ground of the scenes. With its swing held, its walk meets the ground under a fixed trunk, too; that
+of `tests/data/first_fit.json` does not."""
 
 ASSEMBLIES = {"ALL": ALL, "RIGID": RIGID}
 
@@ -60,7 +60,8 @@ VARIANTS: tuple[tuple[str, dict[str, Any], float], ...] = (
     (", all joint reactions", {"reactions": True}, 0.5),
     (", semi_implicit_euler", {"integrator": "semi_implicit_euler"}, 0.0),
 )
-"""Name, options of the engine, and share of the bars that is asked of it; the last is MuJoCo's own scheme."""
+"""Name, options of the engine, and the share of the bars that it must meet; the last is MuJoCo's own
+scheme."""
 
 ANIMAL: tuple[tuple[str, dict[str, Any], float | None], ...] = (
     (", springs and three harmonics", {"harmonics": 3}, 1.4),
@@ -70,7 +71,7 @@ ANIMAL: tuple[tuple[str, dict[str, Any], float | None], ...] = (
         None,
     ),
 )
-"""What a whole animal has beyond rigid legs, and how much longer a step may take than theirs."""
+"""Name and options of compliant legs, and the largest ratio of their time of a step to that of rigid legs."""
 
 INTRO = """\
 # How fast it is
@@ -99,16 +100,16 @@ one, in the same round."""
 
 @dataclass(frozen=True)
 class Case:
-    """Something to time.
+    """Piece of work to time.
 
     Attributes:
         name: unique.
         group: the scene; cases of one group have the same reference.
-        run: does the work from the same state and returns the time that it took [s].
-        units: steps of the whole animal that this is.
-        note: for the table.
+        run: does the work from the same state and returns its time [s].
+        units: steps of the whole animal in it.
+        note: remark in the table.
         required, aimed: bars of the ratio to the reference.
-        bits: of the widest vectors in code that numba compiled.
+        bits: bits of the widest vectors in code that numba compiled.
     """
 
     name: str
@@ -126,7 +127,7 @@ Clock = Callable[[], float]
 
 
 def own_cases(quick: bool, clock: Clock) -> list[Case]:
-    """Cases of this project's engine."""
+    """Return the cases of this project's engine."""
     cases = []
     for (name, count), steps in STEPS.items():
         n, steps = (min(count, 64), max(steps // 20, 4)) if quick else (count, steps)
@@ -143,14 +144,16 @@ def own_cases(quick: bool, clock: Clock) -> list[Case]:
 
 
 def run_of(made: TrunkEngine, steps: int, clock: Clock) -> Callable[[], float]:
-    """Times so many steps of an engine from where it is now, its kernels compiled."""
+    """Return a function that times `steps` steps of an engine from its present state, with compiled
+    kernels."""
+    # Compiles outside of the clock
     made.advance(steps=1, account=False)
     before = partial(made.set_state, made.get_state())
     return partial(timed, clock, before, partial(made.advance, steps=steps, account=False))
 
 
 def mujoco_cases(quick: bool, clock: Clock) -> list[Case]:
-    """MuJoCo's `mj_step`, with its own contact and the Jacobian that is faster here."""
+    """Return the cases of MuJoCo's `mj_step`, with its own contact and the Jacobian that is faster here."""
     import mujoco
 
     from benchmarks.mujoco_legs import MujocoLegs
@@ -158,7 +161,9 @@ def mujoco_cases(quick: bool, clock: Clock) -> list[Case]:
     def run_of(scene: Scene, assembly: str, jacobian: int) -> Callable[[], float]:
         parts = ASSEMBLIES[assembly]
         legs = MujocoLegs(scene.limbs, scene.trunk, scene.start, dt=DT, contact=True, assembly=parts)
-        model, data, what = legs.model, legs.data, mujoco.mjtState.mjSTATE_INTEGRATION
+        model = legs.model
+        data = legs.data
+        what = mujoco.mjtState.mjSTATE_INTEGRATION
         model.geom_solref[:] = scene.softness, 1.0
         model.opt.jacobian = jacobian
         state = np.empty(mujoco.mj_stateSize(model, what))
@@ -166,12 +171,14 @@ def mujoco_cases(quick: bool, clock: Clock) -> list[Case]:
         before = partial(mujoco.mj_setState, model, data, state, what)
         return partial(timed, clock, before, partial(mujoco.mj_step, model, data, steps))
 
-    cases, steps = [], 50 if quick else 1000
+    cases = []
+    steps = 50 if quick else 1000
     for name in ("leg", "horse"):
         for assembly in ASSEMBLIES:
             runs = {
                 kind: run_of(scenes(PRESET)[name], assembly, k) for k, kind in enumerate(("dense", "sparse"))
             }
+            # The peer runs with the options that serve it best
             fastest = {kind: min(run() for _ in range(2 if quick else 7)) for kind, run in runs.items()}
             best = min(runs, key=lambda kind: fastest[kind])
             cases.append(Case(f"{name}, MuJoCo {assembly}", name, runs[best], steps, f"{best} Jacobian"))
@@ -179,7 +186,7 @@ def mujoco_cases(quick: bool, clock: Clock) -> list[Case]:
 
 
 def exudyn_cases(quick: bool, clock: Clock) -> list[Case]:
-    """Exudyn at its fastest, with our contact law and our motor in Python."""
+    """Return the cases of Exudyn at its fastest, with this project's contact law and motor in Python."""
     from benchmarks.exudyn_legs import ExudynLegs
 
     def run(scene: Scene) -> float:
@@ -187,7 +194,8 @@ def exudyn_cases(quick: bool, clock: Clock) -> list[Case]:
         legs = ExudynLegs(scene.limbs, scene.trunk, scene.start, dt=DT, outside=law)
         return timed(clock, lambda: None, partial(legs.run, steps * DT, 1, fast=True))
 
-    steps, title = 5 if quick else 50, "Exudyn with our contact law from Python"
+    steps = 5 if quick else 50
+    title = "Exudyn with our contact law from Python"
     return [
         Case(f"{name}, {title}", name, partial(run, scenes(PRESET)[name]), steps, "modified Newton")
         for name in ("leg", "horse")
@@ -199,8 +207,10 @@ def compare(cases: list[Case], rounds: int) -> list[dict[str, Any]]:
     seconds = interleave({case.name: case.run for case in cases}, rounds)
     costs = {
         case.name + what: seconds[case.name + what] / seconds[case.name]
-        for case in cases for what, _, _ in ANIMAL if case.name + what in seconds
-    }  # fmt: skip
+        for case in cases
+        for what, _, _ in ANIMAL
+        if case.name + what in seconds
+    }
     rate = {case.name: case.units / seconds[case.name] for case in cases}
     rows = []
     for case in cases:
@@ -208,23 +218,31 @@ def compare(cases: list[Case], rounds: int) -> list[dict[str, Any]]:
         others = {a: rate[peer] for a, peer in peers.items() if peer in rate and peer != case.name}
         ratios = {a: spread(rate[case.name] / other) for a, other in others.items()}
         rows.append(
-            {"name": case.name, "group": case.group, "note": case.note, "bits": case.bits,
-             "rate": spread(rate[case.name]), "ratios": ratios,
-             "cost": spread(costs[case.name]) if case.name in costs else None,
-             "required": case.required, "aimed": case.aimed}
-        )  # fmt: skip
+            {
+                "name": case.name,
+                "group": case.group,
+                "note": case.note,
+                "bits": case.bits,
+                "rate": spread(rate[case.name]),
+                "ratios": ratios,
+                "cost": spread(costs[case.name]) if case.name in costs else None,
+                "required": case.required,
+                "aimed": case.aimed,
+            }
+        )
     return rows
 
 
 def start() -> dict[str, float]:
-    """Wall time [s] of `import hoof_env`, the median of five processes, and of compiling into an empty cache
-    the kernels of the environments."""
+    """Return the wall time [s] of `import hoof_env`, the median of five processes, and of compiling the
+    kernels of the environments into an empty cache."""
     root = Path(__file__).resolve().parents[1]
 
     def seconds_of(code: str, before: str = "", **settings: str) -> float:
         clock = "import time; begin = time.perf_counter()"
         program = "\n".join((before, clock, code, "print(time.perf_counter() - begin)"))
-        command, environment = [sys.executable, "-c", program], os.environ | settings
+        command = [sys.executable, "-c", program]
+        environment = os.environ | settings
         done = subprocess.run(
             command, cwd=root, env=environment, stdout=subprocess.PIPE, text=True, check=True
         )
@@ -233,15 +251,17 @@ def start() -> dict[str, float]:
     with tempfile.TemporaryDirectory() as folder:
         load = "from hoof_env.envs.compile_ahead import compile_kernels"
         cold = {"NUMBA_CACHE_DIR": folder, "HOOF_ENV_QUIET": "1"}
+        # An empty cache, so that everything is compiled
         compiled = seconds_of("compile_kernels(lambda line: None)", load, **cold)
     imported = float(np.median([seconds_of("import hoof_env") for _ in range(5)]))
     return dict(zip(START_BARS, (imported, compiled), strict=True))
 
 
 def measure(quick: bool, rounds: int, clock_name: str) -> dict[str, Any]:
-    """All of it; what `speed.json` holds."""
+    """Measure all of it and return the content of `speed.json`."""
     clock = CLOCKS[clock_name]
-    cases, notes = own_cases(quick, clock), []
+    cases = own_cases(quick, clock)
+    notes = []
     for package, title, peer in (("mujoco", "MuJoCo", mujoco_cases), ("exudyn", "Exudyn", exudyn_cases)):
         if importlib.util.find_spec(package):
             cases += peer(quick, clock)
@@ -250,17 +270,26 @@ def measure(quick: bool, rounds: int, clock_name: str) -> dict[str, Any]:
     print(f"{len(cases)} cases, {rounds} rounds", file=sys.stderr, flush=True)
     rows = compare(cases, rounds)
     return {
-        "machine": machine(), "bits": vector_bits(), "preset": PRESET, "quick": quick, "clock": clock_name,
-        "rounds": rounds, "dt_s": DT, "cases": rows, "notes": notes, "start": None if quick else start(),
-    }  # fmt: skip
+        "machine": machine(),
+        "bits": vector_bits(),
+        "preset": PRESET,
+        "quick": quick,
+        "clock": clock_name,
+        "rounds": rounds,
+        "dt_s": DT,
+        "cases": rows,
+        "notes": notes,
+        "start": None if quick else start(),
+    }
 
 
 def speed_table(rows: list[dict[str, Any]]) -> str:
-    """Every case: its rate, its ratios, and whether they meet the bars."""
+    """Return the table of every case: its rate, its ratios, and the verdicts on the bars."""
     head = ["case", "bits", "steps/s", "ratio to MuJoCo ALL", "ratio to MuJoCo RIGID", "required", "aimed at"]
     lines = []
     for row in rows:
-        ratios, rate = row["ratios"], row["rate"]["median"]
+        ratios = row["ratios"]
+        rate = row["rate"]["median"]
         lines.append(
             [
                 row["name"] + (f" ({row['note']})" if row["note"] else ""),
@@ -274,8 +303,9 @@ def speed_table(rows: list[dict[str, Any]]) -> str:
 
 
 def cost_table(rows: list[dict[str, Any]]) -> str:
-    """What springs and harmonics cost beside rigid legs."""
-    bars, lines = {what: bar for what, _, bar in ANIMAL}, []
+    """Return the table of the costs of springs and harmonics, compared with rigid legs."""
+    bars = {what: bar for what, _, bar in ANIMAL}
+    lines = []
     for row in rows:
         if cost := row["cost"]:
             bar = next(bar for what, bar in bars.items() if row["name"].endswith(what))
@@ -285,7 +315,7 @@ def cost_table(rows: list[dict[str, Any]]) -> str:
 
 
 def page(result: dict[str, Any]) -> str:
-    """The whole result as Markdown."""
+    """Return the whole result as Markdown."""
     about = [["leg and ground", result["preset"]], *([k, v] for k, v in result["machine"].items())]
     parts = [INTRO.format(**result), markdown_table(["", ""], about), RATIOS, speed_table(result["cases"])]
     parts += [COSTS, cost_table(result["cases"])]
@@ -300,19 +330,19 @@ def page(result: dict[str, Any]) -> str:
 
 
 def main(arguments: list[str] | None = None) -> None:
-    """The command; see `--help`."""
+    """Run the command; see `--help`."""
     parser = argparse.ArgumentParser(prog="python -m benchmarks.speed", description=__doc__.splitlines()[0])
     parser.add_argument("--out", type=Path, default=RESULTS, help="folder for those of all vector widths")
     parser.add_argument("--rounds", type=int, help=f"how many; {ROUNDS} if not given")
     parser.add_argument("--clock", choices=CLOCKS, default="wall", help="processor: on a busy machine")
     parser.add_argument("--quick", action="store_true", help="a smoke test: small numbers that mean nothing")
-    given = parser.parse_args(arguments)
-    rounds = given.rounds or (2 if given.quick else ROUNDS)
-    result = measure(given.quick, rounds, given.clock)
+    args = parser.parse_args(arguments)
+    rounds = args.rounds or (2 if args.quick else ROUNDS)
+    result = measure(args.quick, rounds, args.clock)
     rows = [(row["name"], "MuJoCo ALL", row["ratios"].get("ALL"), row["required"]) for row in result["cases"]]
-    own = write(given.out, "speed", result, page(result), rows)
+    folder = write(args.out, "speed", result, page(result), rows)
     print(speed_table(result["cases"]))
-    print(f"written to {own}")
+    print(f"written to {folder}")
 
 
 if __name__ == "__main__":

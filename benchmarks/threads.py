@@ -1,10 +1,11 @@
-"""What threads gain: one, two or more that share 1024 legs, beside as many separate processes.
+"""Gain of threads: one, two or more that share 1024 legs, compared with as many separate processes.
 
     python -m benchmarks.threads          writes threads.json and .md, where `benchmarks.speed` does
 
 A round has each case once, in a new order: one thread, T threads that are joined after each control step, and
-T processes with a T-th of the legs each, which are told to begin and wait for nobody. Then what a call to a
-thread costs and what a group of columns takes, from which the table of more cores is computed, not measured.
+T processes with a T-th of the legs each, which begin together and do not wait for each other. Then the cost
+of a call to a thread and the time of a group of columns, from which the table of more cores is computed, not
+measured.
 """
 
 from __future__ import annotations
@@ -31,9 +32,12 @@ from hoof_env.dynamics.advance import LANES
 from hoof_env.envs.vector import HorseLegVectorEnv
 from hoof_env.simd.threads import available, run_together
 
-LEGS, STEPS = 1024, 60
-BESIDE_PROCESSES, BESIDE_ONE = 0.9, 1.5
-CORES, MODELLED = (2, 4, 8, 16, 32, 64), (1024, 8192)
+LEGS = 1024
+STEPS = 60
+BESIDE_PROCESSES = 0.9
+BESIDE_ONE = 1.5
+CORES = (2, 4, 8, 16, 32, 64)
+MODELLED = (1024, 8192)
 
 INTRO = """\
 # What threads gain
@@ -59,19 +63,21 @@ class Legs:
     def __init__(self, count: int, **options: Any) -> None:
         self.envs = HorseLegVectorEnv(num_envs=count, task="leg", **options)
         self.envs.reset(seed=0)
-        shape, uniform = self.envs.action_space.shape or (), np.random.default_rng(0).uniform
+        shape = self.envs.action_space.shape or ()
+        uniform = np.random.default_rng(0).uniform
         self.actions = [uniform(-1, 1, shape).astype(np.float32) for _ in range(8)]
 
     def run(self) -> float:
-        """Wall time [s] of `STEPS` steps."""
+        """Return the wall time [s] of `STEPS` steps."""
         begin = time.perf_counter()
         for k in range(STEPS):
             self.envs.step(self.actions[k % 8])
         return time.perf_counter() - begin
 
     def serial_and_kernel(self) -> tuple[float, float]:
-        """Wall time [s] of a step outside the kernel and in it."""
-        batch_step, spent = self.envs.batch.step, 0.0
+        """Return the wall time [s] of a step outside the kernel and in it."""
+        batch_step = self.envs.batch.step
+        spent = 0.0
 
         def step(*arguments: Any) -> bool:
             nonlocal spent
@@ -80,13 +86,14 @@ class Legs:
             spent += time.perf_counter() - begin
             return ended
 
+        # Timed from outside: the package has no clock in it
         with patch.object(self.envs.batch, "step", step):
             whole = self.run()
         return (whole - spent) / STEPS, spent / STEPS
 
 
 def work(pipe: Connection, count: int) -> None:
-    """Of a process: run whenever it is told to."""
+    """Run once per message, in a worker process."""
     legs = Legs(count)
     legs.run()
     pipe.send(None)
@@ -96,9 +103,10 @@ def work(pipe: Connection, count: int) -> None:
 
 
 class Processes:
-    """So many processes with their share of the legs."""
+    """Worker processes that share the legs equally."""
 
     def __init__(self, count: int) -> None:
+        # A forked process would inherit numba's threads
         context = multiprocessing.get_context("spawn")
         self.pipes = []
         for _ in range(count):
@@ -108,15 +116,17 @@ class Processes:
         self.wait()
 
     def end(self) -> None:
+        """End the processes."""
         for pipe in self.pipes:
             pipe.send(False)
 
     def wait(self) -> None:
+        """Wait until all have run."""
         for pipe in self.pipes:
             pipe.recv()
 
     def run(self) -> float:
-        """Wall time [s] from telling them until the last is done."""
+        """Return the wall time [s] from the message until the last is done."""
         begin = time.perf_counter()
         for pipe in self.pipes:
             pipe.send(True)
@@ -125,7 +135,7 @@ class Processes:
 
 
 def call_cost(calls: int) -> float:
-    """Time [s] of each call more at once of a kernel that does nothing."""
+    """Return the time [s] of each additional call to a thread, of a kernel that does nothing."""
 
     @numba.njit(nogil=True)
     def nothing(x):  # type: ignore[no-untyped-def]
@@ -141,7 +151,7 @@ def call_cost(calls: int) -> float:
 
 
 def gain(legs: int, threads: int, serial: float, group: float, call: float, neighbours: float) -> float:
-    """How many times as fast so many threads are by the page's model; `serial` is for `LEGS`."""
+    """Return the speed of `threads` threads over that of one by the page's model; `serial` is for `LEGS`."""
     groups = -(-legs // LANES)
 
     def seconds(p: int) -> float:
@@ -151,15 +161,17 @@ def gain(legs: int, threads: int, serial: float, group: float, call: float, neig
 
 
 def measure(rounds: int, threads: int) -> dict[str, Any]:
-    """Rates, ratios, and what the model takes."""
-    one, several, processes = Legs(LEGS), Legs(LEGS, num_threads=threads), Processes(threads)
-    shared, apart = f"{threads} threads", f"{threads} processes"
-    runs: dict[str, Callable[[], float]] = {
-        "1 thread": one.run, shared: several.run, apart: processes.run
-    }  # fmt: skip
+    """Return rates, ratios, and the parameters of the model."""
+    single = Legs(LEGS)
+    several = Legs(LEGS, num_threads=threads)
+    processes = Processes(threads)
+    shared = f"{threads} threads"
+    apart = f"{threads} processes"
+    runs: dict[str, Callable[[], float]] = {"1 thread": single.run, shared: several.run, apart: processes.run}
     seconds = interleave(runs, rounds)
     processes.end()
-    parts = np.array([one.serial_and_kernel() for _ in range(rounds)])
+    parts = np.array([single.serial_and_kernel() for _ in range(rounds)])
+    # Medians of each, as the page says
     serial, kernel = np.median(parts, 0).tolist()
     ratios = [
         (shared, "1 thread", seconds["1 thread"] / seconds[shared], BESIDE_ONE),
@@ -167,34 +179,44 @@ def measure(rounds: int, threads: int) -> dict[str, Any]:
         (shared, apart, seconds[apart] / seconds[shared], BESIDE_PROCESSES),
     ]
     return {
-        "machine": machine(), "bits": vector_bits(), "rounds": rounds, "legs": LEGS, "steps": STEPS,
-        "rate": {name: spread(LEGS * STEPS / each) for name, each in seconds.items()},
-        "ratios": [(case, beside, spread(ratio), bar) for case, beside, ratio, bar in ratios],
-        "serial": serial, "group": kernel * LANES / LEGS, "call": call_cost(threads),
+        "machine": machine(),
+        "bits": vector_bits(),
+        "rounds": rounds,
+        "legs": LEGS,
+        "steps": STEPS,
+        "rate": {name: spread(LEGS * STEPS / values) for name, values in seconds.items()},
+        "ratios": [(case, reference, spread(ratio), bar) for case, reference, ratio, bar in ratios],
+        "serial": serial,
+        "group": kernel * LANES / LEGS,
+        "call": call_cost(threads),
         "neighbours": threads / float(np.median(seconds["1 thread"] / seconds[apart])),
-    }  # fmt: skip
+    }
 
 
 def page(result: dict[str, Any]) -> str:
-    """The tables as Markdown."""
-    rates = [[name, f"{each['median']:,.0f}", describe(each)] for name, each in result["rate"].items()]
+    """Return the tables as Markdown."""
+    rates = [[name, f"{rate['median']:,.0f}", describe(rate)] for name, rate in result["rate"].items()]
     ratios = [
-        [case, beside, describe(ratio), bar_text(bar, ratio) if bar else ""]
-        for case, beside, ratio, bar in result["ratios"]
+        [case, reference, describe(ratio), bar_text(bar, ratio) if bar else ""]
+        for case, reference, ratio, bar in result["ratios"]
     ]
     model = [result[key] for key in ("serial", "group", "call", "neighbours")]
     more = [[str(p), *(f"{gain(legs, p, *model):.1f}" for legs in MODELLED)] for p in CORES]
     micro = {key: 1e6 * result[key] for key in ("serial", "group", "call")}
     about = markdown_table(["", ""], [[key, value] for key, value in result["machine"].items()])
-    return "\n\n".join(
-        (
-            INTRO.format(**result), about,
-            markdown_table(["", "environment steps/s", "spread"], rates),
-            markdown_table(["case", "beside", "ratio", "bar"], ratios),
-            MODEL.format(**result | micro),
-            markdown_table(["threads", *(f"{legs} legs" for legs in MODELLED)], more),
+    return (
+        "\n\n".join(
+            (
+                INTRO.format(**result),
+                about,
+                markdown_table(["", "environment steps/s", "spread"], rates),
+                markdown_table(["case", "beside", "ratio", "bar"], ratios),
+                MODEL.format(**result | micro),
+                markdown_table(["threads", *(f"{legs} legs" for legs in MODELLED)], more),
+            )
         )
-    ) + "\n"  # fmt: skip
+        + "\n"
+    )
 
 
 def main() -> None:
@@ -203,12 +225,12 @@ def main() -> None:
     parser.add_argument("--rounds", type=int, default=40)
     parser.add_argument("--threads", type=int, default=2, help="and processes")
     parser.add_argument("--out", type=Path, default=RESULTS, help="folder for those of all vector widths")
-    given = parser.parse_args()
-    if not 2 <= given.threads <= available():
-        parser.error(f"--threads: expected 2 to {available()}, the processors here, got {given.threads}")
-    result = measure(given.rounds, given.threads)
+    args = parser.parse_args()
+    if not 2 <= args.threads <= available():
+        parser.error(f"--threads: expected 2 to {available()}, the processors here, got {args.threads}")
+    result = measure(args.rounds, args.threads)
     print(page(result))
-    write(given.out, "threads", result, page(result), result["ratios"])
+    write(args.out, "threads", result, page(result), result["ratios"])
 
 
 if __name__ == "__main__":

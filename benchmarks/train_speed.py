@@ -1,9 +1,9 @@
-"""How fast Stable-Baselines3's PPO and agents/ppo_flat.py train, and where the time goes.
+"""Speed of training of Stable-Baselines3's PPO and agents/ppo_flat.py, and its parts.
 
     python -m benchmarks.train_speed      writes train_speed.json and .md, where `benchmarks.speed` does
 
 Each round trains every case, in a new order, for one rollout and its updates, with the settings of
-agents/hyperparams. What comes of such trainings is `python -m agents.baselines --subset trainers`.
+agents/hyperparams. `python -m agents.baselines --subset trainers` has the results of such trainings.
 """
 
 from __future__ import annotations
@@ -49,7 +49,7 @@ of its step, with what Stable-Baselines3 asks of it; play is the policy and the 
 
 
 def model_of(algo: Algorithm, env_threads: int = 1, **params: Any) -> Any:
-    """A model of an algorithm with `params` instead of the file's, on its environments."""
+    """Return a model of an algorithm with `params` instead of the file's, on its environments."""
     settings = load_settings(FOLDER / f"{algo}.yml", ENV_ID) | params
     many = runs.make_vec_env(ENV_ID, settings["n_envs"], env_threads)
     model = make_model(Args(env_id=ENV_ID, algo=algo), settings, many)
@@ -58,7 +58,7 @@ def model_of(algo: Algorithm, env_threads: int = 1, **params: Any) -> Any:
 
 
 def train(model: Any, torch_threads: int = 1) -> float:
-    """Wall time [s] of a rollout and its updates."""
+    """Return the wall time [s] of a rollout and its updates."""
     torch.set_num_threads(torch_threads)
     begin = time.perf_counter()
     model.learn(model.n_steps * model.n_envs, reset_num_timesteps=False)
@@ -66,13 +66,13 @@ def train(model: Any, torch_threads: int = 1) -> float:
 
 
 class Clock:
-    """Adds up the time that functions take."""
+    """Sum of the time that functions take."""
 
     def __init__(self) -> None:
         self.seconds = 0.0
 
     def around(self, function: Callable[..., Any]) -> Callable[..., Any]:
-        """The same function, timed."""
+        """Return the same function, timed."""
 
         def call(*args: Any, **kwargs: Any) -> Any:
             begin = time.perf_counter()
@@ -84,18 +84,20 @@ class Clock:
         return call
 
     def take(self) -> float:
-        """What was added up since the last call."""
+        """Return the sum since the last call."""
         taken, self.seconds = self.seconds, 0.0
         return taken
 
 
 def where_time_goes(model: Any, rounds: int) -> dict[str, float]:
-    """Seconds of a rollout and its updates, by part; medians."""
+    """Return the seconds of a rollout and its updates, by part; medians."""
     env = model.env
+    # Down to the environments themselves, below the wrappers
     while hasattr(env, "venv"):
         env = env.venv
     timed = [(env.envs.batch, "step"), (model.env, "step_async"), (model.env, "step_wait"), (model, "train")]
     clocks = [Clock() for _ in timed]
+    # Clocks stand around methods of objects, not of classes: other models are not timed
     for clock, (owner, name) in zip(clocks, timed, strict=True):
         setattr(owner, name, clock.around(getattr(owner, name)))
     rows = []
@@ -108,9 +110,10 @@ def where_time_goes(model: Any, rounds: int) -> dict[str, float]:
 
 
 def measure(rounds: int) -> dict[str, Any]:
-    """Rates, ratios to Stable-Baselines3 on one thread, and parts."""
+    """Return rates, ratios to Stable-Baselines3 on one thread, and parts."""
     threads = min(2, available())
-    sb3, flat = model_of("ppo"), {n: model_of("ppo_flat", num_threads=n) for n in {1, threads}}
+    sb3 = model_of("ppo")
+    flat = {n: model_of("ppo_flat", num_threads=n) for n in {1, threads}}
     cases = {SB3: partial(train, sb3), f"PPO, {threads} threads": partial(train, model_of("ppo"), threads)}
     cases |= {f"PPO_FLAT, {n} thread{'s' * (n > 1)}": partial(train, model) for n, model in flat.items()}
     too = f"{threads} threads, environments too"
@@ -118,22 +121,31 @@ def measure(rounds: int) -> dict[str, Any]:
         f"PPO, {too}": partial(train, model_of("ppo", threads), threads),
         f"PPO_FLAT, {too}": partial(train, model_of("ppo_flat", threads), threads),
     }
-    seconds, units = interleave(cases, rounds), sb3.n_steps * sb3.n_envs
+    seconds = interleave(cases, rounds)
+    units = sb3.n_steps * sb3.n_envs
     parts = {SB3: where_time_goes(sb3, rounds)}
     parts |= {f"PPO_FLAT, {n} thread{'s' * (n > 1)}": where_time_goes(m, rounds) for n, m in flat.items()}
     return {
-        "machine": machine(), "bits": vector_bits(), "rounds": rounds, "env_id": ENV_ID, "units": units,
+        "machine": machine(),
+        "bits": vector_bits(),
+        "rounds": rounds,
+        "env_id": ENV_ID,
+        "units": units,
         "rows": [
-            {"case": name, "rate": spread(units / each), "ratio": spread(seconds[SB3] / each),
-             "bar": BAR if name.startswith("PPO_FLAT") else None}
-            for name, each in seconds.items()
+            {
+                "case": name,
+                "rate": spread(units / values),
+                "ratio": spread(seconds[SB3] / values),
+                "bar": BAR if name.startswith("PPO_FLAT") else None,
+            }
+            for name, values in seconds.items()
         ],
         "parts": {name: {key: x / units for key, x in part.items()} for name, part in parts.items()},
-    }  # fmt: skip
+    }
 
 
 def page(result: dict[str, Any]) -> str:
-    """The tables as Markdown."""
+    """Return the tables as Markdown."""
     rates = [
         [
             row["case"],
@@ -161,11 +173,11 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--rounds", type=int, default=15)
     parser.add_argument("--out", type=Path, default=RESULTS, help="folder for those of all vector widths")
-    given = parser.parse_args()
-    result = measure(given.rounds)
+    args = parser.parse_args()
+    result = measure(args.rounds)
     print(page(result))
     rows = [(row["case"], SB3, row["ratio"], row["bar"]) for row in result["rows"]]
-    write(given.out, "train_speed", result, page(result), rows)
+    write(args.out, "train_speed", result, page(result), rows)
 
 
 if __name__ == "__main__":

@@ -20,11 +20,13 @@ model.save("first_curve.zip")
 
 
 def play(policy, episodes=20):
-    """Mean return of a policy, in episodes that start as it says."""
-    env, total = gym.make(ENV_ID), 0.0
+    """Return the mean return of a policy, in episodes with the start that it prescribes."""
+    env = gym.make(ENV_ID)
+    total = 0.0
     for seed in range(1000, 1000 + episodes):
         observation, _ = env.reset(seed=seed, options=start_of(policy))
-        begins, ended = True, False
+        begins = True
+        ended = False
         while not ended:
             action, _ = policy.predict(observation, episode_start=np.array([begins]), deterministic=True)
             observation, reward, failed, through, _ = env.step(action)

@@ -1,4 +1,4 @@
-"""Every environment, alone and among many, in a minute or two: whether an installation works.
+"""Every environment, alone and among many, in a minute or two: a test of an installation.
 
 python examples/smoke.py
 """
@@ -13,7 +13,7 @@ for env_id in sorted(name for name in gym.registry if name.startswith("hoof_env/
     env.action_space.seed(0)
     for _ in range(20):
         env.step(env.action_space.sample())
-    if "MO" not in env_id:  # whose vectors of rewards Gymnasium's have no room for
+    if "MO" not in env_id:  # Gymnasium's vectors have no room for rewards that are vectors
         envs = gym.make_vec(env_id, num_envs=8)
         envs.reset(seed=0)
         envs.action_space.seed(0)

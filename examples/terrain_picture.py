@@ -9,7 +9,8 @@ from hoof_env.ground.contact import load_ground
 from hoof_env.render.instant import columns_of_engine, instants
 from hoof_env.render.renderer import Renderer
 
-leg, run = load_geometry("identified"), load_gait("run", "identified")
+leg = load_geometry("identified")
+run = load_gait("run", "identified")
 terrain = Terrain.through(
     x=[0.0, 1.0, 1.2, 2.4, 2.6, 3.0, 4.4, 4.5],
     height=[0.0, 0.0, 0.06, 0.06, 0.0, 0.0, 0.1, 0.1],

@@ -2,8 +2,8 @@
 
     python scripts/check_release.py
 
-Standard library alone, as the workflow installs nothing for it. CITATION.cff is read by the line: the entries
-in question are one line each.
+It uses the standard library alone, as the workflow installs nothing for it. CITATION.cff is read by the line:
+the entries in question are one line each.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ ROOT = Path(__file__).resolve().parent.parent
 
 
 def unfilled(root: Path = ROOT) -> list[str]:
-    """What is still to be filled in, by its place; addresses that disagree, too."""
+    """Return the places that are still to be filled in; addresses that disagree, too."""
     project = tomllib.loads((root / "pyproject.toml").read_text(encoding="utf-8"))["project"]
     citation = (root / "CITATION.cff").read_text(encoding="utf-8")
     cited = re.search(r"^repository-code:[ \t]*['\"]?([^'\"\s]+)", citation, re.MULTILINE)
@@ -34,12 +34,12 @@ def unfilled(root: Path = ROOT) -> list[str]:
 
 
 def _email(project: dict[str, list[dict[str, str]]]) -> str:
-    """Of the first author who has one."""
+    """Return the address of the first author with one, empty if there is none."""
     return next((one["email"] for one in project.get("authors", []) if one.get("email")), "")
 
 
 def main() -> int:
-    """Print what is unfilled; 1 if there is anything."""
+    """Print the places that are unfilled; return 1 if there are any."""
     found = unfilled()
     for place in found:
         print(f"to fill in before a release: {place}", file=sys.stderr)

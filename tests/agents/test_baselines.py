@@ -15,18 +15,8 @@ import pytest
 import yaml
 
 import hoof_env  # noqa: F401  registers the ids
-from agents import baselines, baselines_report, baselines_results, baselines_run, statistics
-from agents.baselines_results import (
-    LOWER,
-    compare,
-    dominates,
-    dominates_with_confidence,
-    expected_settings,
-    following,
-    read_results,
-    seconds_to,
-    settled_speeds,
-)
+from agents import baselines, baselines_report, baselines_run, statistics
+from agents.baselines_report import following, settled_speeds
 from agents.baselines_run import (
     CURVE,
     FINAL,
@@ -35,14 +25,27 @@ from agents.baselines_run import (
     Args,
     Entry,
     Run,
+    expected_settings,
     load_plan,
     read_curve,
+    read_results,
     runs_of,
+    seconds_to,
     train_one,
 )
 from agents.score import CURVE_SEEDS, FINAL_SEEDS, score_vector
 from agents.settings import FOLDER, load_settings
-from agents.statistics import Interval, Scored, iqm, mean_figures, over_episodes
+from agents.statistics import (
+    LOWER,
+    Interval,
+    Scored,
+    compare,
+    dominates,
+    dominates_with_confidence,
+    iqm,
+    mean_figures,
+    over_episodes,
+)
 from hoof_env.envs.policies import open_loop
 from hoof_env.errors import DataFileError, ParameterError
 from tests.agents.conftest import SHORT, TINY
@@ -94,7 +97,7 @@ def test_a_variant_has_a_name_and_hyperparameters_of_its_own():
 def test_the_time_to_a_return_is_that_of_the_first_crossing(tmp_path):
     rows = [(0.0, -5.0), (10.0, 10.0), (20.0, 30.0), (30.0, 5.0), (40.0, 90.0)]
     (tmp_path / CURVE).write_text("wall_s,return\n" + "".join(f"{t},{r}\n" for t, r in rows))
-    one = baselines_results.Result(tmp_path, {})
+    one = baselines_run.Result(tmp_path, {})
     assert seconds_to(20.0, one) == pytest.approx(15.0)
     assert seconds_to(60.0, one) == pytest.approx(30.0 + 10 * 55 / 85)
     assert seconds_to(91.0, one) == np.inf
@@ -316,24 +319,24 @@ def test_intervals_must_lie_apart():
 
 def test_who_follows_half_of_a_command(monkeypatch, tmp_path):
     """And results without a policy, as of an archive, are passed over."""
-    monkeypatch.setattr(baselines_results, "settled_speed", lambda policy, command: 1.0 + 0.5 * command)
+    monkeypatch.setattr(baselines_report, "settled_speed", lambda policy, command: 1.0 + 0.5 * command)
     for name in ("one", "two"):
         (tmp_path / name).mkdir()
         (tmp_path / name / "policy.json").touch()
     results = [
-        baselines_results.Result(tmp_path / name, {"seed": seed})
+        baselines_run.Result(tmp_path / name, {"seed": seed})
         for seed, name in enumerate(("one", "gone", "two"))
     ]
-    speeds = settled_speeds(baselines_results.Row(SMALL[0], tuple(results)))
+    speeds = settled_speeds(baselines_run.Row(SMALL[0], tuple(results)))
     assert list(speeds) == [0, 2]
     assert following("PPO", speeds).intervals["follows"].mean == pytest.approx(0.5)
 
 
 def test_the_settled_speed_is_that_behind_the_start():
     """A constant gait: its speed after four seconds, from the environment's own account."""
-    env = gym.make(baselines_results.SPEED, target_speed=2.0)
+    env = gym.make(baselines_report.SPEED, target_speed=2.0)
     held = open_loop({"constant": env.unwrapped.gaits["run"].to_array()}, env)
-    speed = baselines_results.settled_speed(held, 2.0)
+    speed = baselines_report.settled_speed(held, 2.0)
     each = []
     for seed in FINAL_SEEDS[:10]:
         (seen, _), x = env.reset(seed=seed), []

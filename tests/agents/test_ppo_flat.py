@@ -10,7 +10,8 @@ from stable_baselines3 import PPO
 from stable_baselines3.common.utils import LinearSchedule
 from stable_baselines3.common.vec_env import DummyVecEnv
 
-from agents.ppo_flat import CHUNK, FlatPPO, Gradient, Scale, tanh
+from agents.perceptrons import CHUNK, tanh
+from agents.ppo_flat import FlatPPO, Gradient, Scale
 from agents.train import Args, train
 from agents.watch import DivergedError
 from hoof_env.errors import ParameterError
