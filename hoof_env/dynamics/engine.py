@@ -431,8 +431,7 @@ class TrunkEngine(Mechanics):
 
         Returns:
             Results of the environments, values of `parts.Result`, shape (num_envs,). An environment that
-                could not be
-            simulated has its state and its report from before this call.
+            could not be simulated has its state and its report from before this call.
 
         Raises:
             ParameterError: the command has a wrong shape or is not finite.
@@ -467,10 +466,8 @@ class TrunkEngine(Mechanics):
 
         Returns:
             Arrays by name, time on the first axis, and "result", values of `parts.Result`, shape (num_envs,).
-                Once an
-            environment does not end OK all stop, and the record ends there: with the instant where a limit
-                was passed,
-            without one that could not be simulated.
+            Once an environment does not end OK all stop, and the record ends there: with the instant where a
+            limit was passed, without one that could not be simulated.
 
         Raises:
             ParameterError, NotStartedError: as `advance`.

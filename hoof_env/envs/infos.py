@@ -124,7 +124,7 @@ class NamedArray(np.ndarray[Any, np.dtype[np.float64]]):
         return (
             f"NamedArray({', '.join(parts)})"
             if self.ndim == 1
-            else "Named(\n  " + ",\n  ".join(parts) + "\n)"
+            else "NamedArray(\n  " + ",\n  ".join(parts) + "\n)"
         )
 
     def __str__(self) -> str:
