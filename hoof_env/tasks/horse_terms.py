@@ -1,5 +1,5 @@
-"""What a horse's policy sees, and what it is paid: the tables of `Horse-v0`, as `observation` and `reward`
-have them for one leg."""
+"""Entries of the observation and terms of the reward of `Horse-v0`; `observation` and `reward` have those of
+one leg."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from hoof_env.tasks.reward import Term
 # The observation
 
 IN_WEIGHTS = Scale("tanh(x / weight)", lambda x, scene: x / scene.episode.weight, True)
-"""Of the whole horse."""
+"""Scale of forces, in units of the horse's weight."""
 
 
 def _height(scene):  # type: ignore[no-untyped-def]
@@ -27,6 +27,7 @@ def _height(scene):  # type: ignore[no-untyped-def]
 
 
 def _from_hips(x, scene):  # type: ignore[no-untyped-def]
+    # Relative to the hip height, so that horses of all sizes are seen alike.
     return (x - scene.task.height) / (0.2 * scene.task.height)
 
 
@@ -38,6 +39,7 @@ def _in_bounds(k: int) -> Scale:
 
 
 def _of_leg(i: int, measure: Callable[[Any], Any]) -> Callable[[Any], Any]:
+    """Return a function of a scene that measures its i-th leg."""
     compiled = inline_llvm(measure)
     return lambda scene: compiled(block_at(scene.leg, i))
 
@@ -70,6 +72,7 @@ def _offset(k: int) -> Callable[[Any], Any]:
     return lambda scene: scene.episode.offset[k]
 
 
+# Name, group, unit, function of a leg's memory, scale. A table, one entry a line.
 _PER_LEG: tuple[tuple[str, str, str, Callable[[Any], Any], Scale], ...] = (
     ("sin(crank angle)", "crank", "-", _sine, PLAIN),
     ("cos(crank angle)", "crank", "-", _cosine, PLAIN),
@@ -113,53 +116,54 @@ HORSE_ENTRIES = (
         for k, name in enumerate(PARAMETERS)
     ),
 )  # fmt: skip
-"""All that can be observed of a horse, by group; legs in the order of `LEGS`."""
+"""Entries that can be observed of a horse; for each quantity, legs in the order of `LEGS`."""
 
 # The reward
 
 
 def alive(step, weight):  # type: ignore[no-untyped-def]
-    """For every second."""
+    """Return the reward for the time in which the horse has not fallen."""
     return weight * step.seconds
 
 
 def tracking(step, weight):  # type: ignore[no-untyped-def]
-    """1 at the commanded speed, less twice the relative error: else it pays to slide less and be late."""
+    """Return the reward for speed: 1 at the commanded speed, less twice the relative error, at least -1."""
+    # Twice the error: with less, a policy gains by sliding less and staying behind the command.
     asked = maximum(step.commanded_progress, 1e-9)
     error = absolute(step.progress - asked) / asked
     return where(step.seconds > 0.0, weight * step.seconds * maximum(1.0 - 2.0 * error, -1.0), 0.0)
 
 
 def peak(step, weight):  # type: ignore[no-untyped-def]
-    """In units of the weight."""
+    """Return the charge for the increase of the running peak GRF, in units of the horse's weight."""
     return -weight * step.sums.running_peak_increase / step.weight
 
 
 def slip(step, weight):  # type: ignore[no-untyped-def]
-    """Over the commanded distance, at most all of it, for every second."""
+    """Return the charge for sliding, over the commanded distance and at most 1, times the duration."""
     asked = maximum(step.commanded_progress, 1e-9)
     return -weight * step.seconds * minimum(step.sums.slip / asked, 1.0)
 
 
 def landing(step, weight):  # type: ignore[no-untyped-def]
-    """For each stance that begins."""
+    """Return the charge for each stance that begins."""
     return -weight * step.sums.stances
 
 
 def work(step, weight):  # type: ignore[no-untyped-def]
-    """Over the weight and the commanded distance, for every second."""
+    """Return the charge for positive work over weight times commanded distance, times the duration."""
     asked = maximum(step.commanded_progress, 1e-9)
     return -weight * step.seconds * step.sums.positive_work / (step.weight * asked)
 
 
 def pitch(step, weight):  # type: ignore[no-untyped-def]
-    """Square of the angle."""
+    """Return the charge for the square of the trunk's pitch, times the duration."""
     angle = step.trunk.state.moving.pitch
     return -weight * step.seconds * (angle * angle)
 
 
 def fall(step, weight):  # type: ignore[no-untyped-def]
-    """Charged once."""
+    """Return the charge for a failure, in the step that ends the episode."""
     return where(step.failed > 0.0, -weight, 0.0)
 
 
@@ -187,4 +191,4 @@ HORSE_TERMS = (
     Term("pitch", 3.0, "1/(s rad^2)", "minus the square of the trunk's pitch", pitch),
     Term("fall", 15.0, "-", "once, minus this, when the episode fails", fall),
 )  # fmt: skip
-"""The terms of `Horse-v0`."""
+"""Terms of the reward of `Horse-v0`, in the order in which they are added."""
