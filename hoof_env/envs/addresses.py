@@ -8,9 +8,18 @@ from hoof_env.simd.compile import inline_llvm
 from hoof_env.simd.memory import COLUMNS, Addresses, doubles_at
 
 ADDRESSES = Addresses(
-    "data", "model", "tables", "ground", "constants", "reactions", "episode", "task", "actions",
-    "observations", "rewards",
-)  # fmt: skip
+    "data",
+    "model",
+    "tables",
+    "ground",
+    "constants",
+    "reactions",
+    "episode",
+    "task",
+    "actions",
+    "observations",
+    "rewards",
+)
 """The arrays of a step, those of the engine first."""
 
 AT = ADDRESSES.slots

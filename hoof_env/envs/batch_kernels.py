@@ -70,8 +70,13 @@ class BatchKernels:
         """Find the arrays where they are now."""
         self.episode_rows = views(self.layout, self.episode)
         arrays = (
-            *self.engine.arrays, self.episode, self.task_record, self.actions, self.observations, self.rewards
-        )  # fmt: skip
+            *self.engine.arrays,
+            self.episode,
+            self.task_record,
+            self.actions,
+            self.observations,
+            self.rewards,
+        )
         self.addresses = ADDRESSES.of(*arrays, columns=range(self.engine.columns))
         blocks = self.engine.blocks[:1] if self.paper else self.engine.blocks
         self._blocks = [(ADDRESSES.of(*arrays, columns=block),) for block in blocks]

@@ -21,9 +21,17 @@ CHANGEABLE = ("target_speed", "target_seconds", "terrain", "reward_weights", "ra
 """Settings that may change: none changes what is observed, an action, or how long an episode is."""
 
 OF_BATCH = (
-    "asked", "settings", "randomize", "terrain", "validated", "weights", "target_speed", "speed_changes",
-    "target_seconds", "task_record",
-)  # fmt: skip
+    "asked",
+    "settings",
+    "randomize",
+    "terrain",
+    "validated",
+    "weights",
+    "target_speed",
+    "speed_changes",
+    "target_seconds",
+    "task_record",
+)
 OF_ENGINE = ("terrain", "substeps", "step_limits", "_model")
 """Attributes of a batch, and of its engine, that follow from these settings."""
 

@@ -73,10 +73,16 @@ class HorseLegEnv(LegBase, gym.Env[NDArray[np.float32], NDArray[np.float32]]):
         weighed = [(k, term) for k, term in enumerate(terms) if batch.weights[term.name]]
         paid = [(term.key, k) for k, term in weighed if term.compute is not failure]  # 0 before the end
         self._views: tuple[Any, ...] = (
-            batch.actions[0].data, batch.direct_kernel(), batch.addresses, bool(batch.randomize), paid,
-            batch.episode_rows.terms[:, 0], batch.rewards.data, batch.observations[0].copy,
+            batch.actions[0].data,
+            batch.direct_kernel(),
+            batch.addresses,
+            bool(batch.randomize),
+            paid,
+            batch.episode_rows.terms[:, 0],
+            batch.rewards.data,
+            batch.observations[0].copy,
             batch.measurements.reader(batch.engine.arrays[0][:, 0]),
-        )  # fmt: skip
+        )
 
     # What pictures, records and policies read
 

@@ -27,22 +27,39 @@ HERE = Path(__file__).parent
 def tables() -> dict[str, dict[str, Any]]:
     """Return what `manual.toml` says, by table and name: unit and meaning, or the words of a page."""
     names = {
-        "presets": preset_names(), "trunks": ONE_LEG, "schemes": SCHEMES, "paper_schemes": INTEGRATORS,
-        "normal_laws": NORMAL_LAWS, "friction_laws": FRICTION_LAWS, "horse_gaits": horse_gaits(),
-    }  # fmt: skip
+        "presets": preset_names(),
+        "trunks": ONE_LEG,
+        "schemes": SCHEMES,
+        "paper_schemes": INTEGRATORS,
+        "normal_laws": NORMAL_LAWS,
+        "friction_laws": FRICTION_LAWS,
+        "horse_gaits": horse_gaits(),
+    }
     values = {name: ", ".join(f'\\"{one}\\"' for one in choices) for name, choices in names.items()}
     numbers = {
-        "lowest": leg_starts.LOWEST, "highest": leg_starts.HIGHEST,
-        "spacing": SPACING, "margin": leg_starts.MARGIN,
-        "start_speed": leg_starts.START_SPEED, "horse_mass": horse.MASS, "fastest": FASTEST,
-        "smallest_size": SIZES[0], "largest_size": SIZES[1],
-        "speed_spread": 100 * horse.SPEED_SPREAD, "pitch_spread": horse.PITCH_SPREAD,
-        "phase_spread": horse.PHASE_SPREAD, "fall_pitch": horse.PITCH, "fall_low": horse.HEIGHT[0],
-        "fall_high": horse.HEIGHT[1], "clearance": 100 * horse.CLEARANCE, "followed": FOLLOWED,
+        "lowest": leg_starts.LOWEST,
+        "highest": leg_starts.HIGHEST,
+        "spacing": SPACING,
+        "margin": leg_starts.MARGIN,
+        "start_speed": leg_starts.START_SPEED,
+        "horse_mass": horse.MASS,
+        "fastest": FASTEST,
+        "smallest_size": SIZES[0],
+        "largest_size": SIZES[1],
+        "speed_spread": 100 * horse.SPEED_SPREAD,
+        "pitch_spread": horse.PITCH_SPREAD,
+        "phase_spread": horse.PHASE_SPREAD,
+        "fall_pitch": horse.PITCH,
+        "fall_low": horse.HEIGHT[0],
+        "fall_high": horse.HEIGHT[1],
+        "clearance": 100 * horse.CLEARANCE,
+        "followed": FOLLOWED,
         "carried": round(100 * CARRIED),
-        "crank_bound": FilterSettings().crank_rate, "swing_bound": FilterSettings().swing_rate,
-        "bearing": BEARING, "full_allowance": BEARING * LONGEST_STRIDE,
-    }  # fmt: skip
+        "crank_bound": FilterSettings().crank_rate,
+        "swing_bound": FilterSettings().swing_rate,
+        "bearing": BEARING,
+        "full_allowance": BEARING * LONGEST_STRIDE,
+    }
     numbers |= {f"{name}_{end}": WIDEST[name][k] for name in WIDEST for k, end in enumerate(("low", "high"))}
     values |= {name: f"{number:g}" for name, number in numbers.items()}
     text = (HERE / "manual.toml").read_text(encoding="utf-8")

@@ -29,10 +29,17 @@ Records = NDArray[np.void]
 
 ACCOUNT = np.dtype(
     [
-        ("open", "?"), ("began", "f8"), ("peak", "f8"), ("steepest", "f8"), ("load", "f8"),
-        ("running", "f8"), ("count", "i8"), ("impulse", "f8"), ("loaded", "f8"),
+        ("open", "?"),
+        ("began", "f8"),
+        ("peak", "f8"),
+        ("steepest", "f8"),
+        ("load", "f8"),
+        ("running", "f8"),
+        ("count", "i8"),
+        ("impulse", "f8"),
+        ("loaded", "f8"),
     ]
-)  # fmt: skip
+)
 """A stance as `dynamics.observables.StanceCounter` has it, and over the episode the impulse of the normal
 force [N s] and the time under load [s]."""
 
@@ -71,11 +78,17 @@ class PaperSolver:
         self.substeps = substeps
         self.legs = [
             ConstrainedLeg(
-                engine.limbs[0].geometry, engine.ground, s.sim_dt, engine.filters,
-                s.baumgarte_alpha, s.baumgarte_beta, s.integrator, engine.trunk.height,
+                engine.limbs[0].geometry,
+                engine.ground,
+                s.sim_dt,
+                engine.filters,
+                s.baumgarte_alpha,
+                s.baumgarte_beta,
+                s.integrator,
+                engine.trunk.height,
             )
             for _ in range(engine.num_envs)
-        ]  # fmt: skip
+        ]
         self.traces = [new_trace(1) for _ in self.legs]
         self.apart = np.zeros(len(self.legs), bool)
         self._accounts: Records = np.zeros(len(self.legs), ACCOUNT)

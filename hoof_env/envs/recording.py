@@ -99,9 +99,16 @@ class Recording:
         if self.renderer is None:
             weight = float(self.batch.episode_rows.weight[self.env])
             self.renderer = Renderer(
-                self.batch.body.geometry, mode, fps, self.size, self.batch.settings.trunk, weight,
-                LIFT_OFF * weight / self.batch.legs, terrain, hips,
-            )  # fmt: skip
+                self.batch.body.geometry,
+                mode,
+                fps,
+                self.size,
+                self.batch.settings.trunk,
+                weight,
+                LIFT_OFF * weight / self.batch.legs,
+                terrain,
+                hips,
+            )
         if not self._ends:
             self.begin()
         if self._unseen >= len(self._ends):  # also the start of what is remembered

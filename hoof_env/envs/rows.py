@@ -16,9 +16,15 @@ from hoof_env.errors import ParameterError, all_of, count
 UNKNOWN_SEED = -1  # as Gymnasium says it
 
 PER_ENV = (
-    "weight", "render", "episode_summary", "raw_observation", "record", "np_random", "np_random_seed",
+    "weight",
+    "render",
+    "episode_summary",
+    "raw_observation",
+    "record",
+    "np_random",
+    "np_random_seed",
     "action_for",
-)  # fmt: skip
+)
 """What each environment has of its own; the rest is of all."""
 
 SINGLE_SPACES = {"action_space": "single_action_space", "observation_space": "single_observation_space"}

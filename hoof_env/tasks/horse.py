@@ -99,9 +99,12 @@ LEG_ONLY_SETTINGS = "trunk", "hip_height", "solver"
 """Settings of which a horse accepts only the default."""
 
 OPTIONS = {
-    "phase": (-1e6, 1e6), "speed": (-20.0, 20.0), "pitch": (-0.4, 0.4), "x": (-1e5, 1e5),
+    "phase": (-1e6, 1e6),
+    "speed": (-20.0, 20.0),
+    "pitch": (-0.4, 0.4),
+    "x": (-1e5, 1e5),
     "target_speed": (0.1, 20.0),
-}  # fmt: skip
+}
 """Numeric reset options and their ranges [strides, m/s, rad, m, m/s]; "gait" and "parameters" are the
 others."""
 

@@ -90,13 +90,16 @@ _PER_LEG: tuple[tuple[str, str, str, Callable[[Any], Any], Scale], ...] = (
     ("toe load", "hoof", "N", lambda leg: leg.report.toe.normal, IN_WEIGHTS),
     ("heel load", "hoof", "N", lambda leg: leg.report.heel.normal, IN_WEIGHTS),
     ("running peak force", "hoof", "N", lambda leg: leg.strides.running_peak, IN_WEIGHTS),
-)  # fmt: skip
+)
 
 HORSE_ENTRIES = (
     Entry("forward speed", "trunk", "m/s", lambda s: s.trunk.report.velocity.real, tanh_of(5.0)),
     Entry("vertical speed", "trunk", "m/s", lambda s: s.trunk.report.velocity.imag, tanh_of(1.0)),
     Entry(
-        "height above the ground", "trunk", "m", _height,
+        "height above the ground",
+        "trunk",
+        "m",
+        _height,
         Scale("tanh((x - hip height) / (0.2 hip height))", _from_hips, True),
     ),
     Entry("pitch", "trunk", "rad", lambda s: s.trunk.state.moving.pitch, tanh_of(0.3)),
@@ -109,13 +112,16 @@ HORSE_ENTRIES = (
     ),
     *(
         Entry(
-            f"offset: {leg.replace('_', ' ')}, {name.replace('_', ' ')}", "offset", "-",
-            _offset(len(PARAMETERS) * i + k), PLAIN,
+            f"offset: {leg.replace('_', ' ')}, {name.replace('_', ' ')}",
+            "offset",
+            "-",
+            _offset(len(PARAMETERS) * i + k),
+            PLAIN,
         )
         for i, leg in enumerate(LEGS)
         for k, name in enumerate(PARAMETERS)
     ),
-)  # fmt: skip
+)
 """Entries that can be observed of a horse; for each quantity, legs in the order of `LEGS`."""
 
 # The reward
@@ -170,25 +176,36 @@ def fall(step, weight):  # type: ignore[no-untyped-def]
 HORSE_TERMS = (
     Term("alive", 45.0, "1/s", "for every second", alive),
     Term(
-        "tracking", 16.0, "1/s", "for every second, 1 less twice the speed's relative error, at least -1",
+        "tracking",
+        16.0,
+        "1/s",
+        "for every second, 1 less twice the speed's relative error, at least -1",
         tracking,
     ),
     Term(
-        "peak", 0.25, "-",
+        "peak",
+        0.25,
+        "-",
         "minus the increase of the legs' running peak GRF over the weight; each is the highest force of all"
-        " substeps but at most twice the present one, so that it adds up to every stance's peak", peak,
+        " substeps but at most twice the present one, so that it adds up to every stance's peak",
+        peak,
     ),
     Term(
-        "slip", 35.0, "1/s",
+        "slip",
+        35.0,
+        "1/s",
         "minus the way that all hooves slide in stance, to and fro, over the commanded distance; 1 at most",
         slip,
     ),
     Term("landing", 0.25, "-", "minus the stances that begin: who taps the ground pays twice", landing),
     Term(
-        "work", 0.4, "1/s",
-        "minus the positive work of all drives over the weight times the commanded distance", work,
+        "work",
+        0.4,
+        "1/s",
+        "minus the positive work of all drives over the weight times the commanded distance",
+        work,
     ),
     Term("pitch", 3.0, "1/(s rad^2)", "minus the square of the trunk's pitch", pitch),
     Term("fall", 15.0, "-", "once, minus this, when the episode fails", fall),
-)  # fmt: skip
+)
 """Terms of the reward of `Horse-v0`, in the order in which they are added."""

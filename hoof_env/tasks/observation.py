@@ -206,7 +206,10 @@ ENTRIES = (
     Entry("forward speed", "trunk", "m/s", lambda s: s.trunk.report.velocity.real, tanh_of(5.0)),
     Entry("vertical speed", "trunk", "m/s", lambda s: s.trunk.report.velocity.imag, tanh_of(2.0)),
     Entry(
-        "height", "trunk", "m", lambda s: s.trunk.report.place.imag,
+        "height",
+        "trunk",
+        "m",
+        lambda s: s.trunk.report.place.imag,
         Scale("tanh((x - hip height) / 0.3)", _height, True),
     ),
     Entry("bearing allowance", "trunk", "s", lambda s: s.episode.allowance, PLAIN),
@@ -220,7 +223,7 @@ ENTRIES = (
     Entry("steepest rise of the force", "hoof", "N/s", lambda s: s.leg.strides.steepest_rise, RISE),
     Entry("commanded speed", "target", "m/s", lambda s: s.episode.target, tanh_of(5.0)),
     *(Entry(f"height of the ground {x:g} m ahead", "ground", "m", _ahead(x), tanh_of(0.5)) for x in AHEAD),
-)  # fmt: skip
+)
 """Entries that can be observed of one leg, in the order of the observation within each group. Heights of the
 ground are relative to the ground under O."""
 

@@ -53,7 +53,7 @@ def check_rates(s: Settings, speed_scale: float = 1.0) -> Floats:
     """Return the rates at which an action of 1 changes the gait, shape (4,) [rad/s^2, rad/s, rad/s, rad/s].
 
     Args:
-        s: settings, whose rates are those of the published leg.
+        s: settings; their rates are those of the published leg.
         speed_scale: see `gait.speed_scale_of`.
 
     Raises:

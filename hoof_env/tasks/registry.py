@@ -42,7 +42,7 @@ class Task:
         about: description for the manual page.
         defaults: settings that differ from the defaults of `Settings`.
         start: reset options that are used unless others are given.
-        reference: name of the scripted gait whose score simple policies must not reach.
+        reference: name of the scripted gait with a score that simple policies must not reach.
         terms: terms of the reward.
         entries: entries that can be observed.
         body: function that makes the `body.Body` of settings.
@@ -378,6 +378,6 @@ def _add_to_gymnasium(task: Task) -> None:
         entry_point="hoof_env.envs.horse_leg:HorseLegEnv",
         vector_entry_point="hoof_env.envs.vector:HorseLegVectorEnv",
         kwargs={"task": task.key},
-        # Gymnasium's checker warns of what is right here; tests run it on the package's own ids.
+        # As for the package's own ids, see `hoof_env/__init__.py`.
         disable_env_checker=True,
     )

@@ -58,7 +58,7 @@ LONGEST_STRIDE = 1.0
 
 STEPPING = 0.5
 """Rate of the crank from which a leg counts as stepping [rad/s], a twelfth of that of the paper's gaits:
-agents slow the crank down in a stance, and a leg whose crank stands still can only oscillate its swing."""
+agents slow the crank down in a stance, and a leg can only oscillate its swing while its crank stands."""
 
 
 # Arguments of all terms: an `Outcome`, and the weight of the term in the unit that `TERMS` says.
@@ -170,43 +170,67 @@ class Term:
 
 TERMS = (
     Term(
-        "progress", 2.5, "1/m", "forward travel of the trunk, up to the commanded speed", progress,
+        "progress",
+        2.5,
+        "1/m",
+        "forward travel of the trunk, up to the commanded speed",
+        progress,
         objective=PROGRESS,
     ),
     Term(
-        "peak", 0.5, "1/kN",
+        "peak",
+        0.5,
+        "1/kN",
         "minus the increase of the running peak GRF, the highest of all substeps but at most twice the"
-        " present one; it adds up to a stance's peak, and to each further one behind a fall by half", peak,
+        " present one; it adds up to a stance's peak, and to each further one behind a fall by half",
+        peak,
         objective=PEAK_FORCE,
     ),
     Term(
-        "energy", 1.0, "1/kJ",
-        "minus the positive work of crank and swing drive; braking is not recovered", energy,
+        "energy",
+        1.0,
+        "1/kJ",
+        "minus the positive work of crank and swing drive; braking is not recovered",
+        energy,
         objective=ENERGY,
     ),
     Term(
-        "slip", 1.0, "1/m", "minus the way that the hoof slides in stance, to and fro", slip,
+        "slip",
+        1.0,
+        "1/m",
+        "minus the way that the hoof slides in stance, to and fro",
+        slip,
         objective=ENERGY,
     ),
     Term("failure", 25.0, "1/s", "once, minus the rest of `episode_seconds`, if the episode fails", failure),
     Term(
-        "support", 17.0, "1/s",
+        "support",
+        17.0,
+        "1/s",
         "impulse of the normal force over the weight of trunk and leg, less twice what goes beyond a mean of"
         f" {BEARING:g}; times the speed over the commanded one, within +-1, and no more than the crank's rate"
-        f" over {STEPPING:g} rad/s", support,
+        f" over {STEPPING:g} rad/s",
+        support,
         objective=PROGRESS,
     ),
     Term(
-        "overspeed", 0.0, "1/m", "minus the forward travel beyond the commanded speed", overspeed,
+        "overspeed",
+        0.0,
+        "1/m",
+        "minus the forward travel beyond the commanded speed",
+        overspeed,
         objective=PROGRESS,
     ),
     Term(
-        "loading", 75.0, "s/MN",
+        "loading",
+        75.0,
+        "s/MN",
         "minus the increase of the stance's running loading rate, the steepest rise of the normal force from"
-        " one substep to the next while the peak grows", loading,
+        " one substep to the next while the peak grows",
+        loading,
         objective=PEAK_FORCE,
     ),
-)  # fmt: skip
+)
 """Terms of all ids of one leg, in the order in which they are added."""
 
 
