@@ -50,41 +50,54 @@ Floats = NDArray[np.float64]
 
 LONGEST_EPISODE = 1e6  # largest `episode_seconds` [s]
 
+COPIED = (
+    "engine",
+    "has_overrides",
+    "start_values",
+    "episode",
+    "actions",
+    "observations",
+    "rewards",
+    "task_record",
+)
+"""Attributes of an `EpisodeBatch` that change in place, which a copy must have for itself."""
+
+FOUND_AGAIN = (
+    "addresses",
+    "_blocks",
+    "entries",
+    "kernel",
+    "measurements",
+    "episode_rows",
+    "kernels",
+    "observe_kernel",
+)
+"""Attributes of an `EpisodeBatch` that belong to one process: addresses, kernels and views."""
+
 
 class EpisodeBatch(BatchKernels):
     """`num_envs` episodes of a task.
 
     Attributes:
-        task: task of all episodes.
-        asked: settings as asked for; `settings` has values in the place of None.
+        asked: settings as asked for; `settings` has values in place of None.
         body: one leg, or a horse.
-        engine: engine of all episodes. Its memory, and the arrays below, have `engine.columns` columns, the
-            last of which may be idle.
-        entries, names: entries of the observation and their names.
+        engine: engine of all episodes. Memory and arrays have `engine.columns` columns; the last may be idle.
+        names: names of the observation's entries.
         terms: keys of the reward's terms in infos.
-        kernel, addresses: `kernel(addresses)` is one control step of all episodes; `finish_step` follows.
         episode: memory of the episodes, rows as in `episode.Episode`, shape (rows, columns).
-        episode_rows: views of this memory by name, shape (columns,) or (rows, columns) each.
         actions, observations, rewards: input and output of a step, of shapes (columns, actions), (columns,
             entries) and (columns,).
         task_record: constants of the task that the kernels read, shape (1,), see `episode.task_type`.
-        measurements: places of the values in the engine's memory that infos contain.
         start_values: the body's `start_names`, the gait, and the values drawn by `randomize`, shape (numbers,
             num_envs); NaN where a state does not contain them.
-        conditions, changed: conditions of the rows after `change`, and a batch that has the settings for the
-            next episodes, None if there are no new ones.
+        conditions, changed: conditions of the rows, and a batch with the settings of the next episodes, None
+            if `change` was not called.
         paper: solver of the paper, None with the engine's kernels.
 
-    Args:
-        task: task of all episodes.
-        settings: settings of the task.
-        num_envs: number of episodes.
-        num_threads: number of threads that share them in a step.
-        runs: False for a batch that is not stepped, which compiles no kernels.
+    Kernels and their attributes are those of `BatchKernels`. With `runs=False` nothing is compiled.
 
     Raises:
-        ParameterError: a setting is out of range or of the wrong type, or a user's function cannot be
-            compiled.
+        ParameterError: a setting is out of range or of the wrong type, or a function cannot be compiled.
     """
 
     def __init__(
@@ -216,16 +229,8 @@ class EpisodeBatch(BatchKernels):
         generators: Sequence[np.random.Generator],
         options: Mapping[str, Any],
     ) -> dict[str, Floats]:
-        """Start episodes.
-
-        Args:
-            envs: environments that start.
-            generators: generator of each of them.
-            options: options as `batch_starts.check_options` returns them.
-
-        Returns:
-            The "parameters" that were drawn or set, by name, shape (len(envs),).
-        """
+        """Start episodes in `envs`, with a generator for each and options of `batch_starts.check_options`.
+        Return the "parameters" that were drawn or set, by name, shape (len(envs),)."""
         which = np.asarray(envs, np.int64)
         if self.changed is not None:
             self._adopt()
@@ -240,11 +245,8 @@ class EpisodeBatch(BatchKernels):
         return start(self, which, generators, options)
 
     def step(self, generators: Sequence[np.random.Generator], idle: NDArray[np.bool_] | None = None) -> bool:
-        """Take one control step under `actions`; return True if any episode ended.
-
-        Args:
-            generators: generators of all environments, from which commanded speeds are drawn.
-            idle: True for environments whose episode is over, shape (num_envs,): nothing is drawn for them.
+        """Take one control step under `actions`; return True if any episode ended. Nothing is drawn for
+        `idle` environments, shape (num_envs,), which have no episode.
 
         Raises:
             ParameterError: an action is not finite; no environment was advanced then.
@@ -265,15 +267,7 @@ class EpisodeBatch(BatchKernels):
     def finish_step(
         self, happened: int, generators: Sequence[np.random.Generator], idle: NDArray[np.bool_] | None = None
     ) -> bool:
-        """Finish a step after its kernel; the rest is as in `step`.
-
-        Args:
-            happened: return code of the kernel.
-            generators, idle: arguments of `step`.
-
-        Raises:
-            ParameterError: an action is not finite.
-        """
+        """Finish a `step` after its kernel, which returned the code `happened`."""
         if happened == NOT_A_NUMBER:
             raise ParameterError("action: expected finite numbers, got some that are not")
         # The engine put failed environments back to their last good state; the kernel observed what failed.
@@ -298,18 +292,8 @@ class EpisodeBatch(BatchKernels):
         return row
 
     def __getstate__(self) -> dict[str, Any]:
-        """Return the attributes without addresses, kernels and views, which `__setstate__` finds again."""
-        found_again = (
-            "addresses",
-            "_blocks",
-            "entries",
-            "kernel",
-            "measurements",
-            "episode_rows",
-            "kernels",
-            "observe_kernel",
-        )
-        return {key: value for key, value in vars(self).items() if key not in found_again}
+        """Return the attributes that can be pickled; `__setstate__` finds the others again."""
+        return {key: value for key, value in vars(self).items() if key not in FOUND_AGAIN}
 
     def __setstate__(self, state: dict[str, Any]) -> None:
         """Set the attributes, and find kernels and arrays of this process."""
@@ -321,16 +305,7 @@ class EpisodeBatch(BatchKernels):
         """Copy the batch. The copy shares what never changes: planners copy at every node of their tree."""
         made = object.__new__(type(self))
         vars(made).update(vars(self))
-        for name in (
-            "engine",
-            "has_overrides",
-            "start_values",
-            "episode",
-            "actions",
-            "observations",
-            "rewards",
-            "task_record",
-        ):
+        for name in COPIED:
             setattr(made, name, copy.deepcopy(getattr(self, name), memo))
         # The solver refers to the engine, and the kernel is a method of the batch: both to those of the copy.
         if self.paper:

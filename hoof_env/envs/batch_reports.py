@@ -112,7 +112,7 @@ def endings_of(batch: Any, done: NDArray[np.bool_], terminated: NDArray[np.bool_
 
     Args:
         batch: an `EpisodeBatch`.
-        done: True for environments whose episode ended, shape (num_envs,).
+        done: True for environments that ended an episode, shape (num_envs,).
         terminated: True for those that failed, shape (num_envs,).
     """
     figures: dict[str, Any] = {}

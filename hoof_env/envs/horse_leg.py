@@ -38,7 +38,6 @@ class HorseLegEnv(LegBase, gym.Env[NDArray[np.float32], NDArray[np.float32]]):
         settings: any of `settings.Settings`; the manual page (`manual`) describes them.
 
     Attributes:
-        task, settings: task and its settings.
         batch: episode, a batch of one.
         action_space, observation_space: boxes from -1 to 1, float32, of shapes (len(action_names),) and
             (len(observation_names),).
@@ -67,8 +66,7 @@ class HorseLegEnv(LegBase, gym.Env[NDArray[np.float32], NDArray[np.float32]]):
         self._attach()
 
     def _attach(self) -> None:
-        """Collect everything that a step reads, writes or calls: attribute look-ups cost as much as a
-        substep."""
+        """Collect what a step reads, writes or calls: looking it up costs as much as a substep."""
         batch = self.batch
         terms = self.task.terms
         weighted = [(k, term) for k, term in enumerate(terms) if batch.weights[term.name]]
@@ -85,8 +83,6 @@ class HorseLegEnv(LegBase, gym.Env[NDArray[np.float32], NDArray[np.float32]]):
             batch.observations[0].copy,
             batch.measurements.reader(batch.engine.arrays[0][:, 0]),
         )
-
-    # What pictures, records and policies read
 
     @property
     def weight(self) -> float:
@@ -127,13 +123,11 @@ class HorseLegEnv(LegBase, gym.Env[NDArray[np.float32], NDArray[np.float32]]):
             ParameterError: a bad seed or option; nothing has changed then.
         """
         self._check_open("reset")
-        # Before the generator is seeded, so that a refused reset changes nothing.
-        checked = check_options(self.batch, options)
+        checked = check_options(self.batch, options)  # first, so that a refused reset changes nothing
         super().reset(seed=None if seed is None else count("seed", seed, low=0))
         before = self.batch.addresses
         parameters = self.batch.reset([0], [self.np_random], checked)
-        # `change_settings` took effect: the arrays of the step are others now.
-        if self.batch.addresses is not before:
+        if self.batch.addresses is not before:  # `change_settings` took effect: other arrays
             self._attach()
         self._phase = "running"
         if self._recording is not None:
@@ -156,9 +150,8 @@ class HorseLegEnv(LegBase, gym.Env[NDArray[np.float32], NDArray[np.float32]]):
                 finite numbers, clipped to [-1, 1].
 
         Returns:
-            Observation (float32), reward, terminated, truncated, and the info with the terms of the reward by
-            name; at the end of an episode also "episode_summary", and "failure" if it failed. A step after
-            the end warns.
+            Observation, reward, terminated, truncated, and the info with the terms of the reward by name; at
+            the end of an episode also "episode_summary" and, if it failed, "failure". Later steps warn.
 
         Raises:
             ParameterError: the action has a wrong shape or is not finite; nothing has happened then.
@@ -172,11 +165,9 @@ class HorseLegEnv(LegBase, gym.Env[NDArray[np.float32], NDArray[np.float32]]):
             buffer[:] = action
         except (TypeError, ValueError, BufferError):
             self._read_action(action)
-        # Not through the batch: a call costs as much as a substep.
-        happened = kernel(addresses)
+        happened = kernel(addresses)  # not through the batch: a call costs as much as a substep
         ended = happened != 0 and self._follow(happened)
-        # A copy that has all keys already, in the order of the reset's info.
-        info = self._begun[0]()
+        info = self._begun[0]()  # has all keys already, in the order of the reset's info
         gait = self._begun[1]()
         info["gait"] = gait
         info["measured"] = measure()
@@ -194,8 +185,7 @@ class HorseLegEnv(LegBase, gym.Env[NDArray[np.float32], NDArray[np.float32]]):
             info["episode_summary"] = summary_of(self.batch, 0)
             if failed:
                 info["failure"] = failure_of(self.batch, 0)
-            # A step that failed was taken back: it has no sums.
-            if broken(self.batch.engine.results)[0]:
+            if broken(self.batch.engine.results)[0]:  # the step was taken back: it has no sums
                 info["measured"][self.batch.measurements.last_step] = 0.0
         if self._recording is not None:
             self._recording.add()
@@ -211,8 +201,7 @@ class HorseLegEnv(LegBase, gym.Env[NDArray[np.float32], NDArray[np.float32]]):
         return ended
 
     def _begin(self) -> None:
-        """Make the info that every step of this episode copies: the values of its start, and keys for the
-        values of a step."""
+        """Make the info that steps of this episode copy: values of its start, keys for those of a step."""
         row = self.batch.start_values[:, 0].copy()
         body = self.batch.body
         first = self.batch.start_row_count
@@ -231,22 +220,16 @@ class HorseLegEnv(LegBase, gym.Env[NDArray[np.float32], NDArray[np.float32]]):
         return self.batch.start_values.tobytes(), float(self.batch.episode_rows.target[0])
 
     def _read_action(self, action: Any) -> None:
-        """Convert and store an action.
-
-        Raises:
-            ParameterError: a wrong shape or type.
-        """
+        """Convert and store an action; raise `ParameterError` for a wrong shape or type."""
         array = array_of(action)
         count = len(self.batch.body.action_names)
         if array.shape != (count,) or array.dtype.kind not in "fiu":
             raise ParameterError(f"action: expected {count} finite numbers in [-1, 1], got {action!r}")
-        # Too large numbers become infinite in float32, which the kernel refuses.
-        with np.errstate(over="ignore"):
+        with np.errstate(over="ignore"):  # to infinity, which the kernel refuses
             self.batch.actions[0] = array
 
     def render(self) -> NDArray[np.uint8] | None:
-        """Draw the present state. Return a uint8 array of shape (H, W, 3) for "rgb_array"; draw into a window
-        and return None for "human"; warn and return None without a render_mode."""
+        """Draw the present state, a uint8 array of shape (H, W, 3) or a window; warn without a mode."""
         if self.render_mode is None:
             gym.logger.warn("render() was called without a render_mode: pass 'rgb_array' or 'human'")
             return None
@@ -264,8 +247,7 @@ class HorseLegEnv(LegBase, gym.Env[NDArray[np.float32], NDArray[np.float32]]):
     # State
 
     def get_state(self) -> dict[str, Any]:
-        """Return everything that changes, generator included: an episode that continues from it has the same
-        bits.
+        """Return everything that changes, generator included: to continue from it gives the same bits.
 
         Raises:
             ResetNeeded: there is no episode yet.
@@ -283,19 +265,16 @@ class HorseLegEnv(LegBase, gym.Env[NDArray[np.float32], NDArray[np.float32]]):
         set_state(self.batch, state)
         self.np_random = generator
         self._phase = "ended" if self.batch.episode_rows.ended[0] else "running"
-        # Not for another state of the same episode: planners restore thousands of them.
-        if self._start_and_target() != self._began_with:
+        if self._start_and_target() != self._began_with:  # a planner's states are of one episode
             self._begin()
         if self._recording is not None:
             self._recording.begin()
         return self.batch.observations[0].copy()
 
     def __getstate__(self) -> dict[str, Any]:
-        """Return the attributes without addresses and bound methods, which `__setstate__` finds again."""
         return {k: v for k, v in vars(self).items() if k not in ("_views", "_begun", "_began_with")}
 
     def __setstate__(self, state: dict[str, Any]) -> None:
-        """Set the attributes, and find the arrays of this process."""
         vars(self).update(state)
         self._attach()
         self._begin()

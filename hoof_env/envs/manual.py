@@ -55,9 +55,6 @@ def page(task: str, film: str = "") -> str:
     Args:
         task: one of `PAGES`, or an id of one's own.
         film: path of the film, relative to the page; "" for a page without one.
-
-    Raises:
-        ParameterError: an unknown task.
     """
     what = task_of("leg" if task == "mo" else task)
     s = what.settings({})
@@ -73,8 +70,7 @@ def page(task: str, film: str = "") -> str:
     groups = observation.groups_of(what.entries)
     weights = check_weights(s.reward_weights, what.terms)
     defaults = {name: literal(value) for name, value in to_json(s).items()}
-    # Bold: defaults that differ from those of the other ids.
-    defaults |= {name: f"**{defaults[name]}**" for name in what.defaults}
+    defaults |= {name: f"**{defaults[name]}**" for name in what.defaults}  # bold: this task's own
     head = ("Name", "Default", "Unit", "Meaning")
     module = what.module or ("hoof_env" if what.id.startswith("hoof_env/") else "my_module")
     text = Template(PAGE).substitute(

@@ -212,8 +212,8 @@ class PaperSolver:
         memory.strides[0, :, env] = account[["open", "began", "peak", "steepest", "load", "running"]].item()
 
     def _sum(self, env: int, trace: Records) -> dict[str, float]:
-        """Return the `layout.StrideSums` of a control step by name, and update the account of the episode. The
-        engine's kernels have the same sums in `dynamics.observables.count_stride`."""
+        """Return the `layout.StrideSums` of a control step by name, and update the account of the episode.
+        The engine's kernels have the same sums in `dynamics.observables.count_stride`."""
         h = self.legs[env].sim_dt
         *stance, impulse_before, loaded_before = self._accounts[env].item()
         since = StanceCounter(self._threshold, *stance)

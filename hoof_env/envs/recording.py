@@ -49,7 +49,7 @@ class Recording:
 
     def _find(self) -> None:
         """Set the function that copies the end of a control step: the engine's memory of this environment, or
-        the record of the paper's solver, whose substeps cannot be run again."""
+        the record of the paper's solver, which cannot run substeps again."""
         paper = self.batch.paper
         env = self.env
         column = self.batch.engine.arrays[0][:, env]

@@ -371,15 +371,8 @@ class Horse:
     # Gaits
 
     def reference(self, targets: Floats, given: Any = None) -> Floats:
-        """Return the numbers of the gaits from which actions make offsets, shape (n, 16).
-
-        Args:
-            targets: commanded speeds [m/s], shape (n,).
-            given: gait that is used at all speeds; None for `gait`, or for the reference gaits.
-
-        Raises:
-            ParameterError: `given` is no gait of this animal.
-        """
+        """Return the numbers of the gaits from which actions make offsets at commanded speeds [m/s], shape
+        (n, 16): `given`, else `gait`, else the reference gaits."""
         fixed = self.gait if given is None else given
         if fixed is not None:
             numbers = gait_numbers("gait", fixed, self.gaits, self.size)

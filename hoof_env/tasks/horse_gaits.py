@@ -124,11 +124,7 @@ class HorseGait:
 
     @classmethod
     def from_array(cls, values: Any) -> HorseGait:
-        """Make a gait from numbers in the order of `NAMES`, shape (16,).
-
-        Raises:
-            ParameterError: another shape, or a number outside its limits.
-        """
+        """Make a gait from numbers in the order of `NAMES`, shape (16,)."""
         array = np.asarray(values, float)
         if array.shape != (len(NAMES),):
             raise ParameterError(f"gait of a horse: expected {len(NAMES)} numbers, got shape {array.shape}")
@@ -137,11 +133,7 @@ class HorseGait:
 
 
 def checked_size(given: float | None) -> float:
-    """Return the setting `size`, 1 for None.
-
-    Raises:
-        ParameterError: the size is outside `SIZES`.
-    """
+    """Return the setting `size`, 1 for None; raise `ParameterError` for a size outside `SIZES`."""
     return check_number("size", 1.0 if given is None else given, low=SIZES[0], high=SIZES[1])
 
 
@@ -219,12 +211,8 @@ def reference_type() -> list[Any]:
 
 
 def reference_constants(speed_scale: float, follows: bool) -> dict[str, Any]:
-    """Return values for the fields of `reference_type`.
-
-    Args:
-        speed_scale: speed over that of a horse of 475 kg [-].
-        follows: True if the gait follows the commanded speed.
-    """
+    """Return values for the fields of `reference_type`, for a speed over that of a horse of 475 kg [-];
+    `follows` is True if the gait follows the commanded speed."""
     speeds, gaits, _ = _reference()
     return {"follows": follows, "speed_scale": speed_scale, "speeds": speeds, "gaits": gaits}
 
@@ -251,15 +239,11 @@ def reference_gaits(speeds: Floats) -> Floats:
 
 
 def trunk_motion(speeds: Floats, phase: Floats) -> dict[str, Floats]:
-    """Return the motion of the trunk of a horse of 475 kg in its reference gaits, from simulation.
+    """Return the motion of the trunk of a horse of 475 kg in its reference gaits, from simulation, for speeds
+    of the gaits [m/s] and phases of the stride [strides], shape (n,).
 
-    Args:
-        speeds: speeds of the gaits [m/s], shape (n,).
-        phase: phase of the stride [strides], shape (n,).
-
-    Returns:
-        "y" over the height of the hips [-] and its rate "vy" over the rate of the crank [1/rad], "vx" over
-        the speed [-], "pitch" [rad] and "pitch_rate" over the rate of the crank [-], shape (n,) each.
+    The values are "y" over the height of the hips [-] and its rate "vy" over the rate of the crank [1/rad],
+    "vx" over the speed [-], "pitch" [rad] and "pitch_rate" over the rate of the crank [-], shape (n,) each.
     """
     # Rows are y, vx and pitch; columns the mean, then a cosine and a sine coefficient of each harmonic.
     mixed = np.moveaxis(_mixed(speeds, _reference()[2]), 0, -1)
@@ -344,13 +328,8 @@ def _pairs(gaits: Floats) -> Floats:
 
 
 def crank_angles(gaits: Floats, phase: Floats, off: Floats) -> Floats:
-    """Return the angles of the cranks [rad], shape (4, n).
-
-    Args:
-        gaits: numbers of gaits, shape (n, 16).
-        phase: phase of the stride [strides], shape (n,).
-        off: deviation of each crank from the phase [strides], shape (4, n).
-    """
+    """Return the angles of the cranks [rad], shape (4, n), in gaits, shape (n, 16), at phases of the stride
+    [strides], shape (n,), from which the cranks deviate by `off` [strides], shape (4, n)."""
     wave = np.repeat(_pairs(gaits)[:, :2], 2, axis=0)
     stride = Stride(wave[:, 0], wave[:, 1])
     ahead = np.zeros((COUNT, len(gaits)))
@@ -366,13 +345,8 @@ def crank_angles(gaits: Floats, phase: Floats, off: Floats) -> Floats:
 
 
 def commands_of(gaits: Floats, theta: Floats, count: int) -> Floats:
-    """Return the commands of legs that are in step, shape (4, count, n).
-
-    Args:
-        gaits: numbers of gaits, shape (n, 16).
-        theta: crank angles [rad], shape (4, n).
-        count: number of gait parameters of the engine.
-    """
+    """Return the commands of legs that are in step, shape (4, count, n), in gaits, shape (n, 16), at crank
+    angles [rad], shape (4, n); `count` is the number of gait parameters of the engine."""
     pairs = np.repeat(_pairs(gaits), 2, axis=0)
     stride = Stride(pairs[:, 0], pairs[:, 1])
     wave = stride.wave[0] * np.cos(theta) + stride.wave[1] * np.sin(theta)

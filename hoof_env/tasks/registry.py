@@ -323,10 +323,8 @@ def register(
     Args:
         env_id: "namespace/Name-v0".
         base: name in `TASKS`, or an id of one's own, from which settings, terms and entries are taken.
-        terms: terms of the reward, added behind those of the base; a term with the name of one of these
-            replaces it.
-        entries: entries of the observation, added behind those of the base; their groups are observed by
-            default.
+        terms: terms of the reward, behind those of the base; one with the same name replaces its term.
+        entries: entries of the observation, behind those of the base; their groups are observed by default.
         contact_law: function of penetration [m], its rate [m/s], inverse approach speed [s/m] and the
             ground's constants, which returns the normal force [N]; see `dynamics.hoof.law_of`.
         defaults: settings, see the manual pages.
@@ -348,19 +346,17 @@ def register(
     added = {term.name: term for term in new_terms}
     kept = [added.pop(term.name, term) for term in old.terms]
     of_law = f" The normal force is that of `{function_name(contact_law)}`." if contact_law else ""
-    # The caller's module: other processes import it to register the id. A main program has no such name.
     caller = str(sys._getframe(1).f_globals.get("__name__", ""))
     task = replace(
         old,
         name=env_id,
-        module="" if caller in ("__main__", "__mp_main__") else caller,
+        module="" if caller in ("__main__", "__mp_main__") else caller,  # other processes import it
         summary=f"{old.summary} With terms, entries or laws from outside this package.",
         about=old.about + of_law,
         terms=(*kept, *added.values()),
         entries=(*old.entries, *new_entries),
         contact_law=contact_law or old.contact_law,
     )
-    # All checks before the first registration, so that a refused call changes nothing.
     groups = dict.fromkeys((*old.chosen({}).observation, *groups_of(new_entries)))
     settings = task.chosen({"observation": tuple(groups), **defaults})
     check_groups(settings.observation, groups_of(task.entries))
