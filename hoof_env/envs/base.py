@@ -106,7 +106,7 @@ class LegBase:
         self._size = check_side("width", size[0]), check_side("height", size[1])
         self.task = task_of(task)
         self.render_mode = render_mode
-        # Kept for `change_settings`, which replaces some of them and starts from the task's defaults again.
+        # Kept for `change_settings`, which replaces some and starts from the task's defaults again.
         self._given = {name: as_plain(name, value) for name, value in given.items()}
         self.batch = EpisodeBatch(self.task, self.task.settings(given), n, num_threads)
         self.metadata = {**self.metadata, "render_fps": max(1, round(1 / self.batch.dt))}

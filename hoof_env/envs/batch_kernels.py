@@ -61,7 +61,7 @@ class BatchKernels:
         self.kernels = k = step_kernels(
             self.task.terms, self.task.entries, self.task.contact_law, self.engine.features, self.body.kernels
         )
-        # One environment alone, or the paper's solver, which reads the engine's memory between two kernels.
+        # Few environments, or the paper's solver, which works on the engine's memory between two kernels.
         runs_scalar = self.engine.runs_scalar or self.paper
         self.kernel, self.observe_kernel = (
             (k.step_one, k.observers.observe_one)

@@ -79,7 +79,7 @@ def start(
             vary(batch, int(env), values)
         batch.has_overrides[which] = bool(parameters)
     gaits: Any = options.get("gait")
-    # One gait for each environment
+    # Gaits of all environments, of which only some start.
     if np.ndim(gaits) == 2:
         options = {**options, "gait": gaits[which]}
     start = batch.body.draw(options, generators, batch.engine)
@@ -120,7 +120,7 @@ def start(
 
 
 def vary(batch: Any, env: int, values: Mapping[str, float]) -> None:
-    """Give one environment physical parameters of its own, by name; the others are those of the settings."""
+    """Set physical parameters of one environment, by name; the others are those of the settings."""
     trunk, ground, limbs = batch.body.parts(replace(batch.settings, **dict(values)))
     batch.engine.vary(env, trunk, ground, limbs=limbs)
     batch.episode_rows.weight[env] = (trunk.mass + sum(limb.geometry.mass for limb in limbs)) * GRAVITY

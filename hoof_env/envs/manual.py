@@ -56,31 +56,31 @@ def page(task: str, film: str = "") -> str:
         task: one of `PAGES`, or an id of one's own.
         film: path of the film, relative to the page; "" for a page without one.
     """
-    what = task_of("leg" if task == "mo" else task)
-    s = what.settings({})
-    body = what.body(s)
+    definition = task_of("leg" if task == "mo" else task)
+    s = definition.settings({})
+    body = definition.body(s)
     parts = page_of_body(body)
     film = _film(_NAMES[task], parts.kind, film) if film else ""
     if task == "mo":
         objectives = _objectives(check_weights(s.reward_weights))
-        observations = _observations(what, body)
+        observations = _observations(definition, body)
         text = Template(MO_PAGE).substitute(film=film, observations=observations, objectives=objectives)
         return _tidy(text)
     trunk = TABLES[s.trunk]
-    groups = observation.groups_of(what.entries)
-    weights = check_weights(s.reward_weights, what.terms)
+    groups = observation.groups_of(definition.entries)
+    weights = check_weights(s.reward_weights, definition.terms)
     defaults = {name: literal(value) for name, value in to_json(s).items()}
-    defaults |= {name: f"**{defaults[name]}**" for name in what.defaults}  # bold: this task's own
+    defaults |= {name: f"**{defaults[name]}**" for name in definition.defaults}  # bold: this task's own
     head = ("Name", "Default", "Unit", "Meaning")
-    module = what.module or ("hoof_env" if what.id.startswith("hoof_env/") else "my_module")
+    module = definition.module or ("hoof_env" if definition.id.startswith("hoof_env/") else "my_module")
     text = Template(PAGE).substitute(
-        name=what.name,
-        id=what.id,
+        name=definition.name,
+        id=definition.id,
         module=module,
         module_words="the package" if module == "hoof_env" else "it",
-        summary=what.summary,
+        summary=definition.summary,
         film=film,
-        about=what.about,
+        about=definition.about,
         body=Template(WORDS[f"{parts.kind}_body"].strip()).safe_substitute(trunk=trunk["moves"]),
         action_space=f"Box(-1, 1, ({len(body.action_names)},), float32)",
         actions=parts.actions(body),
@@ -88,13 +88,13 @@ def page(task: str, film: str = "") -> str:
         observed=WORDS[f"{parts.kind}_observed"].strip(),
         legs=str(body.kernels.legs),
         **parts.words,
-        observation_space=f"Box(-1, 1, ({len(_observed(what))},), float32)",
-        observations=_observations(what, body),
+        observation_space=f"Box(-1, 1, ({len(_observed(definition))},), float32)",
+        observations=_observations(definition, body),
         other_groups=", ".join(f"`{group}`" for group in groups if group not in s.observation),
-        rewards=_rewards(what, weights),
+        rewards=_rewards(definition, weights),
         target_reward=parts.target_reward(s),
         lift_off=f"{100 * LIFT_OFF:g}",
-        start=_start(s, what.start),
+        start=_start(s, definition.start),
         options=markdown_table(("Option", "Unit", "Range", "Meaning"), parts.options()),
         parameters=", ".join(f"`{name}`" for name in parts.parameters(s)),
         infos=markdown_table(("Key", "Unit", "Meaning"), parts.infos(s)),
@@ -104,7 +104,7 @@ def page(task: str, film: str = "") -> str:
         seconds=literal(s.episode_seconds),
         figures=markdown_table(("Figure", "Unit", "Meaning"), rows_of("summary")),
         vector_arguments=markdown_table(("Argument", "Default", "Meaning"), _vector_arguments()),
-        bold=WORDS["bold"] if what.defaults else "",
+        bold=WORDS["bold"] if definition.defaults else "",
         settings=markdown_table(head, [*parts.settings(s, defaults), *PICTURES]),
         terrain=WORDS["terrain"] + markdown_table(head, rows_of("hills", _hills())) if s.terrain else "",
     )
@@ -116,9 +116,9 @@ def _hills() -> dict[str, str]:
     return {name: literal(value) for name, value in HILLS.items()}
 
 
-def _rewards(what: Task, weights: Mapping[str, float]) -> str:
+def _rewards(task: Task, weights: Mapping[str, float]) -> str:
     """Write the table of the reward's terms."""
-    rows = [(f"`{t.key}`", f"`{t.name}`", f"{weights[t.name]:g}", t.unit, t.meaning) for t in what.terms]
+    rows = [(f"`{t.key}`", f"`{t.name}`", f"{weights[t.name]:g}", t.unit, t.meaning) for t in task.terms]
     return markdown_table(("Term", "Weight", "Default", "Unit", "Meaning"), rows)
 
 
@@ -138,12 +138,12 @@ def index() -> str:
     """Write the page with the table of all ids, in Markdown."""
     rows = []
     for task, name in _NAMES.items():
-        what = TASKS.get(task, TASKS["leg"])
+        definition = TASKS.get(task, TASKS["leg"])
         native = "yes" if task in TASKS else "no"
-        summary = what.summary if task in TASKS else str(HorseLegMOEnv.__doc__).splitlines()[0]
+        summary = definition.summary if task in TASKS else str(HorseLegMOEnv.__doc__).splitlines()[0]
         link = f"[`hoof_env/{name}-v0`]({name}.md)"
-        actions = str(len(what.body(what.settings({})).action_names))
-        rows.append((link, summary, actions, str(len(_observed(what))), what.reference, native))
+        actions = str(len(definition.body(definition.settings({})).action_names))
+        rows.append((link, summary, actions, str(len(_observed(definition))), definition.reference, native))
     head = ("id", "what it is", "action", "observation", "reference gait", "native vector environment")
     return Template(WORDS["index"]).substitute(table=markdown_table(head, rows))
 
@@ -221,10 +221,10 @@ def _film(name: str, kind: str, film: str) -> str:
     return Template(WORDS["film"].strip()).substitute(name=name, film=film, shown=shown)
 
 
-def _observed(what: Task) -> list[observation.Entry]:
+def _observed(task: Task) -> list[observation.Entry]:
     """Return the entries that are observed by default."""
-    settings = what.settings({})
-    return observation.observed(settings.observation, settings.trunk, settings.drive, what.entries)
+    settings = task.settings({})
+    return observation.observed(settings.observation, settings.trunk, settings.drive, task.entries)
 
 
 def _features(s: Settings, body: Body) -> Features:
@@ -242,10 +242,10 @@ def _objectives(weights: Mapping[str, float]) -> str:
     return markdown_table(("Num", "Objective", "Terms", "Weights by default"), rows)
 
 
-def _observations(what: Task, body: Body) -> str:
+def _observations(task: Task, body: Body) -> str:
     """Write the table of the observation."""
     parts = page_of_body(body)
-    entries = enumerate(_observed(what))
+    entries = enumerate(_observed(task))
     rows = [(str(k), e.name, parts.scaling(e.scale, body), e.unit, e.group) for k, e in entries]
     return markdown_table(("Num", "Observation", "Scaling", "Unit before scaling", "Group"), rows)
 

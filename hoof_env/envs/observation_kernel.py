@@ -83,6 +83,7 @@ def _with_entry(entry: Entry, slot: int, layouts: Memories, scaled: bool) -> Cal
         if scene.task.observation_columns[slot] >= 0:
             numbers[slot] = scaled_number(scale(number(measure(scene)), scene))
 
+    # For users' functions of ordinary numbers: each lane has memory views of its own.
     @inline_llvm
     def put_one_by_one(addresses, lanes, scene, numbers, n):  # type: ignore[no-untyped-def]
         if scene.task.observation_columns[slot] >= 0:
@@ -136,7 +137,7 @@ def observers_of(entries: tuple[Entry, ...], terms: int, features: Features, bod
         body: the body's own parts.
     """
     foreign = from_outside([part for entry in entries for part in functions_of(entry)])
-    # What a function of a user refers to may have changed since the kernels were made, as in a notebook.
+    # Helpers and constants of a user's function may have changed since, as in a notebook.
     key = (entries, terms, features, body, fingerprint(*foreign))
     kernels: Observers = _OBSERVERS.get(key, lambda: _made(entries, terms, features, body), bool(foreign))
     return kernels

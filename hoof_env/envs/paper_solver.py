@@ -133,7 +133,7 @@ class PaperSolver:
         for env, leg in enumerate(self.legs):
             trace = new_trace(self.substeps)
             kept = leg.state.copy()
-            # What remains if the step fails.
+            # Only the last row, which stays if the step fails.
             self.traces[env] = self.traces[env][-1:]
             # A copy, because a strided command would be another type for numba than that of a leg alone.
             result = leg.advance(memory.command[0, :, env].copy(), trace)

@@ -56,7 +56,7 @@ class Sb3VecEnv(VecEnv):
             envs = gym.make_vec(env_id, num_envs, **many).unwrapped
         except ParameterError:
             raise
-        # An unknown id, or one of another package, whose environments do not take these arguments.
+        # An unknown id, or one of another package: its environments do not take these arguments.
         except (gym.error.Error, ModuleNotFoundError, TypeError):
             envs = None
         if not isinstance(envs, HorseLegVectorEnv):

@@ -88,7 +88,7 @@ def step_kernels(
     """
     key = (terms, entries, contact_law, features, body)
     foreign = from_outside(_functions(terms, entries, contact_law))
-    # What a function of a user refers to may have changed since the kernels were made, as in a notebook.
+    # Helpers and constants of a user's function may have changed since, as in a notebook.
     present = fingerprint(*foreign)
     kernels: StepKernels = _KEPT.get((*key, present), lambda: _made(foreign, *key), bool(foreign))
     return kernels

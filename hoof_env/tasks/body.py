@@ -63,6 +63,7 @@ class Body(Protocol):
         finite_fields: fields of the episode's memory that must be finite in a state; the weight always must.
     """
 
+    # Fixed when a body is made: settings that change later (`conditions.CHANGEABLE`) do not affect them.
     kernels: BodyKernels
     leg_prefixes: tuple[str, ...]
     geometry: Geometry

@@ -393,4 +393,5 @@ class Horse:
 # Kept, because `parts` is called for every drawn set of parameters.
 @cache
 def _limb(geometry: Geometry, pair: str, mass: float) -> Geometry:
+    """Return a leg with the segment masses of a fore or hind limb, for a mass of the animal [kg]."""
     return with_limb_masses(geometry, pair, mass)

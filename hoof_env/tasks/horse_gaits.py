@@ -150,6 +150,7 @@ def bounds(size: float = 1.0) -> Floats:
 
 @cache
 def _data() -> dict[str, Any]:
+    """Read the stored gaits and reference gaits."""
     file = resources.files("hoof_env").joinpath("data", "horse", "gaits.json")
     return dict(json.loads(file.read_text(encoding="utf-8")))
 
@@ -311,6 +312,7 @@ class Stride:
         return self._map(x, y, -1.0)
 
     def _map(self, x: Floats, y: Floats, sign: float) -> tuple[Floats, Floats]:
+        """Evaluate the formula of the class with w, or with -w for a `sign` of -1."""
         (u, v) = self.wave
         (f, g) = self.fold
         speed = 1 + sign * (u * x + v * y)

@@ -22,16 +22,19 @@ IN_WEIGHTS = Scale("tanh(x / weight)", lambda x, scene: x / scene.episode.weight
 
 
 def _height(scene):  # type: ignore[no-untyped-def]
+    """Measure the height of the trunk over the ground below it [m]."""
     place = scene.trunk.report.place
     return place.imag - surface(place.real, scene.ground, scene.ground_origin, scene.ground_per_metre)[0]
 
 
 def _from_hips(x, scene):  # type: ignore[no-untyped-def]
+    """Scale a height, relative to that of the hips."""
     # Relative to the hip height, so that horses of all sizes are seen alike.
     return (x - scene.task.height) / (0.2 * scene.task.height)
 
 
 def _in_bounds(k: int) -> Scale:
+    """Return the scale of the k-th gait parameter, linear between its widest limits."""
     low, high = list(WIDEST.values())[k]
     middle = (low + high) / 2
     per = 2 / (high - low)
@@ -61,14 +64,17 @@ def _heel_contact(leg):  # type: ignore[no-untyped-def]
 
 
 def _filter(k: int) -> Callable[[Any], Any]:
+    """Return a function that measures the k-th gait parameter of a leg, after its filter."""
     return lambda leg: leg.state.gait[k]
 
 
 def _filter_rate(k: int) -> Callable[[Any], Any]:
+    """Return a function that measures the rate of the k-th gait parameter of a leg."""
     return lambda leg: leg.state.gait_rate[k]
 
 
 def _offset(k: int) -> Callable[[Any], Any]:
+    """Return a function that measures the k-th offset of the actions, of all legs."""
     return lambda scene: scene.episode.offset[k]
 
 

@@ -118,10 +118,13 @@ RISE = Scale("tanh(x / (30 weights / s))", lambda x, scene: x / (30.0 * scene.ep
 
 
 def _height(x, scene):  # type: ignore[no-untyped-def]
+    """Scale a height: relative to the nominal one, in units of 0.3 m."""
     return (x - scene.task.height) * (1 / 0.3)
 
 
 def _in_range(k: int) -> Scale:
+    """Return the scale of the k-th gait parameter, linear between its limits."""
+
     def apply(x, scene):  # type: ignore[no-untyped-def]
         return (x - scene.task.middle[k]) / scene.task.half[k]
 
@@ -129,6 +132,8 @@ def _in_range(k: int) -> Scale:
 
 
 def _in_rate(k: int) -> Scale:
+    """Return the scale of the rate of the k-th gait parameter, over its bound."""
+
     def apply(x, scene):  # type: ignore[no-untyped-def]
         return x / scene.task.rate_bound[k]
 
@@ -146,10 +151,12 @@ def rate_text(bound: float) -> str:
 
 
 def _gait(k: int) -> Callable[[Any], Any]:
+    """Return a function that measures the k-th gait parameter, after its filter."""
     return lambda scene: scene.leg.state.gait[k]
 
 
 def _gait_rate(k: int) -> Callable[[Any], Any]:
+    """Return a function that measures the rate of the k-th gait parameter."""
     return lambda scene: scene.leg.state.gait_rate[k]
 
 
@@ -176,6 +183,9 @@ def _approach_speed(memory):  # type: ignore[no-untyped-def]
 
 
 def _ahead(distance: float) -> Callable[[Any], Any]:
+    """Return a function that measures the height of the ground at a distance ahead of O [m]."""
+
+    # Relative to the ground under O: heights in the world say nothing after hundreds of metres.
     def rise(scene):  # type: ignore[no-untyped-def]
         x = scene.trunk.report.place.real
         here = surface(x, scene.ground, scene.ground_origin, scene.ground_per_metre)[0]
@@ -246,6 +256,7 @@ def observed(
     """Return the entries of some groups that are observed on a kind of trunk with a kind of drive."""
 
     def is_observed(entry: Entry) -> bool:
+        # A prescribed crank has the commanded rate, which is observed already.
         if entry.name.endswith(TRUE_RATE):
             return drive == "motor"
         return entry.name not in ABSENT.get(trunk, ())

@@ -202,6 +202,7 @@ class OneLeg:
         self.geometry = load_geometry(s.preset)
         load_ground(s.preset)  # a broken preset raises here, even if the settings replace its ground
         self.speed_scale = speed_scale_of(self.geometry)
+        # Similar legs: times are proportional to the speed scale, so that filters slow down with it.
         self.filters = FilterSettings().sped_up(1 / self.speed_scale)
         self.low, self.high = np.array([*limits_of(self.geometry).values()]).T
         self.middle = (self.low + self.high) / 2

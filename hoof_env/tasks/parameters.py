@@ -174,6 +174,7 @@ def extremes(given: Mapping[str, float | tuple[float, float]]) -> list[dict[str,
     low, high = ({name: ends[k] for name, ends in pairs.items()} for k in (0, 1))
 
     def mixed(base: dict[str, float], other: dict[str, float], *names: str) -> dict[str, float]:
+        """Return a corner with some parameters of another one."""
         return base | {name: other[name] for name in names if name in other}
 
     # The lower threshold at its highest, the upper one at its lowest: they may cross.

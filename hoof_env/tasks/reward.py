@@ -153,6 +153,7 @@ class Term:
         if not isinstance(self.name, str) or not self.name:
             raise ParameterError(f"name: expected a text, got {self.name!r}")
         check_number(f"{self.title}: weight", self.weight, low=0, high=1e6)
+        # Without one the term is divided among all objectives.
         if self.objective is not None:
             check_choice(f"{self.title}: objective", self.objective, OBJECTIVES)
         check_function(f"{self.title}: compute", self.compute, 2)
