@@ -94,7 +94,14 @@ class EpisodeBatch(BatchKernels):
             if `change` was not called.
         paper: solver of the paper, None with the engine's kernels.
 
-    Kernels and their attributes are those of `BatchKernels`. With `runs=False` nothing is compiled.
+    Kernels and their attributes are those of `BatchKernels`.
+
+    Args:
+        task: task of all episodes.
+        settings: settings of the task, see `Task.settings`.
+        num_envs: number of episodes.
+        num_threads: number of threads that share the episodes in a step.
+        runs: False for a batch that is never stepped, for which no kernel is compiled.
 
     Raises:
         ParameterError: a setting is out of range or of the wrong type, or a function cannot be compiled.
@@ -116,7 +123,8 @@ class EpisodeBatch(BatchKernels):
         self._allocate()
         self._open()
         self.episode_rows.weight[:] = self.engine.weight
-        self.episode_rows.switch[:] = np.inf  # idle columns never switch
+        # Columns without an environment never switch, so that they cause no draw.
+        self.episode_rows.switch[:] = np.inf
         if not runs:
             return
         try:
@@ -246,7 +254,7 @@ class EpisodeBatch(BatchKernels):
 
     def step(self, generators: Sequence[np.random.Generator], idle: NDArray[np.bool_] | None = None) -> bool:
         """Take one control step under `actions`; return True if any episode ended. Nothing is drawn for
-        `idle` environments, shape (num_envs,), which have no episode.
+        `idle` environments, shape (num_envs,), which are between two episodes.
 
         Raises:
             ParameterError: an action is not finite; no environment was advanced then.

@@ -141,7 +141,7 @@ class BatchKernels:
         return dict(zip(self.names, out, strict=True))
 
     def alone(self, env: int) -> TrunkEngine:
-        """Make an engine for a single environment, equal to that of the environment `env`."""
+        """Make an engine of one environment, under the conditions of the environment `env`."""
         if not self.conditions.are_mixed:
             return self.engine.alone()
         (engine,) = under_each(self, np.array([env]), lambda rows: self.engine.alone())

@@ -19,7 +19,7 @@ KERNELS: dict[str, Callable[[], object]] = {
     "one horse": lambda: EpisodeBatch(TASKS["horse"], TASKS["horse"].settings({}), 1),
     "many horses": lambda: EpisodeBatch(TASKS["horse"], TASKS["horse"].settings({}), LANES),
 }
-"""Functions that make a user of each set of kernels, by name. All ids share these kernels, and all settings
+"""Functions that make a batch for each set of kernels, by name. All ids share these kernels, and all settings
 except `hoof_stiffness` of one leg, and `harmonics` and a rigid hoof of a horse."""
 
 

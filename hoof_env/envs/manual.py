@@ -269,7 +269,6 @@ def _start(settings: Settings, options: Mapping[str, float]) -> str:
 
 def _vector_arguments() -> list[tuple[str, ...]]:
     """Return the rows of the arguments that only the vector environment has."""
-    # Imported here: the vector environment has the page as an attribute.
     from hoof_env.envs.vector import HorseLegVectorEnv
 
     arguments = inspect.signature(HorseLegVectorEnv).parameters

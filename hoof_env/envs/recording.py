@@ -39,7 +39,7 @@ class Recording:
         self.batch = batch
         self.env = env
         self.size = size
-        # Memory at the end of control steps, at first at a start: two more than steps are shown.
+        # Memory at the end of control steps; the first one is a start, or the last end before what is shown.
         self._ends: deque[Any] = deque(maxlen=round(SHOWN / batch.dt) + 2)
         self._unseen = 0  # number of the last ends that no picture shows yet
         self.renderer: Any = None

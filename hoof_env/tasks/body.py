@@ -86,7 +86,7 @@ class Body(Protocol):
         """Names of the scripted policies."""
 
     def parts(self, s: Settings) -> tuple[Trunk, Ground, tuple[Limb, ...]]:
-        """Make trunk, ground and legs from settings, which have values for None (`parameters.resolved`)."""
+        """Make trunk, ground and legs from settings of `parameters.resolved`."""
 
     def commanded_speeds(self, s: Settings) -> tuple[float, float] | None:
         """Return the lowest and highest commanded speed [m/s]; None if no speed is commanded."""

@@ -17,7 +17,7 @@ Range = float | Sequence[float]
 class Keywords(TypedDict, total=False):
     """Keywords of `HorseLegEnv` that are settings, in the types that callers may pass."""
 
-    # A copy by hand: type checkers read no annotations that are made at run time. tests compare it.
+    # A copy by hand, because type checkers do not run code; `tests/test_typing.py` compares the two.
     preset: Preset
     gait: str | None
     trunk: str

@@ -44,7 +44,7 @@ def as_plain(name: str, value: Any) -> Any:
     if isinstance(value, (list, tuple)):
         plain = (as_plain(f"{name}[{k}]", inner) for k, inner in enumerate(value))
         return tuple(plain) if isinstance(value, tuple) else list(plain)
-    # A subclass, such as a text of an enumeration or of NumPy: its pickle would need the library.
+    # Subclasses of other libraries, which JSON and pickles of this package should not depend on.
     if isinstance(value, (int, float, str)):
         return next(kind(value) for kind in (int, float, str) if isinstance(value, kind))
     if hasattr(type(value), "__float__"):
