@@ -1,5 +1,5 @@
-"""Arrays of a control step, reached from one array of addresses: a call from Python with as many arguments
-costs more than a step."""
+"""Arrays of a control step, reached from one array of addresses: a call from Python with an argument for each
+array costs more than a step."""
 
 from __future__ import annotations
 
@@ -8,10 +8,19 @@ from hoof_env.simd.compile import inline_llvm
 from hoof_env.simd.memory import COLUMNS, Addresses, doubles_at
 
 ADDRESSES = Addresses(
-    "data", "model", "tables", "ground", "constants", "reactions", "episode", "task", "actions",
-    "observations", "rewards",
-)  # fmt: skip
-"""The arrays of a step, those of the engine first."""
+    "data",
+    "model",
+    "tables",
+    "ground",
+    "constants",
+    "reactions",
+    "episode",
+    "task",
+    "actions",
+    "observations",
+    "rewards",
+)
+"""Arrays of a step; the first ones, to `reactions`, are `TrunkEngine.arrays` in their order."""
 
 AT = ADDRESSES.slots
 BEGIN = ADDRESSES.begin
@@ -20,7 +29,9 @@ END = ADDRESSES.end
 
 @inline_llvm
 def memories(addresses, lanes, layouts, n):  # type: ignore[no-untyped-def]
-    """Trunk, leg and episode of environments n, n + 1, ..., as `lanes` columns, see `simd.columns`."""
+    """Return trunk, first leg and episode of environments n, n + 1, ..., as `lanes` columns, see
+    `simd.columns`."""
+    # The distance from one row of memory to the next: engine and episode have the same number of columns.
     row = addresses[AT.data + COLUMNS]
     data = doubles_at(addresses[AT.data])
     episode = doubles_at(addresses[AT.episode])

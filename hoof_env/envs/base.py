@@ -1,5 +1,5 @@
-"""What the environment and the vector environment share: what they say of themselves, and the refusal of
-calls at the wrong time and of assignments that would change nothing."""
+"""Base of the single and the vector environment: properties, settings and states, and checks for calls at the
+wrong time and for assignments without effect."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ from hoof_env.tasks.settings import PER_EPISODE, SETTINGS, Settings
 
 
 def fixed_setting(name: str) -> FixedSettingError:
-    """The error of an assignment to a setting, or to what follows from the settings."""
+    """Return the error of an assignment to a setting, or to an attribute that follows from the settings."""
     how = "gymnasium.make(id, ...)" if name in SETTINGS else "the arguments of gymnasium.make"
     if name in PER_EPISODE:
         how += f", or reset(options={{'parameters': {{{name!r}: ...}}}}) for an episode"
@@ -39,20 +39,25 @@ def fixed_setting(name: str) -> FixedSettingError:
     return FixedSettingError(f"{name}: expected no assignment, which would change nothing; set it by {how}")
 
 
-def array_of(given: Any) -> NDArray[Any]:
-    """An array of what a caller gave; an empty one of objects where it makes none."""
+def array_of(value: Any) -> NDArray[Any]:
+    """Convert to an array; return an empty object array if NumPy cannot."""
     try:
-        return np.asarray(given)
-    except (ValueError, TypeError, RuntimeError):  # the last of a tensor that has a gradient
+        return np.asarray(value)
+    except (ValueError, TypeError, RuntimeError):  # RuntimeError is that of a tensor with a gradient
         return np.empty(0, object)
 
 
+# Asking the system for entropy takes as long as a step.
 ANY_SEED = np.random.SeedSequence(0)
-"""Of a generator whose state is set at once: to ask the system for entropy takes as long as a step."""
+"""Seed of generators that get a state at once."""
 
 
 def generator_of(state: Any) -> np.random.Generator:
-    """A generator in the state that a `PCG64` had; `ParameterError` if it is none."""
+    """Make a generator from the state of a `PCG64`.
+
+    Raises:
+        ParameterError: `state` is not such a state.
+    """
     generator = np.random.Generator(np.random.PCG64(ANY_SEED))
     try:
         generator.bit_generator.state = state
@@ -62,13 +67,13 @@ def generator_of(state: Any) -> np.random.Generator:
 
 
 class LegBase:
-    """One environment of a task, or many.
+    """Base of the single and the vector environment.
 
     Attributes:
-        task, settings: the task and its settings.
-        batch: the episodes.
-        spec: what Gymnasium made it from. `max_episode_steps` is the environment's own limit, which
-            `episode_seconds` and `dt` give, unless it has one already.
+        task, settings: task and its settings.
+        batch: episodes, a batch of one in the single environment.
+        spec: Gymnasium's specification. Its `max_episode_steps` is the environment's own limit, from
+            `episode_seconds` and `dt`, unless it has one already.
     """
 
     task: Task
@@ -79,7 +84,8 @@ class LegBase:
     _spec: EnvSpec | None = None
     _as_json: tuple[Settings | None, dict[str, Any], list[str]] = (None, {}, [])
     _phase = "new"
-    """Then "running", and "closed"; a single environment also has "ended" and "warned"."""
+    """State of the object: "new" before the first reset, "running", and "closed" after `close`; in a single
+    environment also "ended" after an episode, and "warned" after a further step."""
 
     def _make(
         self,
@@ -90,12 +96,17 @@ class LegBase:
         size: tuple[int, int],
         num_threads: int = 1,
     ) -> list[Any]:
-        """Make `n` environments; returns the space of an observation and of an action."""
+        """Make the batch of `n` environments; return the spaces of an observation and of an action.
+
+        Raises:
+            ParameterError: a bad argument or setting.
+        """
         if render_mode is not None:
             check_choice("render_mode", render_mode, self.metadata["render_modes"])
         self._size = check_side("width", size[0]), check_side("height", size[1])
         self.task = task_of(task)
         self.render_mode = render_mode
+        # Kept for `change_settings`, which replaces some and starts from the task's defaults again.
         self._given = {name: as_plain(name, value) for name, value in given.items()}
         self.batch = EpisodeBatch(self.task, self.task.settings(given), n, num_threads)
         self.metadata = {**self.metadata, "render_fps": max(1, round(1 / self.batch.dt))}
@@ -103,14 +114,18 @@ class LegBase:
         return [spaces.Box(-1.0, 1.0, (size,), np.float32) for size in sizes]
 
     def __setattr__(self, name: str, value: Any) -> None:
-        """As of any object; `FixedSettingError` for settings and what follows from them."""
+        """Set an attribute.
+
+        Raises:
+            FixedSettingError: a setting, or an attribute that follows from the settings.
+        """
         fixed = getattr(type(self), name, None)
         if name in SETTINGS or (isinstance(fixed, property) and fixed.fset is None):
             raise fixed_setting(name)
         super().__setattr__(name, value)
 
     def set_wrapper_attr(self, name: str, value: Any, *, force: bool = True) -> bool:
-        """As Gymnasium's, which would otherwise set a setting that the environment lacks on a wrapper."""
+        """Override Gymnasium's method, which would create a setting as an attribute on the wrapper."""
         if force or name in SETTINGS or hasattr(self, name):
             setattr(self, name, value)
             return True
@@ -118,34 +133,36 @@ class LegBase:
 
     @property
     def spec(self) -> EnvSpec | None:
-        """The specification, None for an environment that Gymnasium did not make."""
+        """Specification; None for an environment that Gymnasium did not make."""
         return self._spec
 
     @spec.setter
     def spec(self, spec: EnvSpec | None) -> None:
         if spec is not None:
-            spec = copy.copy(spec)  # it may be the registered one
-            spec.kwargs = {name: as_plain(name, value) for name, value in spec.kwargs.items()}  # for to_json
+            # A copy, because it may be the registered one; plain values, for its `to_json`.
+            spec = copy.copy(spec)
+            spec.kwargs = {name: as_plain(name, value) for name, value in spec.kwargs.items()}
             if spec.max_episode_steps is None:
                 spec.max_episode_steps = self.batch.steps_per_episode
         self._spec = spec
 
     @property
     def settings(self) -> Settings:
-        """Those of the episode; of many environments those of every episode that starts from now on."""
+        """Settings of the episode; of a vector environment those of every episode that starts from now on."""
         return self.batch.asked
 
     def change_settings(self, **changes: Any) -> None:
-        """Change settings from the next reset on, as a curriculum does: the episode goes on with the old.
-        Of many environments each takes the new ones when it starts again, by itself or by `reset`.
+        """Change settings from the next reset on, for a curriculum. The present episode continues with the
+        old ones. In a vector environment each environment takes the new ones when it starts again, by itself
+        or by `reset`.
 
         Args:
             changes: some of `target_speed`, `target_seconds`, `terrain`, `reward_weights` and `randomize`, as
-                the arguments of `gymnasium.make`: afterwards all is as if it had been made with them.
+                for `gymnasium.make`. Afterwards the environment is as if it had been made with them.
 
         Raises:
-            ParameterError: a value is out of range, or an episode of these settings would lack something;
-                nothing has changed then.
+            ParameterError: a value is out of range, or the settings do not fit together; nothing has changed
+                then.
             FixedSettingError: another setting.
         """
         self._check_open("change_settings")
@@ -161,24 +178,24 @@ class LegBase:
 
     @property
     def geometry(self) -> Geometry:
-        """The leg."""
+        """Geometry of a leg."""
         return self.batch.body.geometry
 
     @property
     def gaits(self) -> dict[str, GaitParameters]:
         """Gaits of the preset by name; of a horse they are `HorseGait`s."""
-        gaits: Any = self.batch.body.gaits
-        found: dict[str, GaitParameters] = gaits
-        return found
+        of_body: Any = self.batch.body.gaits
+        gaits: dict[str, GaitParameters] = of_body
+        return gaits
 
     @property
     def engine(self) -> TrunkEngine:
-        """The mechanics."""
+        """Engine that simulates all environments."""
         return self.batch.engine
 
     @property
     def terrain(self) -> Terrain:
-        """What the legs stand on."""
+        """Terrain under the legs."""
         return self.batch.engine.terrain
 
     @property
@@ -188,29 +205,29 @@ class LegBase:
 
     @property
     def sim_dt(self) -> float:
-        """Substep [s]."""
+        """Substep of the settings [s], which the engine may divide."""
         return self.batch.settings.sim_dt
 
     @property
     def observation_names(self) -> tuple[str, ...]:
-        """Of the observation's entries."""
+        """Names of the observation's entries, in order."""
         return tuple(self.batch.names)
 
     @property
     def action_names(self) -> tuple[str, ...]:
-        """Of the action's numbers; of a horse with the leg before each."""
+        """Names of the actions; a horse's carry the leg as prefix."""
         names: tuple[str, ...] = self.batch.body.action_names
         return names
 
     @property
     def observation_units(self) -> tuple[str, ...]:
-        """Of what `raw_observation` gives, in the observation's order."""
+        """Units of `raw_observation`, in the order of the observation."""
         return tuple(entry.unit for entry in self.batch.entries)
 
     def episode_summary(self) -> dict[str, Any]:
-        """Figures of the episode so far by name, those of `info["episode_summary"]`; of many, shape
-        (num_envs,). The info lacks them where a wrapper ends an episode, as that of
-        `gymnasium.make(..., max_episode_steps=...)` does.
+        """Return figures of the episode so far by name, as in `info["episode_summary"]`; in a vector
+        environment of shape (num_envs,). The info lacks them where a wrapper ends an episode, such as the one
+        of `gymnasium.make(..., max_episode_steps=...)`.
 
         Raises:
             ResetNeeded: there is no episode yet.
@@ -220,8 +237,8 @@ class LegBase:
         return {name: self._each(values) for name, values in figures.items()}
 
     def raw_observation(self) -> dict[str, Any]:
-        """What is observed now, before it is scaled: by name, in `observation_units`; of many, shape
-        (num_envs,).
+        """Return the present observation before scaling, by name, in `observation_units`; in a vector
+        environment of shape (num_envs,).
 
         Raises:
             ResetNeeded: there is no episode yet.
@@ -230,27 +247,28 @@ class LegBase:
         return {name: self._each(values) for name, values in self.batch.measured().items()}
 
     def _each(self, values: Any) -> Any:
-        """What every environment has, as an array; a single environment gives its own."""
+        """Return values of all environments as an array; the single environment returns its own value."""
         return np.array(values)
 
     @property
     def action_form(self) -> str:
-        """What actions are: "rates" of the gait parameters of one leg, or "offsets" from a horse's gait. It
-        is in states and in files of policies, so that none of another form is taken."""
+        """Meaning of actions: "rates" of the gait parameters of one leg, or "offsets" from a horse's gait.
+        States and files of policies contain it, so that those of another form are refused."""
         form: str = self.batch.body.action_form
         return form
 
     def action_for(self, gait: str | GaitParameters | NDArray[np.float64]) -> NDArray[np.float32]:
-        """The action that goes towards a gait from the present one, as fast as is allowed: given again at
-        every step it ends there and keeps it. Shape (4,); of many environments (num_envs, 4).
+        """Return the action that moves from the present gait towards another one as fast as is allowed. If it
+        is computed again for every step, the gait arrives there and stays. Shape (4,); in a vector
+        environment (num_envs, 4).
 
         Args:
-            gait: the name of one of `gaits`, or its four parameters; as an array also many, shape
-                (num_envs, 4).
+            gait: name of one of `gaits`, or four gait parameters; in a vector environment also an array of
+                shape (num_envs, 4).
 
         Raises:
-            ParameterError: an unknown name, or not four parameters.
-            ResetNeeded: there is no episode yet, so no present gait.
+            ParameterError: an unknown name, not four parameters, or an environment of a horse.
+            ResetNeeded: there is no episode yet, and therefore no present gait.
         """
         self._check_started("action_for")
         actions: NDArray[np.float32] = self._each(
@@ -259,16 +277,26 @@ class LegBase:
         return actions
 
     def _check_open(self, call: str) -> None:
+        """Raise `ClosedEnvironmentError` after `close`; `call` is the name of the method."""
         if self._phase == "closed":
             raise ClosedEnvironmentError(f"{call}() was called after close(): make a new one")
 
     def _check_started(self, call: str) -> None:
+        """Raise `ResetNeeded` before the first reset, too."""
         self._check_open(call)
         if self._phase == "new":
             raise ResetNeeded(f"{call}() was called before reset(): expected reset() first")
 
     def _check_state(self, state: Any, *parts: str) -> None:
-        """`ParameterError` unless `state` is one that `get_state` of such an environment gave."""
+        """Check that `state` is one of `get_state` of an environment with this id and these settings.
+
+        Args:
+            state: state to check.
+            parts: names of further parts that it must have.
+
+        Raises:
+            ParameterError: it is not.
+        """
         self._check_open("set_state")
         names = ("id", "settings", "engine", "episode", "generator", *parts)
         missing = [name for name in names if not isinstance(state, Mapping) or name not in state]
@@ -283,28 +311,32 @@ class LegBase:
         here = self._settings_as_json()
         if here == there:
             return
+        # Only settings that exist now: states of other versions may have more.
         unlike = [f"{k}: {v!r} here, {there.get(k)!r} there" for k, v in here.items() if there.get(k) != v]
         if unlike:
             raise ParameterError(f"state: of other settings; {'; '.join(unlike)}")
 
     def _state_of_batch(self) -> dict[str, Any]:
-        """What `get_state` gives but for the generators."""
+        """Return the state without the generators."""
         self._check_started("get_state")
         values = self._settings_as_json()
-        settings = values | {name: json_value(values[name]) for name in self._as_json[2]}  # nobody else's
+        # Copies of lists and mappings, because callers may change the state.
+        settings = values | {name: json_value(values[name]) for name in self._as_json[2]}
         about = {"id": self.task.id, "actions": self.action_form, "settings": settings}
         return about | state_of(self.batch)
 
     def _settings_as_json(self) -> dict[str, Any]:
-        """As values that JSON can hold, found once for these settings."""
-        found, values, _ = self._as_json
-        if found is not self.settings:
+        """Return the settings as values that JSON can hold. They are converted once: planners take a state at
+        every node of their tree."""
+        converted, values, _ = self._as_json
+        if converted is not self.settings:
             values = to_json(self.settings)
             changeable = [name for name, value in values.items() if isinstance(value, (dict, list))]
             self._as_json = self.settings, values, changeable
         return values
 
     def _warn_ended(self) -> None:
+        """Warn once, in Gymnasium's words, of a step after the end of an episode."""
         if self._phase == "ended":
             self._phase = "warned"
             gym.logger.warn(

@@ -1,8 +1,9 @@
-"""Episodes of a task, one or many at once: what the single and the vector environment share.
+"""Episodes of a task, one or many at once, for the single and the vector environment.
 
-`EpisodeBatch` knows arrays and generators and nothing of Gymnasium. A row has the same bits whatever the
-number of its neighbours: starts are drawn from a generator of its own, and the kernels are those of
-`step`, compiled for one environment or for several side by side.
+`EpisodeBatch` works with arrays and generators and does not depend on Gymnasium. A row has the same bits for
+any number of neighbours: its starts are drawn from its own generator, and the kernels are those of `step`,
+compiled for one environment or for several side by side. Functions on batches are in `batch_build`,
+`batch_reports`, `batch_starts` and `batch_states`.
 """
 
 from __future__ import annotations
@@ -47,30 +48,63 @@ from hoof_env.tasks.settings import Settings
 
 Floats = NDArray[np.float64]
 
-LONGEST_EPISODE = 1e6  # seconds of an episode at most
+LONGEST_EPISODE = 1e6  # largest `episode_seconds` [s]
+
+COPIED = (
+    "engine",
+    "has_overrides",
+    "start_values",
+    "episode",
+    "actions",
+    "observations",
+    "rewards",
+    "task_record",
+)
+"""Attributes of an `EpisodeBatch` that change in place, which a copy must have for itself."""
+
+FOUND_AGAIN = (
+    "addresses",
+    "_blocks",
+    "entries",
+    "kernel",
+    "measurements",
+    "episode_rows",
+    "kernels",
+    "observe_kernel",
+)
+"""Attributes of an `EpisodeBatch` that belong to one process: addresses, kernels and views."""
 
 
 class EpisodeBatch(BatchKernels):
     """`num_envs` episodes of a task.
 
     Attributes:
-        task, settings: what it is.
-        engine: the mechanics of all.
-        entries, names: of the observation.
+        asked: settings as asked for; `settings` has values in place of None.
+        body: one leg, or a horse.
+        engine: engine of all episodes. Memory and arrays have `engine.columns` columns; the last may be idle.
+        names: names of the observation's entries.
         terms: keys of the reward's terms in infos.
-        kernel, addresses: one control step of all is `kernel(addresses)`; then comes `follow`.
         episode: memory of the episodes, rows as in `episode.Episode`, shape (rows, columns).
-        now: the same by name, shape (columns,) or (rows, columns) each.
-        actions, observations, rewards: what a step takes and gives, shapes (columns, actions), (columns,
-            entries),
-            (columns,).
-        body: the leg, or the horse, that they are about.
-        measurements: what infos measure.
-        start_values: the body's `start_names`, the gait and what `randomize` drew for them, a column
-            an environment; not a number where a state does not say.
+        actions, observations, rewards: input and output of a step, of shapes (columns, actions), (columns,
+            entries) and (columns,).
+        task_record: constants of the task that the kernels read, shape (1,), see `episode.task_type`.
+        start_values: the body's `start_names`, the gait, and the values drawn by `randomize`, shape (numbers,
+            num_envs); NaN where a state does not contain them.
+        conditions, changed: conditions of the rows, and a batch with the settings of the next episodes, None
+            if `change` was not called.
+        paper: solver of the paper, None with the engine's kernels.
+
+    Kernels and their attributes are those of `BatchKernels`.
+
+    Args:
+        task: task of all episodes.
+        settings: settings of the task, see `Task.settings`.
+        num_envs: number of episodes.
+        num_threads: number of threads that share the episodes in a step.
+        runs: False for a batch that is never stepped, for which no kernel is compiled.
 
     Raises:
-        ParameterError: a setting is out of range or of the wrong type.
+        ParameterError: a setting is out of range or of the wrong type, or a function cannot be compiled.
     """
 
     def __init__(
@@ -89,7 +123,8 @@ class EpisodeBatch(BatchKernels):
         self._allocate()
         self._open()
         self.episode_rows.weight[:] = self.engine.weight
-        self.episode_rows.switch[:] = np.inf  # idle columns never switch
+        # Columns without an environment never switch, so that they cause no draw.
+        self.episode_rows.switch[:] = np.inf
         if not runs:
             return
         try:
@@ -98,12 +133,13 @@ class EpisodeBatch(BatchKernels):
             raise ParameterError(f"{task.id}: {what_cannot_be_compiled(error)}") from error
 
     def _check_settings(self) -> None:
-        """Check the settings, and keep what follows from them."""
+        """Check the settings, and set the attributes that follow from them."""
         s = self.settings
         task = self.task
         check_choices(s)
         self.randomize = {} if s.randomize is None else check_parameters("randomize", s.randomize, s)
         self.terrain = make_terrain(s.terrain)
+        # The last parameters that `batch_starts.check_extremes` found good, as text.
         self.validated = ""
         if s.solver == "paper":
             check_paper(s)
@@ -114,6 +150,7 @@ class EpisodeBatch(BatchKernels):
         self.weights = check_weights(s.reward_weights, task.terms)
         self.substeps = substeps_of(s.dt, s.sim_dt)
         self.dt = s.sim_dt * self.substeps
+        # An episode of one step is allowed, whatever the rounding of dt.
         shortest = self.dt * (1 - 1e-9)
         self.episode_seconds = check_number(
             "episode_seconds", s.episode_seconds, low=shortest, high=LONGEST_EPISODE
@@ -125,10 +162,10 @@ class EpisodeBatch(BatchKernels):
         shortest = self.dt if self.speed_changes else 0.0
         self.target_seconds = check_range("target_seconds", s.target_seconds, shortest)
         for group, needed in (("target", "target_speed"), ("ground", "terrain")):
-            given = getattr(s, needed)
-            if group in self.groups and given in (None, {}):
+            value = getattr(s, needed)
+            if group in self.groups and value in (None, {}):
                 raise ParameterError(
-                    f"observation: {group!r} is constant without {needed}, got {needed}={given!r}"
+                    f"observation: {group!r} is constant without {needed}, got {needed}={value!r}"
                 )
 
     def _allocate(self) -> None:
@@ -154,7 +191,7 @@ class EpisodeBatch(BatchKernels):
 
     @property
     def start_row_count(self) -> int:
-        """How many numbers an episode starts with, besides those drawn."""
+        """Number of the start values of an episode, without those drawn by `randomize`."""
         return len(self.body.start_names) + len(self.body.gait_names)
 
     # Conditions
@@ -165,30 +202,32 @@ class EpisodeBatch(BatchKernels):
         Raises:
             ParameterError: a setting is out of range; nothing has changed then.
         """
+        # A batch of one checks the settings and makes everything that follows from them.
         made = EpisodeBatch(self.task, settings, 1, runs=False)
         made.limit(self.steps_per_episode)
-        made.num_envs = self.num_envs  # for which options are checked
+        made.num_envs = self.num_envs  # the number for which `check_options` checks the options
         self.changed = made
 
     def _adopt(self) -> None:
         """Work under the conditions that `change` asked for."""
         assert self.changed is not None
         old = [*self.randomize]
-        begun = self.start_values
+        old_values = self.start_values
         self.conditions.add(conditions_of(self), conditions_of(self.changed))
         enter(self, self.conditions.all[-1])
         self.changed = None
         first = self.start_row_count
         self.start_values = np.full((first + len(self.randomize), self.num_envs), np.nan)
-        self.start_values[:first] = begun[:first]
+        self.start_values[:first] = old_values[:first]
+        # Infos of running episodes keep the drawn values that the new settings draw, too; others are NaN.
         for k, name in enumerate(self.randomize):
             if name in old:
-                self.start_values[first + k] = begun[first + old.index(name)]
+                self.start_values[first + k] = old_values[first + old.index(name)]
 
     # Episodes
 
     def limit(self, steps: int) -> None:
-        """Truncate episodes after so many control steps, if not before."""
+        """Truncate episodes after `steps` control steps, if they are not shorter already."""
         self.steps_per_episode = min(steps, self.steps_per_episode)
         self.task_record["episode_steps"] = self.steps_per_episode
 
@@ -198,14 +237,12 @@ class EpisodeBatch(BatchKernels):
         generators: Sequence[np.random.Generator],
         options: Mapping[str, Any],
     ) -> dict[str, Floats]:
-        """Start episodes in `envs`, with a generator each and options as `check_options` gives them.
-
-        Returns the "parameters" that were drawn or set, by name, shape (len(envs),).
-        """
+        """Start episodes in `envs`, with a generator for each and options of `batch_starts.check_options`.
+        Return the "parameters" that were drawn or set, by name, shape (len(envs),)."""
         which = np.asarray(envs, np.int64)
         if self.changed is not None:
             self._adopt()
-            self.has_overrides[:] = True  # rows of settings are of the old ones
+            self.has_overrides[:] = True  # the engine's constants are those of the old settings
         if self.conditions.all:
             self.conditions.start(which)
         if self.conditions.are_mixed:
@@ -216,10 +253,11 @@ class EpisodeBatch(BatchKernels):
         return start(self, which, generators, options)
 
     def step(self, generators: Sequence[np.random.Generator], idle: NDArray[np.bool_] | None = None) -> bool:
-        """One control step under `actions`; returns whether any episode ended.
+        """Take one control step under `actions`; return True if any episode ended. Nothing is drawn for
+        `idle` environments, shape (num_envs,), which are between two episodes.
 
-        Nothing is drawn for environments that are `idle`, shape (num_envs,), as their episode is over. Where
-        an action is not a number there is a `ParameterError`, and nothing has happened.
+        Raises:
+            ParameterError: an action is not finite; no environment was advanced then.
         """
         if self.conditions.are_mixed:
             all_rows = np.arange(self.num_envs)
@@ -229,15 +267,18 @@ class EpisodeBatch(BatchKernels):
         return self.finish_step(int(happened), generators, idle)
 
     def _step(self) -> int:
-        found: int = np.bitwise_or.reduce(run_together(self.kernel, self._blocks, self.engine.num_threads))
-        return found
+        """Run the kernel on all rows, shared among threads; return its code, see `step.NOT_A_NUMBER`."""
+        # Every thread checks all actions: all return NOT_A_NUMBER, which is -1, or none does.
+        code: int = np.bitwise_or.reduce(run_together(self.kernel, self._blocks, self.engine.num_threads))
+        return code
 
     def finish_step(
         self, happened: int, generators: Sequence[np.random.Generator], idle: NDArray[np.bool_] | None = None
     ) -> bool:
-        """`step` after its kernel, which returned what happened."""
+        """Finish a `step` after its kernel, which returned the code `happened`."""
         if happened == NOT_A_NUMBER:
             raise ParameterError("action: expected finite numbers, got some that are not")
+        # The engine put failed environments back to their last good state; the kernel observed what failed.
         if happened & SOME_ENDED and not self.paper:
             put_back = np.flatnonzero(broken(self.engine.results))
             if put_back.size and self.conditions.are_mixed:
@@ -254,43 +295,27 @@ class EpisodeBatch(BatchKernels):
 
     @property
     def ended_row(self) -> int:
-        """Of the memory of episodes."""
+        """Row of `Episode.ended` in the memory of the episodes."""
         row: int = self.layout.rows("ended").start
         return row
 
     def __getstate__(self) -> dict[str, Any]:
-        found_again = (
-            "addresses",
-            "_blocks",
-            "entries",
-            "kernel",
-            "measurements",
-            "episode_rows",
-            "kernels",
-            "observe_kernel",
-        )
-        return {key: value for key, value in vars(self).items() if key not in found_again}
+        """Return the attributes that can be pickled; `__setstate__` finds the others again."""
+        return {key: value for key, value in vars(self).items() if key not in FOUND_AGAIN}
 
     def __setstate__(self, state: dict[str, Any]) -> None:
+        """Set the attributes, and find kernels and arrays of this process."""
         vars(self).update(state)
         self.conditions = self.conditions.copied()
         self._open()
 
     def __deepcopy__(self, memo: dict[int, Any]) -> EpisodeBatch:
-        """What never changes is shared: a planner copies at every node of its tree."""
+        """Copy the batch. The copy shares what never changes: planners copy at every node of their tree."""
         made = object.__new__(type(self))
         vars(made).update(vars(self))
-        for name in (
-            "engine",
-            "has_overrides",
-            "start_values",
-            "episode",
-            "actions",
-            "observations",
-            "rewards",
-            "task_record",
-        ):
+        for name in COPIED:
             setattr(made, name, copy.deepcopy(getattr(self, name), memo))
+        # The solver refers to the engine, and the kernel is a method of the batch: both to those of the copy.
         if self.paper:
             made.paper = copy.deepcopy(self.paper, memo | {id(self.engine): made.engine})
             made.kernel = made._step_paper

@@ -1,4 +1,4 @@
-"""Parts of a batch of episodes that are made once: checks of settings, the engine, the task's record."""
+"""Construction of the parts of a batch of episodes: checks of settings, the engine, the task's record."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from hoof_env.tasks.parameters import extremes
 from hoof_env.tasks.settings import Settings
 
 MOST_BAUMGARTE = 1e6
-"""Largest of Baumgarte's parameters [1/s]; a substep of 1 us integrates no larger one."""
+"""Largest of Baumgarte's parameters [1/s]; larger ones are unstable even with a substep of 1 us."""
 
 
 def check_choices(s: Settings) -> None:
@@ -40,11 +40,12 @@ def check_choices(s: Settings) -> None:
 
 
 def make_engine(batch: Any, num_threads: int) -> TrunkEngine:
-    """Make the engine of an `EpisodeBatch`, with the substeps that all drawn parameters ask for."""
+    """Make the engine of an `EpisodeBatch`, with as many substeps as all drawn parameters need."""
     s = batch.settings
     body = batch.body
     trunk, ground, limbs = body.parts(s)
     substeps = None
+    # For all episodes alike: environments with different numbers of substeps cannot run side by side.
     if batch.randomize:
         corners = ({}, *extremes(batch.randomize))
         substeps = max(substeps_under(batch, corner, None) for corner in corners)
@@ -55,6 +56,7 @@ def make_engine(batch: Any, num_threads: int) -> TrunkEngine:
         batch.terrain,
         substeps=substeps,
         sim_dt=s.sim_dt,
+        # The paper's solver has schemes of its own; the engine then holds memory and takes no step.
         integrator="midpoint" if s.solver == "paper" else s.integrator,
         num_envs=batch.num_envs,
         num_threads=num_threads,
@@ -68,7 +70,17 @@ def make_engine(batch: Any, num_threads: int) -> TrunkEngine:
 
 
 def substeps_under(batch: Any, changes: Mapping[str, float], asked: int | None) -> int:
-    """Return the number of substeps of `sim_dt` with some settings changed, see `StepLength.choose`."""
+    """Return the number of substeps of `sim_dt` with some settings changed.
+
+    Args:
+        batch: an `EpisodeBatch`.
+        changes: changed settings by name.
+        asked: number of substeps; None for as many as are needed. With a number that is too low there is a
+            warning, see `StepLength.choose`.
+
+    Raises:
+        ParameterError: a changed setting is out of range.
+    """
     s: Any = replace(batch.settings, **dict(changes))
     trunk, ground, limbs = batch.body.parts(s)
     profiles = [leg_profile(limb.geometry) for limb in limbs]
@@ -98,6 +110,7 @@ def task_record(batch: Any) -> NDArray[Any]:
     task["episode_steps"] = batch.steps_per_episode
     task["stays"] = batch.settings.trunk == "fixed"
     task["observation_size"] = len(batch.names)
+    # One kernel serves all choices of groups: it skips entries without a column.
     task["observation_columns"] = -1
     for entry, slot in zip(entries, slots, strict=True):
         if entry.name in batch.names:

@@ -1,4 +1,4 @@
-"""Kernels of a batch of episodes: found for its task and body, compiled, and run."""
+"""Kernels of a batch of episodes: choice, compilation, and calls other than a step."""
 
 from __future__ import annotations
 
@@ -26,10 +26,15 @@ class BatchKernels:
     """Kernels of an `EpisodeBatch`, and the arrays that they work on.
 
     Attributes:
-        kernel, addresses: one control step of all is `kernel(addresses)`; then comes `finish_step`.
-        observe_kernel: observes without a step; it takes addresses, too.
-        kernels: all kernels of the task.
+        kernel, addresses: `kernel(addresses)` is one control step of all episodes; `finish_step` follows.
+        observe_kernel: kernel that observes without a step; `observe_kernel(addresses)`.
+        kernels: all kernels of the task, `step.StepKernels`.
+        episode_rows: views of the episodes' memory by name.
+        entries: entries that are observed.
+        measurements: places of the values in the engine's memory that infos contain.
     """
+
+    # Attributes of the subclass that the methods here read.
 
     task: Any
     settings: Any
@@ -49,13 +54,14 @@ class BatchKernels:
     rewards: Any
 
     def _open(self) -> None:
-        """Find the kernels, and the arrays where they are now."""
+        """Find the kernels, and the addresses of the arrays in this process."""
         s = self.settings
         self.entries = observed(self.groups, s.trunk, s.drive, self.task.entries)
         self.measurements = InfoLayout(self.engine.features, self.body.leg_prefixes)
         self.kernels = k = step_kernels(
             self.task.terms, self.task.entries, self.task.contact_law, self.engine.features, self.body.kernels
         )
+        # Few environments, or the paper's solver, which works on the engine's memory between two kernels.
         runs_scalar = self.engine.runs_scalar or self.paper
         self.kernel, self.observe_kernel = (
             (k.step_one, k.observers.observe_one)
@@ -67,17 +73,23 @@ class BatchKernels:
         self.find()
 
     def find(self) -> None:
-        """Find the arrays where they are now."""
+        """Find the addresses of the arrays, after any of them was replaced."""
         self.episode_rows = views(self.layout, self.episode)
         arrays = (
-            *self.engine.arrays, self.episode, self.task_record, self.actions, self.observations, self.rewards
-        )  # fmt: skip
+            *self.engine.arrays,
+            self.episode,
+            self.task_record,
+            self.actions,
+            self.observations,
+            self.rewards,
+        )
         self.addresses = ADDRESSES.of(*arrays, columns=range(self.engine.columns))
+        # A block of columns for each thread; the paper's solver runs on one.
         blocks = self.engine.blocks[:1] if self.paper else self.engine.blocks
         self._blocks = [(ADDRESSES.of(*arrays, columns=block),) for block in blocks]
 
     def _compile(self) -> None:
-        """Have every kernel of a step compiled, or loaded, by running it on no environment."""
+        """Compile or load every kernel of a step, by running it on no environment."""
         if self.paper:
             self._run_idle(self.kernels.apply_one, self.kernels.finish_one)
             self.paper.compile(GaitParameters(*MIDDLE))
@@ -87,21 +99,25 @@ class BatchKernels:
         self.engine.reset(np.empty((self.legs, self.engine.features.gait_size, 0)), envs=[])
 
     def _run_idle(self, *kernels: Any) -> None:
+        """Run kernels on no environment."""
         idle = self.addresses.copy()
         idle[END] = 0
         for run in kernels:
             run(idle)
 
     def direct_kernel(self) -> Any:
-        """`kernel` without numba's choice by types, a hundredth of a single step: only for `addresses`."""
+        """Return `kernel` without numba's dispatch by types, which takes a hundredth of a single step. It
+        must be called with `addresses` only, as it checks no types."""
         if self.paper:
             return self.kernel
-        if not self.kernel.overloads:  # as in a process that unpickled this
+        # Not compiled yet in a process that unpickled the batch.
+        if not self.kernel.overloads:
             self._run_idle(self.kernel)
         (compiled,) = self.kernel.overloads.values()
         return compiled.entry_point
 
     def _step_paper(self, addresses: NDArray[np.int64]) -> int:
+        """Take a control step with the paper's solver between the kernels; return the code of a step."""
         assert self.paper
         if not self.kernels.apply_one(addresses):
             return NOT_A_NUMBER
@@ -110,14 +126,14 @@ class BatchKernels:
         return happened
 
     def measured(self) -> dict[str, Floats]:
-        """What is observed now, before it is scaled: the entries by name, shape (num_envs,)."""
+        """Return the present observation before scaling: entries by name, shape (num_envs,) each."""
         out = np.zeros((len(self.names), self.num_envs))
         if self.conditions.are_mixed:
-
+            # The kernel measures all rows; only those under the present conditions are right.
             def measure(rows: NDArray[np.int64]) -> None:
-                found = np.zeros_like(out)
-                self.kernels.observers.measure_one(self.addresses, found)
-                out[:, rows] = found[:, rows]
+                measured = np.zeros_like(out)
+                self.kernels.observers.measure_one(self.addresses, measured)
+                out[:, rows] = measured[:, rows]
 
             under_each(self, np.arange(self.num_envs), measure)
         else:
@@ -125,7 +141,7 @@ class BatchKernels:
         return dict(zip(self.names, out, strict=True))
 
     def alone(self, env: int) -> TrunkEngine:
-        """An engine like that of one environment."""
+        """Make an engine of one environment, under the conditions of the environment `env`."""
         if not self.conditions.are_mixed:
             return self.engine.alone()
         (engine,) = under_each(self, np.array([env]), lambda rows: self.engine.alone())
@@ -133,9 +149,11 @@ class BatchKernels:
         return made
 
     def _observe_broken(self, envs: NDArray[np.int64]) -> None:
-        """Observe the last good state of what could not be simulated, whose report is of where it broke."""
+        """Observe environments that could not be simulated again: their state is the last good one, but their
+        report is still of the point of failure."""
         data = self.engine.arrays[0]
         form = engine_layout(self.engine.features)
+        # No step, but new reports of all environments; only those of `envs` are kept.
         kept = data.copy()
         leg = form.leg_memory.rows("report")
         self.engine.advance(None, 0)

@@ -1,4 +1,4 @@
-"""Figures of episodes: what infos say, summaries of episodes that ended, reasons of failures."""
+"""Reports on a batch of episodes: infos, summaries of episodes that ended, reasons of failures."""
 
 from __future__ import annotations
 
@@ -17,22 +17,30 @@ Floats = NDArray[np.float64]
 
 
 def infos_of(batch: Any, ended: bool = True) -> dict[str, NDArray[Any]]:
-    """What all started with, what is measured of them, and the terms of the last reward, by name: shape
-    (num_envs,), but for "gait", "measured" and "parameters", which are `NamedArray`. `ended` says whether
-    there may be environments that could not be simulated."""
+    """Return the infos of all environments: start values, measurements, and terms of the last reward.
+
+    Args:
+        batch: an `EpisodeBatch`.
+        ended: False if no episode ended, so that all environments were simulated.
+
+    Returns:
+        Arrays by name, shape (num_envs,); "gait", "measured" and "parameters" are `NamedArray` of shape
+        (num_envs, numbers).
+    """
     n = batch.num_envs
-    begun = batch.start_values.copy()
+    values = batch.start_values.copy()
     memory = batch.engine.arrays[0]
     measured = batch.measurements.read(memory[:, :n])
+    # A step that failed was taken back: it has no sums.
     if ended:
-        nothing = broken(batch.engine.results)
-        measured[np.ix_(batch.measurements.last_step, nothing)] = 0.0
+        failed = broken(batch.engine.results)
+        measured[np.ix_(batch.measurements.last_step, failed)] = 0.0
     first = batch.start_row_count
     names = batch.body.start_names
-    infos: dict[str, NDArray[Any]] = dict(zip(names, begun, strict=False))
-    infos["gait"] = name_columns(begun[len(names) : first].T, batch.body.gait_names)
+    infos: dict[str, NDArray[Any]] = dict(zip(names, values, strict=False))
+    infos["gait"] = name_columns(values[len(names) : first].T, batch.body.gait_names)
     if batch.randomize:
-        infos["parameters"] = name_columns(begun[first:].T, tuple(batch.randomize))
+        infos["parameters"] = name_columns(values[first:].T, tuple(batch.randomize))
     if batch.target_speed:
         infos["target_speed"] = batch.episode_rows.target[:n].copy()
     infos["measured"] = measured.T.view(batch.measurements.kind)
@@ -41,19 +49,19 @@ def infos_of(batch: Any, ended: bool = True) -> dict[str, NDArray[Any]]:
 
 
 def summary_of(batch: Any, env: int) -> dict[str, float]:
-    """Figures of an episode, see `summaries_of`."""
+    """Return the figures of one episode by name, see `summaries_of`."""
     return {name: float(values[0]) for name, values in summaries_of(batch, [env]).items()}
 
 
 def summaries_of(batch: Any, envs: Sequence[int] | NDArray[np.int64]) -> dict[str, Floats]:
-    """Figures of the episodes of some environments, by name, shape (len(envs),) each.
+    """Return figures of the episodes of some environments, by name, shape (len(envs),) each.
 
     seconds, distance_m, speed_m_s, peak_grf_n (highest of the episode), mean_grf_n (normal force over the
     whole time), stance_peak_sum_n, stances, loading_rate_n_s (mean over stances), duty_factor,
     drive_work_j (braking is not recovered), cost_of_transport (work per weight and distance; infinite
-    without forward progress), weight_share (mean normal force over weight: what the leg bore),
-    support_share (the rest: what the rail or the suspension bore), slip_m (mean over stances), failed
-    (0 or 1); of a horse mean, sum and duty factor are of all its legs.
+    without forward progress), weight_share (mean normal force over weight: the leg's share), support_share
+    (the rest: the share of rail or suspension), slip_m (mean over stances), failed (0 or 1). A horse's mean
+    force and sum of peaks are sums over its legs, its duty factor is the mean of its legs.
     """
     seconds = batch.episode_rows.time[envs]
     distance = batch.episode_rows.distance[envs]
@@ -62,6 +70,7 @@ def summaries_of(batch: Any, envs: Sequence[int] | NDArray[np.int64]) -> dict[st
     work = total["positive_work"]
     stances = total["stances"]
     weight = batch.episode_rows.weight[envs]
+    # An episode of which no step was simulated has no duration.
     time = np.maximum(seconds, 1e-12)
     mean = total["normal_impulse"] / time
     each = np.maximum(stances, 1.0)
@@ -69,7 +78,8 @@ def summaries_of(batch: Any, envs: Sequence[int] | NDArray[np.int64]) -> dict[st
     cost = np.full(len(work), np.inf)
     np.divide(work, weight * distance, out=cost, where=distance > 0)
     return {
-        "seconds": np.array([round(count * batch.dt, 12) for count in steps]),  # sums of steps are 9.99...
+        # Rounded, because the sum of the steps of ten seconds is 9.99...
+        "seconds": np.array([round(count * batch.dt, 12) for count in steps]),
         "distance_m": distance,
         "speed_m_s": distance / time,
         "peak_grf_n": total["highest_grf"],
@@ -88,15 +98,23 @@ def summaries_of(batch: Any, envs: Sequence[int] | NDArray[np.int64]) -> dict[st
 
 
 def failure_of(batch: Any, env: int) -> str:
-    """Why an episode failed, for people."""
+    """Return the reason why an episode failed, in words."""
     if batch.paper and batch.paper.apart[env]:
         return "the linkage came apart; the state was put back to the last good one"
+    # The engine of one leg has no limits: the kernel of a step checks the height of its trunk.
     result = Result(int(batch.engine.results[env]))
     return result.message if result is not Result.OK else "the trunk left its range of heights"
 
 
 def endings_of(batch: Any, done: NDArray[np.bool_], terminated: NDArray[np.bool_]) -> dict[str, Any]:
-    """What infos say of episodes that end, as Gymnasium's `_add_info` puts them together one by one."""
+    """Return the entries of infos for episodes that end, in the form of Gymnasium's `_add_info`, which adds
+    one environment after the other.
+
+    Args:
+        batch: an `EpisodeBatch`.
+        done: True for environments that ended an episode, shape (num_envs,).
+        terminated: True for those that failed, shape (num_envs,).
+    """
     figures: dict[str, Any] = {}
     for name, values in summaries_of(batch, np.flatnonzero(done)).items():
         figures[name] = np.zeros(batch.num_envs)

@@ -1,4 +1,4 @@
-"""Starts of episodes in a batch: options, drawn parameters, commanded speeds."""
+"""Starts of episodes of a batch: options, drawn parameters, commanded speeds."""
 
 from __future__ import annotations
 
@@ -21,8 +21,13 @@ Floats = NDArray[np.float64]
 
 
 def check_options(batch: Any, options: Any) -> dict[str, Any]:
-    """Reset options as `reset` takes them; `ParameterError` of whatever can be wrong with them, so that a
-    refused reset changes nothing."""
+    """Check reset options completely, so that a refused reset changes nothing; return them in the form that
+    `EpisodeBatch.reset` takes.
+
+    Raises:
+        ParameterError: an unknown option, or one that no episode of the batch can have.
+    """
+    # The next episodes have the changed settings.
     if batch.changed is not None:
         return check_options(batch.changed, options)
     checked = batch.body.check_options(options, batch.engine.trunk, batch.settings)
@@ -41,7 +46,12 @@ def check_options(batch: Any, options: Any) -> dict[str, Any]:
 
 
 def check_extremes(batch: Any, parameters: Mapping[str, float | tuple[float, float]]) -> None:
-    """Raise where something that can be drawn is out of range, warn where it needs shorter substeps."""
+    """Check the limits of everything that can be drawn; warn if it needs shorter substeps.
+
+    Raises:
+        ParameterError: a parameter, or a combination of them, is out of range.
+    """
+    # The last ones are remembered: learners pass the same options at every reset.
     if parameters and batch.validated != (words := repr(parameters)):
         for corner in extremes(parameters):
             substeps_under(batch, corner, batch.engine.substeps)
@@ -54,11 +64,14 @@ def start(
     generators: Sequence[np.random.Generator],
     options: Mapping[str, Any],
 ) -> dict[str, Floats]:
-    now = batch.episode_rows
+    """Start episodes, see `EpisodeBatch.reset`. The order of the draws from a generator is part of what a
+    seed means."""
+    episode = batch.episode_rows
     options = {**batch.task.start, **options}
     parameters = batch.randomize | options.get("parameters", {})
     drawn = {name: np.zeros(len(which)) for name in parameters}
-    if parameters or batch.has_overrides[which].any():  # what was set for one episode is not for the next
+    # Also without parameters if the last episode had some: they were for that one only.
+    if parameters or batch.has_overrides[which].any():
         for k, (env, generator) in enumerate(zip(which, generators, strict=True)):
             values = draw_parameters(parameters, generator)
             for name, value in values.items():
@@ -66,51 +79,57 @@ def start(
             vary(batch, int(env), values)
         batch.has_overrides[which] = bool(parameters)
     gaits: Any = options.get("gait")
-    if np.ndim(gaits) == 2:  # one for each environment
+    # Gaits of all environments, of which only some start.
+    if np.ndim(gaits) == 2:
         options = {**options, "gait": gaits[which]}
     start = batch.body.draw(options, generators, batch.engine)
-    now.steps[which] = 0.0
-    now.time[which] = 0.0
-    now.distance[which] = 0.0
-    now.sums[:, which] = 0.0
+    episode.steps[which] = 0.0
+    episode.time[which] = 0.0
+    episode.distance[which] = 0.0
+    episode.sums[:, which] = 0.0
     batch.rewards[which] = 0.0
-    now.allowance[which] = BEARING * LONGEST_STRIDE
-    now.terms[:, which] = 0.0
-    now.target[which] = np.inf
-    now.switch[which] = np.inf
+    # The full allowance: a leg can bear its weight from the first step on.
+    episode.allowance[which] = BEARING * LONGEST_STRIDE
+    episode.terms[:, which] = 0.0
+    episode.target[which] = np.inf
+    episode.switch[which] = np.inf
     if batch.target_speed:
-        now.target[which] = batch.target_speed[0]
+        episode.target[which] = batch.target_speed[0]
     if batch.target_speed and batch.speed_changes:
-        now.target[which] = [generator.uniform(*batch.target_speed) for generator in generators]
+        episode.target[which] = [generator.uniform(*batch.target_speed) for generator in generators]
         draw_targets(batch, which, generators)
-    if "target_speed" in options:  # for the whole episode
-        now.target[which] = options["target_speed"]
-        now.switch[which] = np.inf
-    batch.body.complete_start(start, now.target[which], options, batch.engine)
+    # After the draws, so that the option does not change what follows from the generator.
+    if "target_speed" in options:
+        episode.target[which] = options["target_speed"]
+        episode.switch[which] = np.inf
+    batch.body.complete_start(start, episode.target[which], options, batch.engine)
     batch.engine.reset(start.commands, start.theta, envs=which, **start.trunk)
-    begun = [*(start.values[name] for name in batch.body.start_names), *start.gaits.T]
-    batch.start_values[:, which] = [*begun, *(drawn[name] for name in batch.randomize)]
-    now.x_before[which] = start.trunk["x"]
-    now.ended[which] = 0.0
-    batch.body.begin_episodes(now, which, start)
+    start_values = [*(start.values[name] for name in batch.body.start_names), *start.gaits.T]
+    batch.start_values[:, which] = [*start_values, *(drawn[name] for name in batch.randomize)]
+    episode.x_before[which] = start.trunk["x"]
+    episode.ended[which] = 0.0
+    batch.body.begin_episodes(episode, which, start)
     if batch.paper:
         batch.paper.start(which.tolist(), start.gaits, start.values["crank_angle"], start.values["x"])
-    near = batch.addresses.copy()  # the groups of lanes from the first of them to the last
-    near[BEGIN] = which.min() // LANES * LANES
-    near[END] = min(batch.engine.columns, (which.max() // LANES + 1) * LANES)
-    batch.observe_kernel(near)
+    # Whole groups of lanes, from that of the first environment to that of the last: kernels take no parts.
+    groups = batch.addresses.copy()
+    groups[BEGIN] = which.min() // LANES * LANES
+    groups[END] = min(batch.engine.columns, (which.max() // LANES + 1) * LANES)
+    batch.observe_kernel(groups)
     return drawn
 
 
 def vary(batch: Any, env: int, values: Mapping[str, float]) -> None:
-    """Give one environment settings of its own."""
+    """Set physical parameters of one environment, by name; the others are those of the settings."""
     trunk, ground, limbs = batch.body.parts(replace(batch.settings, **dict(values)))
     batch.engine.vary(env, trunk, ground, limbs=limbs)
     batch.episode_rows.weight[env] = (trunk.mass + sum(limb.geometry.mass for limb in limbs)) * GRAVITY
 
 
 def draw_targets(batch: Any, envs: NDArray[np.int64], generators: Sequence[np.random.Generator]) -> None:
-    """When other speeds are commanded, and which, with a generator for each of `envs`."""
+    """Draw the next commanded speeds of some environments, and the control steps after which they are
+    commanded, from a generator for each of `envs`."""
+    # Rows under older conditions draw from the older ranges.
     if batch.conditions.are_mixed:
         each = dict(zip(envs.tolist(), generators, strict=True))
         for conditions, rows in batch.conditions.groups(envs):
@@ -125,13 +144,14 @@ def _draw_between(
     generators: Sequence[np.random.Generator],
     conditions: Mapping[str, Any],
 ) -> None:
+    """Draw commanded speeds from the ranges of some conditions."""
     when, which = np.array([generator.random(2) for generator in generators]).reshape(-1, 2).T
     (shortest, longest) = conditions["target_seconds"]
     (low, high) = conditions["target_speed"]
     steps = np.rint((shortest + (longest - shortest) * when) / batch.dt)
-    now = batch.episode_rows.target[envs]
+    present = batch.episode_rows.target[envs]
     step = batch.body.command_step
-    low = np.maximum(low, now - step)
-    high = np.minimum(high, now + step)
+    low = np.maximum(low, present - step)
+    high = np.minimum(high, present + step)
     batch.episode_rows.switch[envs] = batch.episode_rows.steps[envs] + steps
     batch.episode_rows.next_target[envs] = low + (high - low) * which

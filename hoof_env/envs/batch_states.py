@@ -1,4 +1,4 @@
-"""States of a batch of episodes, which can be put back, also as those of many."""
+"""States of a batch of episodes: reading, checks, and restoring, also into a batch of another size."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ Floats = NDArray[np.float64]
 
 
 def state_of(batch: Any) -> dict[str, Any]:
-    """Everything that changes, but for the generators.
+    """Return everything that changes, except for the generators.
 
     Raises:
         ParameterError: some episodes are under older settings than others.
@@ -30,14 +30,15 @@ def state_of(batch: Any) -> dict[str, Any]:
 
 
 def spread_state(batch: Any, state: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the state of a single environment as one of a vector environment, all of whose rows are there.
+    """Return the state of a single environment as one of a vector environment with this state in every row.
 
     Raises:
-        ParameterError: it is no state of one.
+        ParameterError: `state` is not one of a single environment.
     """
     n = batch.num_envs
 
     def repeated(values: Any) -> Any:
+        """Repeat the last axis, which is that of the environments, n times."""
         return np.repeat(np.asarray(values, np.float64), n, -1)
 
     try:
@@ -46,33 +47,34 @@ def spread_state(batch: Any, state: Mapping[str, Any]) -> dict[str, Any]:
         if layout["num_envs"] != 1 or np.shape(state["episode"])[-1] != 1:
             raise ValueError
         parts = {name: repeated(values) for name, values in engine.items() if name != "layout"}
-        found = {**state, "engine": {**parts, "layout": {**layout, "num_envs": n}}}
-        found |= {name: repeated(state[name]) for name in ("episode", "start_values") if name in state}
+        spread = {**state, "engine": {**parts, "layout": {**layout, "num_envs": n}}}
+        spread |= {name: repeated(state[name]) for name in ("episode", "start_values") if name in state}
         if "paper" in state:
             paper = state["paper"]
-            found["paper"] = {"legs": [*paper["legs"]] * n} | {
+            spread["paper"] = {"legs": [*paper["legs"]] * n} | {
                 name: np.repeat(paper[name], n) for name in ("accounts", "last")
             }
     except (KeyError, TypeError, ValueError, IndexError):
         raise ParameterError(
             "state: expected what get_state gives of one environment, or of this vector environment"
         ) from None
-    ended = found["episode"][batch.ended_row] != 0.0
-    return {**found, "ended": ended, "generator": [state["generator"]] * n}
+    ended = spread["episode"][batch.ended_row] != 0.0
+    return {**spread, "ended": ended, "generator": [state["generator"]] * n}
 
 
 def is_possible(batch: Any, episode: Floats) -> bool:
-    """Whether weights, and the gaits of horses, are numbers that can be."""
+    """True if all rows of the episodes' memory have positive weights, and finite gaits of horses."""
     weight = episode[batch.layout.rows("weight")]
-    if not batch.body.finite_fields and (weight > 0).all():
-        return True
-    begun = ~np.isnan(batch.start_values[0])
-    rows = [episode[batch.layout.rows(name)][:, begun] for name in batch.body.finite_fields]
-    return bool((weight[:, begun] > 0).all() and all(np.isfinite(values).all() for values in rows))
+    rows = [episode[batch.layout.rows(name)] for name in batch.body.finite_fields]
+    return bool((weight > 0).all() and all(np.isfinite(values).all() for values in rows))
 
 
 def set_state(batch: Any, state: Mapping[str, Any]) -> None:
-    """Put back what `get_state` gave; `ParameterError` for one of another task, geometry or setting."""
+    """Restore a state of `state_of`, and observe it. Everything is checked before anything changes.
+
+    Raises:
+        ParameterError: a part is missing or broken, or has a shape of another batch.
+    """
     expected = (len(batch.episode), batch.num_envs)
     try:
         episode = np.asarray(state["episode"], np.float64)
@@ -85,8 +87,9 @@ def set_state(batch: Any, state: Mapping[str, Any]) -> None:
             f"state['episode']: expected shape {expected} for {batch.num_envs} environments, "
             f"got {episode.shape}"
         )
-    begun = np.asarray(state.get("start_values", np.nan))  # older states do not say
-    if begun.dtype.kind != "f" or begun.shape not in ((), batch.start_values.shape):
+    # States of older versions have no start values: infos then contain NaN.
+    start_values = np.asarray(state.get("start_values", np.nan))
+    if start_values.dtype.kind != "f" or start_values.shape not in ((), batch.start_values.shape):
         raise ParameterError(
             f"state['start_values']: expected numbers, shape {batch.start_values.shape}, got"
             f" {state['start_values']!r:.60}"
@@ -96,7 +99,8 @@ def set_state(batch: Any, state: Mapping[str, Any]) -> None:
     if batch.paper and of_paper:
         batch.paper.set_state(*of_paper)
     batch.episode[:, : batch.num_envs] = episode
-    batch.start_values[:] = begun
+    batch.start_values[:] = start_values
+    # The state's engine may have drawn parameters, which the next reset must replace.
     batch.has_overrides[:] = True
     if batch.conditions.all:
         batch.conditions.start(np.arange(batch.num_envs))

@@ -1,4 +1,4 @@
-"""Compile the kernels of all environments before any is made."""
+"""Compilation of the kernels of all environments before any is made."""
 
 from __future__ import annotations
 
@@ -19,20 +19,27 @@ KERNELS: dict[str, Callable[[], object]] = {
     "one horse": lambda: EpisodeBatch(TASKS["horse"], TASKS["horse"].settings({}), 1),
     "many horses": lambda: EpisodeBatch(TASKS["horse"], TASKS["horse"].settings({}), LANES),
 }
-"""What uses kernels of its own; all ids share these, and all settings but `hoof_stiffness` of one leg, and
-`harmonics` and a rigid hoof of a horse."""
+"""Functions that make a batch for each set of kernels, by name. All ids share these kernels, and all settings
+except `hoof_stiffness` of one leg, and `harmonics` and a rigid hoof of a horse."""
 
 
 def compile_kernels(say: Callable[[str], None]) -> list[str]:
-    """Compile what is not in numba's cache, telling of each of `KERNELS`; returns the names of those kernels.
-    `OutputError` where there is something to compile and the cache folder is not writable."""
+    """Compile the kernels that are not in numba's cache; return their names.
+
+    Args:
+        say: function that is called with a line of text after each of `KERNELS`, and at the end.
+
+    Raises:
+        OutputError: there is something to compile and the cache folder is not writable.
+    """
     first = len(COMPILED)
     for name, make in KERNELS.items():
-        begun = time.monotonic()
+        start = time.monotonic()
         count = len(COMPILED)
+        # Making a batch compiles or loads all of its kernels; `COMPILED` grows by those not in the cache.
         make()
-        if found := COMPILED[count:]:
-            say(f"{name}: {time.monotonic() - begun:.1f} s for {', '.join(found)}")
+        if new := COMPILED[count:]:
+            say(f"{name}: {time.monotonic() - start:.1f} s for {', '.join(new)}")
     folder = given_folder() or "numba's own folders; NUMBA_CACHE_DIR names another"
     compiled = COMPILED[first:]
     say(f"{f'{len(compiled)} kernels compiled' if compiled else 'nothing to compile'}; they are in {folder}")

@@ -1,10 +1,11 @@
-"""Settings that change from one episode to the next, as a curriculum asks, in a batch of which every row goes
-on with its own until it starts again.
+"""Settings that change from one episode to the next, for curricula: every row of a batch keeps its own until
+it starts again.
 
-Conditions are what an `EpisodeBatch` and its engine have of such settings, by name. A batch works under one
-of them at a time. Where rows are under several, a kernel runs once under each of them on all rows, and each
-row keeps what happened under its own: it has the bits of a single environment with these settings. That takes
-as many times as long as there are conditions, until every episode has ended that began under older ones.
+Conditions are the attributes of an `EpisodeBatch` and its engine that follow from such settings, by name. A
+batch works under one set of conditions at a time. If its rows are under several, a kernel runs once under
+each of them on all rows, and each row keeps the result under its own: it has the bits of a single environment
+with these settings. The time of a step is multiplied by the number of conditions, until every episode that
+started under older ones has ended.
 """
 
 from __future__ import annotations
@@ -18,33 +19,42 @@ from numpy.typing import NDArray
 Conditions = dict[str, Any]
 
 CHANGEABLE = ("target_speed", "target_seconds", "terrain", "reward_weights", "randomize")
-"""Settings that may change: none changes what is observed, an action, or how long an episode is."""
+"""Settings that may change: none of them changes the observation's entries, the meaning of actions, or the
+length of an episode."""
 
 OF_BATCH = (
-    "asked", "settings", "randomize", "terrain", "validated", "weights", "target_speed", "speed_changes",
-    "target_seconds", "task_record",
-)  # fmt: skip
+    "asked",
+    "settings",
+    "randomize",
+    "terrain",
+    "validated",
+    "weights",
+    "target_speed",
+    "speed_changes",
+    "target_seconds",
+    "task_record",
+)
 OF_ENGINE = ("terrain", "substeps", "step_limits", "_model")
 """Attributes of a batch, and of its engine, that follow from these settings."""
 
 PLACES = ("addresses", "_blocks")
-"""Where the arrays are; they are found again in a copy."""
+"""Attributes that hold addresses of arrays, which a copy has to find again."""
 
 
 def conditions_of(batch: Any) -> Conditions:
-    """Those under which a batch works."""
+    """Return the conditions under which a batch works at present."""
     return {name: getattr(batch, name) for name in OF_BATCH} | {
         name: getattr(batch.engine, name) for name in OF_ENGINE
     }
 
 
 class RowConditions:
-    """Under which conditions the rows of a batch are.
+    """Conditions of the rows of a batch.
 
     Attributes:
-        all: conditions of some row, the last ones those of every episode that starts from now on; empty as
-            long as nothing has changed.
-        which: by row, a place in `all`.
+        all: conditions that rows are under; the last ones are those of every episode that starts from now
+            on. Empty as long as nothing has changed.
+        which: index in `all` of each row, shape (rows,).
     """
 
     def __init__(self, rows: int) -> None:
@@ -52,11 +62,12 @@ class RowConditions:
         self.which = np.zeros(rows, np.int64)
 
     def add(self, old: Conditions, new: Conditions) -> None:
-        """Have every episode that starts from now on take the new conditions."""
+        """Put every episode that starts from now on under the new conditions."""
+        # The first change: all rows are under the old conditions, at index 0.
         self.all = [*(self.all or [old]), new]
 
     def start(self, rows: NDArray[np.int64]) -> None:
-        """Rows take the last conditions; those of no row are forgotten."""
+        """Put rows under the last conditions, and remove conditions that no row is under any more."""
         self.which[rows] = len(self.all) - 1
         used = sorted({*self.which.tolist(), len(self.all) - 1})
         self.all = [self.all[k] for k in used]
@@ -64,35 +75,38 @@ class RowConditions:
 
     @property
     def are_mixed(self) -> bool:
-        """Whether some rows are under older conditions."""
+        """True if some rows are under older conditions."""
         return len(self.all) > 1
 
     def of(self, row: int) -> Conditions:
-        """Of a row; nothing if nothing has ever changed."""
+        """Return the conditions of a row, an empty mapping if nothing has ever changed."""
         return self.all[self.which[row]] if self.all else {}
 
     def groups(self, rows: NDArray[np.int64]) -> Iterator[tuple[Conditions, NDArray[np.int64]]]:
-        """Those of some rows, with the rows."""
+        """Yield the conditions that some rows are under, each with those rows."""
         for k, conditions in enumerate(self.all):
-            those = rows[self.which[rows] == k]
-            if those.size:
-                yield conditions, those
+            group = rows[self.which[rows] == k]
+            if group.size:
+                yield conditions, group
 
     def copied(self) -> RowConditions:
-        """For a copy of the batch, which has its arrays elsewhere."""
+        """Return the conditions for a copy of the batch, which has its arrays at other addresses."""
         made = RowConditions(len(self.which))
         made.which[:] = self.which
-        made.all = [{name: part for name, part in one.items() if name not in PLACES} for one in self.all]
+        for conditions in self.all:
+            made.all.append({name: part for name, part in conditions.items() if name not in PLACES})
         return made
 
 
 def enter(batch: Any, conditions: Conditions) -> None:
-    """Have a batch work under conditions."""
+    """Let a batch work under conditions."""
     for name in OF_BATCH:
         setattr(batch, name, conditions[name])
     for name in OF_ENGINE:
         setattr(batch.engine, name, conditions[name])
+    # The engine keeps the description of its states, in which the terrain is, after the first state.
     vars(batch.engine).pop("_layout", None)
+    # Addresses are found once for each conditions: a step enters all of them.
     if PLACES[0] in conditions:
         for name in PLACES:
             setattr(batch, name, conditions[name])
@@ -102,35 +116,49 @@ def enter(batch: Any, conditions: Conditions) -> None:
 
 
 def keep_others(batch: Any, rows: NDArray[np.int64], act: Callable[[], Any]) -> Any:
-    """What a call returns, which changes nothing but some rows."""
+    """Call a function and restore all rows except some; return the function's result.
+
+    Args:
+        batch: an `EpisodeBatch`.
+        rows: rows that the function may change.
+        act: the function.
+    """
     others = np.setdiff1d(np.arange(batch.num_envs), rows)
     by_column, by_row = _arrays(batch)
-    kept = [array[..., others] for array in by_column], [array[others] for array in by_row]
+    kept_columns = [array[..., others] for array in by_column]
+    kept_rows = [array[others] for array in by_row]
+    # Also if Ctrl-C ends the call, so that no row has results under foreign conditions.
     try:
         return act()
-    finally:  # also where Ctrl-C ends it
-        for array, values in zip(by_column, kept[0], strict=True):
+    finally:
+        for array, values in zip(by_column, kept_columns, strict=True):
             array[..., others] = values
-        for array, values in zip(by_row, kept[1], strict=True):
+        for array, values in zip(by_row, kept_rows, strict=True):
             array[others] = values
 
 
 def under_each(batch: Any, rows: NDArray[np.int64], act: Callable[[NDArray[np.int64]], Any]) -> list[Any]:
-    """What a call returns under the conditions of some rows, once for each, with their rows, of which alone
-    it changes anything."""
+    """Call a function once under each of the conditions that some rows are under; return its results.
+
+    Args:
+        batch: an `EpisodeBatch`.
+        rows: rows that are to be changed.
+        act: function of the rows that are under the present conditions; changes of other rows are undone.
+    """
     newest = batch.conditions.all[-1]
-    found = []
+    results = []
     try:
-        for conditions, those in batch.conditions.groups(rows):
+        for conditions, group in batch.conditions.groups(rows):
             enter(batch, conditions)
-            found.append(keep_others(batch, those, lambda those=those: act(those)))  # type: ignore[misc]
+            results.append(keep_others(batch, group, lambda group=group: act(group)))  # type: ignore[misc]
     finally:
         enter(batch, newest)
-    return found
+    return results
 
 
 def _arrays(batch: Any) -> tuple[list[NDArray[Any]], list[NDArray[Any]]]:
-    """What kernels change: arrays with the environment on the last axis, and with it on the first."""
+    """Return the arrays that kernels change: those with the environment on the last axis, and those with it
+    on the first."""
     data, _, _, _, _, reactions = batch.engine.arrays
     by_column = [data, batch.episode, *([reactions] if reactions.size else [])]
     return by_column, [batch.observations, batch.rewards]

@@ -1,5 +1,5 @@
-"""The environments of the family, one class for all; `tasks` has what they differ in. `HorseLegMOEnv` alone
-says a reward of three numbers."""
+"""Single environments: one class for all tasks of `tasks.registry`, and `HorseLegMOEnv` with a reward of
+three numbers."""
 
 from __future__ import annotations
 
@@ -34,19 +34,18 @@ class HorseLegEnv(LegBase, gym.Env[NDArray[np.float32], NDArray[np.float32]]):
     Args:
         task: name in `registry.TASKS`; the registered ids set it.
         render_mode: "rgb_array" or "human".
-        width, height: of a picture [pixels].
-        settings: any of `settings.Settings`; the manual page (`hoof-env manual`) says what they mean.
+        width, height: size of a picture [pixels].
+        settings: any of `settings.Settings`; the manual page (`hoof-env manual`) describes them.
 
     Attributes:
-        task, settings: the task and its settings.
-        batch: the episode, a batch of one.
-        action_space, observation_space: boxes from -1 to 1, float32, of shapes (4,) and
+        batch: episode, a batch of one.
+        action_space, observation_space: boxes from -1 to 1, float32, of shapes (len(action_names),) and
             (len(observation_names),).
 
     Raises:
         ParameterError: a bad argument, option or action, with what was given and what was expected.
         ResetNeeded: a step, a picture or the state before the first reset.
-        ClosedEnvironmentError: anything after `close`.
+        ClosedEnvironmentError: any use after `close`.
     """
 
     metadata: ClassVar[dict[str, Any]] = {"render_modes": ["human", "rgb_array"], "render_fps": 50}  # type: ignore[misc]
@@ -67,18 +66,23 @@ class HorseLegEnv(LegBase, gym.Env[NDArray[np.float32], NDArray[np.float32]]):
         self._attach()
 
     def _attach(self) -> None:
-        """What every step reads, writes or calls, found once."""
+        """Collect what a step reads, writes or calls: looking it up costs as much as a substep."""
         batch = self.batch
         terms = self.task.terms
-        weighed = [(k, term) for k, term in enumerate(terms) if batch.weights[term.name]]
-        paid = [(term.key, k) for k, term in weighed if term.compute is not failure]  # 0 before the end
+        weighted = [(k, term) for k, term in enumerate(terms) if batch.weights[term.name]]
+        # Terms that can differ from 0 before the end of an episode; infos start with 0 for the others.
+        paid = [(term.key, k) for k, term in weighted if term.compute is not failure]
         self._views: tuple[Any, ...] = (
-            batch.actions[0].data, batch.direct_kernel(), batch.addresses, bool(batch.randomize), paid,
-            batch.episode_rows.terms[:, 0], batch.rewards.data, batch.observations[0].copy,
+            batch.actions[0].data,
+            batch.direct_kernel(),
+            batch.addresses,
+            bool(batch.randomize),
+            paid,
+            batch.episode_rows.terms[:, 0],
+            batch.rewards.data,
+            batch.observations[0].copy,
             batch.measurements.reader(batch.engine.arrays[0][:, 0]),
-        )  # fmt: skip
-
-    # What pictures, records and policies read
+        )
 
     @property
     def weight(self) -> float:
@@ -89,8 +93,8 @@ class HorseLegEnv(LegBase, gym.Env[NDArray[np.float32], NDArray[np.float32]]):
         return values[0] if np.ndim(values) > 1 else float(values[0])
 
     def record(self) -> dict[str, NDArray[np.float64]]:
-        """State and report of the engine at every substep of the last control step, or at the start, by name,
-        time on the first axis. From the first call on substeps are kept.
+        """Return state and report of the engine at every substep of the last control step, or at the start,
+        by name, with time on the first axis. The first call switches recording on.
 
         Raises:
             ResetNeeded: there is no episode yet.
@@ -108,22 +112,22 @@ class HorseLegEnv(LegBase, gym.Env[NDArray[np.float32], NDArray[np.float32]]):
         """Start an episode.
 
         Args:
-            seed: of the generator, a whole number from 0; None goes on with it.
+            seed: seed of the generator, a whole number from 0; None continues with the present generator.
             options: "gait", "crank_angle" [rad], "speed" [m/s], "height" [m], "x" [m], "target_speed"
                 [m/s] for the whole episode, "parameters"; see the manual page.
 
         Returns:
-            The observation, float32, and what was drawn or set.
+            The observation, float32, and the info, with the values that were drawn or set.
 
         Raises:
             ParameterError: a bad seed or option; nothing has changed then.
         """
         self._check_open("reset")
-        checked = check_options(self.batch, options)  # before the generator is touched
+        checked = check_options(self.batch, options)  # first, so that a refused reset changes nothing
         super().reset(seed=None if seed is None else count("seed", seed, low=0))
         before = self.batch.addresses
         parameters = self.batch.reset([0], [self.np_random], checked)
-        if self.batch.addresses is not before:  # other settings
+        if self.batch.addresses is not before:  # `change_settings` took effect: other arrays
             self._attach()
         self._phase = "running"
         if self._recording is not None:
@@ -139,14 +143,15 @@ class HorseLegEnv(LegBase, gym.Env[NDArray[np.float32], NDArray[np.float32]]):
     def step(
         self, action: NDArray[np.float32]
     ) -> tuple[NDArray[np.float32], float, bool, bool, dict[str, Any]]:
-        """Change the gait for `dt`, by the rates of its parameters, or by offsets to a horse's gait.
+        """Take a control step of `dt`.
 
         Args:
-            action: 4 finite numbers, clipped to [-1, 1].
+            action: rates of the gait's parameters, shape (4,), or a horse's offsets to its gait, shape (16,);
+                finite numbers, clipped to [-1, 1].
 
         Returns:
-            Observation (float32), reward, terminated, truncated, and the reward's terms by name; at the end
-            of an episode also "episode_summary", and "failure" if it failed. A step after the end warns.
+            Observation, reward, terminated, truncated, and the info with the terms of the reward by name; at
+            the end of an episode also "episode_summary" and, if it failed, "failure". Later steps warn.
 
         Raises:
             ParameterError: the action has a wrong shape or is not finite; nothing has happened then.
@@ -155,18 +160,19 @@ class HorseLegEnv(LegBase, gym.Env[NDArray[np.float32], NDArray[np.float32]]):
             self._check_started("step")
             self._warn_ended()
         buffer, kernel, addresses, draws, paid, terms, rewards, observe, measure = self._views
+        # A copy from buffer to buffer is the fastest way; it takes float32 arrays of the right shape only.
         try:
-            buffer[:] = action  # four float32, the cheapest way
+            buffer[:] = action
         except (TypeError, ValueError, BufferError):
             self._read_action(action)
         happened = kernel(addresses)  # not through the batch: a call costs as much as a substep
         ended = happened != 0 and self._follow(happened)
-        info = self._begun[0]()  # all keys are there
-        gait = self._begun[1]()  # and stay in their places
+        info = self._begun[0]()  # has all keys already, in the order of the reset's info
+        gait = self._begun[1]()
         info["gait"] = gait
         info["measured"] = measure()
         if draws:
-            info["parameters"] = info["parameters"].copy()
+            info["parameters"] = info["parameters"].copy()  # callers may change their info
         for key, k in paid:
             info[key] = terms[k]
         failed = truncated = False
@@ -179,7 +185,7 @@ class HorseLegEnv(LegBase, gym.Env[NDArray[np.float32], NDArray[np.float32]]):
             info["episode_summary"] = summary_of(self.batch, 0)
             if failed:
                 info["failure"] = failure_of(self.batch, 0)
-            if broken(self.batch.engine.results)[0]:
+            if broken(self.batch.engine.results)[0]:  # the step was taken back: it has no sums
                 info["measured"][self.batch.measurements.last_step] = 0.0
         if self._recording is not None:
             self._recording.add()
@@ -188,14 +194,14 @@ class HorseLegEnv(LegBase, gym.Env[NDArray[np.float32], NDArray[np.float32]]):
         return observe(), rewards[0], failed, truncated, info
 
     def _follow(self, happened: int) -> bool:
-        """After a step in which something happened; returns whether the episode ended."""
+        """Finish a step with another return code than 0; return True if the episode ended."""
         ended = self.batch.finish_step(happened, (self.np_random,))
         if happened & SOME_SWITCHED:
             self._begin()
         return ended
 
     def _begin(self) -> None:
-        """What each info of this episode says of its start, and the keys of what a step fills in."""
+        """Make the info that steps of this episode copy: values of its start, keys for those of a step."""
         row = self.batch.start_values[:, 0].copy()
         body = self.batch.body
         first = self.batch.start_row_count
@@ -210,20 +216,20 @@ class HorseLegEnv(LegBase, gym.Env[NDArray[np.float32], NDArray[np.float32]]):
         self._begun = (info.copy, gait.copy)
 
     def _start_and_target(self) -> tuple[bytes, float]:
-        """What infos say that no step measures."""
+        """Return the part of infos that no step measures, to notice when it changes."""
         return self.batch.start_values.tobytes(), float(self.batch.episode_rows.target[0])
 
     def _read_action(self, action: Any) -> None:
-        given = array_of(action)
+        """Convert and store an action; raise `ParameterError` for a wrong shape or type."""
+        array = array_of(action)
         count = len(self.batch.body.action_names)
-        if given.shape != (count,) or given.dtype.kind not in "fiu":
+        if array.shape != (count,) or array.dtype.kind not in "fiu":
             raise ParameterError(f"action: expected {count} finite numbers in [-1, 1], got {action!r}")
-        with np.errstate(over="ignore"):  # to infinity, which is refused
-            self.batch.actions[0] = given
+        with np.errstate(over="ignore"):  # to infinity, which the kernel refuses
+            self.batch.actions[0] = array
 
     def render(self) -> NDArray[np.uint8] | None:
-        """Draw the present state: an (H, W, 3) uint8 array for "rgb_array", a window for "human"; None
-        without a mode."""
+        """Draw the present state, a uint8 array of shape (H, W, 3) or a window; warn without a mode."""
         if self.render_mode is None:
             gym.logger.warn("render() was called without a render_mode: pass 'rgb_array' or 'human'")
             return None
@@ -241,7 +247,7 @@ class HorseLegEnv(LegBase, gym.Env[NDArray[np.float32], NDArray[np.float32]]):
     # State
 
     def get_state(self) -> dict[str, Any]:
-        """Everything that changes, generator included: continuing from it is bit-identical.
+        """Return everything that changes, generator included: to continue from it gives the same bits.
 
         Raises:
             ResetNeeded: there is no episode yet.
@@ -249,7 +255,7 @@ class HorseLegEnv(LegBase, gym.Env[NDArray[np.float32], NDArray[np.float32]]):
         return {**self._state_of_batch(), "generator": self.np_random.bit_generator.state}
 
     def set_state(self, state: Mapping[str, Any]) -> NDArray[np.float32]:
-        """Put back what `get_state` gave; returns the observation there.
+        """Restore a state of `get_state`; return the observation.
 
         Raises:
             ParameterError: a state of another id, version, geometry or setting, or one that lacks a part.
@@ -259,7 +265,7 @@ class HorseLegEnv(LegBase, gym.Env[NDArray[np.float32], NDArray[np.float32]]):
         set_state(self.batch, state)
         self.np_random = generator
         self._phase = "ended" if self.batch.episode_rows.ended[0] else "running"
-        if self._start_and_target() != self._began_with:  # else infos say it
+        if self._start_and_target() != self._began_with:  # a planner's states are of one episode
             self._begin()
         if self._recording is not None:
             self._recording.begin()
@@ -275,16 +281,16 @@ class HorseLegEnv(LegBase, gym.Env[NDArray[np.float32], NDArray[np.float32]]):
 
 
 class RandomizeParameters(gym.Wrapper[Any, Any, Any, Any], RecordConstructorArgs):
-    """Draws physical parameters at each reset, from the environment's own generator.
+    """Wrapper that draws physical parameters at each reset, from the environment's own generator.
 
-    They go to `reset(options={"parameters": ...})`, where a parameter that the caller names takes precedence.
-    What was drawn is in the info of the reset, under "parameters". Many environments at once have the
-    argument `randomize` instead.
+    They are passed as `reset(options={"parameters": ...})`, where parameters of the caller take precedence.
+    The info of the reset contains the drawn values under "parameters". Vector environments have the argument
+    `randomize` instead.
 
     Args:
-        env: an environment of this family, wrapped or not.
+        env: environment of this package, wrapped or not.
         ranges: (lowest, highest) or a number, by the names of `settings.PER_EPISODE`.
-        enabled: False leaves the parameters as the environment was made with; can be set at any time.
+        enabled: False keeps the parameters of the environment; can be set at any time.
 
     Raises:
         ParameterError: not an environment of this package, an unknown parameter, or one out of range.
@@ -301,22 +307,27 @@ class RandomizeParameters(gym.Wrapper[Any, Any, Any, Any], RecordConstructorArgs
         self.enabled = flag("enabled", enabled)
 
     def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[Any, Any]:
-        """Start an episode with parameters of its own."""
-        given = {} if options is None else options
-        own = given.get("parameters", {}) if isinstance(given, Mapping) else None
-        if self.enabled and isinstance(own, Mapping):  # else the environment says what is wrong
-            options = {**given, "parameters": {**self.ranges, **own}}
+        """Start an episode with drawn parameters, see `HorseLegEnv.reset`."""
+        asked = {} if options is None else options
+        parameters = asked.get("parameters", {}) if isinstance(asked, Mapping) else None
+        # Options of another type are passed on: the environment refuses them with its own message.
+        if self.enabled and isinstance(parameters, Mapping):
+            options = {**asked, "parameters": {**self.ranges, **parameters}}
         return self.env.reset(seed=seed, options=options)
 
 
 def vector_reward(info: Mapping[str, Any], terms: tuple[Term, ...] = TERMS) -> NDArray[np.float32]:
     """Return the reward of each objective, shape (3,), from the terms that `info` holds.
 
-    Energy takes the charge for sliding, which is lost to friction, the peak force that for its rate, and
-    progress what is paid for bearing weight and charged for speed beyond the commanded one. A term without an
-    objective, as the charge for a failure, goes to all three in equal parts: under preference weights that
-    sum to 1 a fall costs the same, whatever the weights, so that falling early to save force or energy pays
-    under none.
+    Energy includes the charge for sliding, which is lost to friction, peak force the charge for the loading
+    rate, and progress the reward for bearing weight and the charge for speed beyond the commanded one. A term
+    without an objective, such as the charge for a failure, is divided equally among all three: a fall costs
+    the same under all preference weights that sum to 1, so that falling early to save force or energy is
+    never worth while.
+
+    Args:
+        info: info of a step of `HorseLegEnv`.
+        terms: terms of the reward of its task.
     """
     sums = [sum(info[term.key] for term in terms if term.objective == name) for name in OBJECTIVES]
     shared = sum(info[term.key] for term in terms if term.objective is None)
@@ -324,7 +335,12 @@ def vector_reward(info: Mapping[str, Any], terms: tuple[Term, ...] = TERMS) -> N
 
 
 def refuse_many(**kwargs: Any) -> NoReturn:
-    """The id's vector entry point: without one Gymnasium would make many, and the first step would break."""
+    """Refuse to make a vector environment of `HorseLegMO-v0`: without this entry point Gymnasium would make
+    one of many single environments, and its first step would fail.
+
+    Raises:
+        gymnasium.error.Error: always.
+    """
     raise gym.error.Error(
         "hoof_env/HorseLegMO-v0: Gymnasium's vector environments keep one number for a reward, this one gives"
         " three: use mo_gymnasium.wrappers.vector.MOSyncVectorEnv([lambda: mo_gymnasium.make(id)] * n)"
@@ -334,11 +350,11 @@ def refuse_many(**kwargs: Any) -> NoReturn:
 class HorseLegMOEnv(HorseLegEnv):
     """A horse's leg that must carry and move its trunk, judged by three objectives.
 
-    `hoof_env/HorseLeg-v0` with a vector for a reward, shape (3,), in the form of MO-Gymnasium; its page in
-    docs/environments says how it is made and what the three are.
+    `hoof_env/HorseLeg-v0` with a vector of rewards, shape (3,), in the form of MO-Gymnasium. The page in
+    docs/environments describes the three objectives.
 
     Attributes:
-        reward_space, reward_dim: of the reward.
+        reward_space, reward_dim: space of the reward vector and its length.
     """
 
     def __init__(
@@ -351,6 +367,7 @@ class HorseLegMOEnv(HorseLegEnv):
         **settings: Unpack[Keywords],
     ) -> None:
         super().__init__(task=task, render_mode=render_mode, width=width, height=height, **settings)
+        # Forces and energy are only charged: their rewards are never positive.
         self.reward_space = spaces.Box(
             np.full(3, -np.inf, np.float32), np.array([np.inf, 0.0, 0.0], np.float32), (3,), np.float32
         )
@@ -359,6 +376,6 @@ class HorseLegMOEnv(HorseLegEnv):
     def step(  # type: ignore[override]  # Gymnasium's type of a reward is a number
         self, action: NDArray[np.float32]
     ) -> tuple[NDArray[np.float32], NDArray[np.float32], bool, bool, dict[str, Any]]:
-        """As in `HorseLegEnv`, with the vector reward, shape (3,)."""
+        """Take a control step, see `HorseLegEnv.step`; the reward is a vector, shape (3,)."""
         observation, _, terminated, truncated, info = super().step(action)
         return observation, vector_reward(info, self.task.terms), terminated, truncated, info

@@ -1,7 +1,7 @@
-"""What infos say besides the reward: where a leg is, what acts on it, and rows of numbers that have names.
+"""Measurements in infos: state, forces and sums of the legs, as rows of numbers that have names.
 
-The single environment's infos hold NumPy's scalars and rows, those of many hold arrays of them, under the
-same keys at a reset and at a step: libraries that stack infos ask for that.
+Infos of the single environment hold NumPy's scalars and rows, those of the vector environment hold arrays of
+them, under the same keys at a reset and at a step: libraries that stack infos need that.
 """
 
 from __future__ import annotations
@@ -28,11 +28,11 @@ from hoof_env.gait import parameter_names
 
 
 def measured_names(features: Features = PLAIN, prefixes: tuple[str, ...] = ("",)) -> tuple[str, ...]:
-    """Return the names of what an info measures, in order: the trunk's, then each leg's.
+    """Return the names of the measurements in an info, in order: the trunk's, then each leg's.
 
     Args:
-        features: of the engine.
-        prefixes: what stands before the names of each leg, see `body.Body`.
+        features: features of the engine.
+        prefixes: prefix of the names of each leg, see `body.Body.leg_prefixes`.
     """
     leg = (*leg_state(features), *STRIDES, *stride_sums(features))
     command = tuple(f"command_{name}" for name in parameter_names(features.harmonics))
@@ -41,12 +41,12 @@ def measured_names(features: Features = PLAIN, prefixes: tuple[str, ...] = ("",)
 
 
 class InfoLayout:
-    """Places of what is measured in the memory of engines of a kind.
+    """Rows of the measurements in the memory of engines with the same features.
 
     Attributes:
-        names: names of what is measured.
-        kind: class of `NamedArray` with these names, to view arrays as.
-        last_step: positions of what is about the last control step, not about its end.
+        names: names of the measurements.
+        kind: class of `NamedArray` with these names, for views of arrays.
+        last_step: positions of the measurements of the whole last control step; the others are of its end.
     """
 
     def __init__(self, features: Features, prefixes: tuple[str, ...]) -> None:
@@ -60,18 +60,19 @@ class InfoLayout:
             first = form.trunk_rows + k * form.leg_rows
             for part in ("state", "strides", "sums", "command", "report"):
                 rows += [first + row for row in range(leg(part).start, leg(part).stop)]
-        # A slice is read several times faster than rows by number
+        # A slice is read several times faster than rows by number.
         is_slice = rows == [*range(rows[0], rows[-1] + 1)]
         self._rows: Any = slice(rows[0], rows[-1] + 1) if is_slice else np.array(rows)
         sums = [f"{prefix}{name}" for prefix in prefixes for name in stride_sums(features)]
         self.last_step = np.array([k for k, name in enumerate(self.names) if name in sums])
 
     def read(self, memory: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Return a copy of what is measured, from columns of memory, shape (rows, ...)."""
+        """Return a copy of the measurements in columns of memory, shape (rows, ...)."""
         return np.array(memory[self._rows])
 
     def reader(self, column: NDArray[np.float64]) -> Callable[[], Any]:
-        """Return a function that reads a column that stays where it is, as a `NamedArray`."""
+        """Return a function that reads the measurements of a column as a `NamedArray`. The column must stay
+        at its address."""
         if isinstance(self._rows, slice):
             copied: Callable[[], Any] = name_columns(column[self._rows], self.names).copy
             return copied
@@ -91,17 +92,18 @@ RENAMED = MappingProxyType(
         "heel_slowness": "heel_inverse_approach_speed",
     }
 )
-"""New names of what is measured, by the old ones."""
+"""New names of measurements, by the old ones, for the message of a look-up."""
 
 
 class NamedArray(np.ndarray[Any, np.dtype[np.float64]]):
     """Numbers that have names along the last axis: `row["crank_speed"]` is `row[..., 0]`.
 
-    A float array whose last axis can also be indexed by name, and a mapping of its names; made by
-    `name_columns`. Equality is that of mappings where the other one has names, too.
+    A float array with a last axis that can also be indexed by name, and a mapping of its names; made by
+    `name_columns`. Comparison with another `NamedArray` or a mapping is that of mappings.
     """
 
-    __slots__ = ()  # no dictionary, which would take as long to make as the array
+    # No dictionary, which would take as long to make as the array.
+    __slots__ = ()
     names: tuple[str, ...] = ()
 
     def __getitem__(self, key: Any) -> Any:
@@ -113,7 +115,7 @@ class NamedArray(np.ndarray[Any, np.dtype[np.float64]]):
         return np.asarray(self)[key][()]
 
     def __array_wrap__(self, array: Any, context: Any = None, return_scalar: bool = False) -> Any:
-        """What is computed from named numbers has no names."""
+        """Return the result of an operation as a plain array: it has no names."""
         return array[()] if return_scalar else np.asarray(array)
 
     def __repr__(self) -> str:
@@ -131,6 +133,7 @@ class NamedArray(np.ndarray[Any, np.dtype[np.float64]]):
         return repr(self)
 
     def get(self, key: str, default: Any = None) -> Any:
+        """Return the numbers of a name, or `default` if there is no such name."""
         return self[key] if key in self.names else default
 
     def _mapping(self) -> dict[str, Any]:
@@ -163,23 +166,26 @@ class NamedArray(np.ndarray[Any, np.dtype[np.float64]]):
 
     __hash__ = None
 
+    # The class is made at run time and cannot be pickled by name.
     def __reduce__(self) -> Any:
         return name_columns, (np.array(self), self.names)
 
 
 @cache
 def _kind(names: tuple[str, ...]) -> type[NamedArray]:
-    """A class for each set of names: views and copies of a row have them without another thought."""
+    """Return the class of `NamedArray` for a set of names: views and copies of a row inherit them from their
+    class, at no cost."""
     return type("Named", (NamedArray,), {"names": names, "__slots__": (), "__doc__": NamedArray.__doc__})
 
 
 def name_columns(values: ArrayLike, names: Sequence[str]) -> NamedArray:
-    """A view of some numbers, shape (..., len(names)), that has names."""
+    """Return a view of numbers, shape (..., len(names)), that has names."""
     return np.asarray(values, np.float64).view(_kind(tuple(names)))
 
 
 def row_of(infos: Mapping[str, Any], env: int) -> dict[str, Any]:
-    """The info of one environment from those of many, where they are about it."""
+    """Extract one environment's info from the vector info: the entries that apply to it."""
+    # Gymnasium's masks: "_key" is True for the environments that have "key".
     row = {}
     for key, values in infos.items():
         if not key.startswith("_") and infos.get(f"_{key}", np.ones(env + 1, bool))[env]:

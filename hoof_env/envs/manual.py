@@ -1,6 +1,7 @@
-"""The manual page of each id, in Gymnasium's form: `manual.md.in` filled from what the environments run on.
+"""Manual page of each id, in Gymnasium's form: `manual.md.in`, filled with the data that environments run on.
 
-`manual.toml` has units and meanings by name; defaults, limits and weights come from the data that has them.
+`manual.toml` has units and meanings by name; defaults, limits and weights come from the modules that define
+them.
 """
 
 from __future__ import annotations
@@ -37,14 +38,15 @@ from hoof_env.tasks.settings import Settings
 PAGE, MO_PAGE = (
     (HERE / f"{name}.md.in").read_text(encoding="utf-8") for name in ("manual", "multi_objective")
 )
-"""The page of a task, and that of the id with three rewards; `page` fills in what begins with $."""
+"""Templates of the page of a task and of the page of the id with three rewards; `page` fills in words that
+begin with $."""
 
 _NAMES = {name: task.name for name, task in TASKS.items()} | {"mo": "HorseLegMO"}
 
-PAGES = tuple(_NAMES)  # the tasks, and the id with three rewards
+PAGES = tuple(_NAMES)  # names of the tasks, and "mo" for the id with three rewards
 
 COMMON = _NAMES["leg"]
-"""The page that the others refer to."""
+"""Name of the page that the others refer to."""
 
 
 def page(task: str, film: str = "") -> str:
@@ -52,58 +54,58 @@ def page(task: str, film: str = "") -> str:
 
     Args:
         task: one of `PAGES`, or an id of one's own.
-        film: where the page finds the film that it shows; "" for a page without one.
+        film: path of the film, relative to the page; "" for a page without one.
     """
-    what = task_of("leg" if task == "mo" else task)
-    s = what.settings({})
-    body = what.body(s)
-    own = page_of_body(body)
-    film = _film(_NAMES[task], own.kind, film) if film else ""
+    definition = task_of("leg" if task == "mo" else task)
+    s = definition.settings({})
+    body = definition.body(s)
+    parts = page_of_body(body)
+    film = _film(_NAMES[task], parts.kind, film) if film else ""
     if task == "mo":
         objectives = _objectives(check_weights(s.reward_weights))
-        observations = _observations(what, body)
+        observations = _observations(definition, body)
         text = Template(MO_PAGE).substitute(film=film, observations=observations, objectives=objectives)
         return _tidy(text)
     trunk = TABLES[s.trunk]
-    groups = observation.groups_of(what.entries)
-    weights = check_weights(s.reward_weights, what.terms)
+    groups = observation.groups_of(definition.entries)
+    weights = check_weights(s.reward_weights, definition.terms)
     defaults = {name: literal(value) for name, value in to_json(s).items()}
-    defaults |= {name: f"**{defaults[name]}**" for name in what.defaults}
+    defaults |= {name: f"**{defaults[name]}**" for name in definition.defaults}  # bold: this task's own
     head = ("Name", "Default", "Unit", "Meaning")
-    module = what.module or ("hoof_env" if what.id.startswith("hoof_env/") else "my_module")
+    module = definition.module or ("hoof_env" if definition.id.startswith("hoof_env/") else "my_module")
     text = Template(PAGE).substitute(
-        name=what.name,
-        id=what.id,
+        name=definition.name,
+        id=definition.id,
         module=module,
         module_words="the package" if module == "hoof_env" else "it",
-        summary=what.summary,
+        summary=definition.summary,
         film=film,
-        about=what.about,
-        body=Template(WORDS[f"{own.kind}_body"].strip()).safe_substitute(trunk=trunk["moves"]),
+        about=definition.about,
+        body=Template(WORDS[f"{parts.kind}_body"].strip()).safe_substitute(trunk=trunk["moves"]),
         action_space=f"Box(-1, 1, ({len(body.action_names)},), float32)",
-        actions=own.actions(body),
-        commands=WORDS[f"{own.kind}_commands"].strip(),
-        observed=WORDS[f"{own.kind}_observed"].strip(),
+        actions=parts.actions(body),
+        commands=WORDS[f"{parts.kind}_commands"].strip(),
+        observed=WORDS[f"{parts.kind}_observed"].strip(),
         legs=str(body.kernels.legs),
-        **own.words,
-        observation_space=f"Box(-1, 1, ({len(_observed(what))},), float32)",
-        observations=_observations(what, body),
+        **parts.words,
+        observation_space=f"Box(-1, 1, ({len(_observed(definition))},), float32)",
+        observations=_observations(definition, body),
         other_groups=", ".join(f"`{group}`" for group in groups if group not in s.observation),
-        rewards=_rewards(what, weights),
-        target_reward=own.target_reward(s),
+        rewards=_rewards(definition, weights),
+        target_reward=parts.target_reward(s),
         lift_off=f"{100 * LIFT_OFF:g}",
-        start=_start(s, what.start),
-        options=markdown_table(("Option", "Unit", "Range", "Meaning"), own.options()),
-        parameters=", ".join(f"`{name}`" for name in own.parameters(s)),
-        infos=markdown_table(("Key", "Unit", "Meaning"), own.infos(s)),
+        start=_start(s, definition.start),
+        options=markdown_table(("Option", "Unit", "Range", "Meaning"), parts.options()),
+        parameters=", ".join(f"`{name}`" for name in parts.parameters(s)),
+        infos=markdown_table(("Key", "Unit", "Meaning"), parts.infos(s)),
         measured=str(len(measured_names(_features(s, body), body.leg_prefixes))),
-        quantities=markdown_table(("Name", "In", "Unit", "Meaning"), own.quantities(_features(s, body))),
+        quantities=markdown_table(("Name", "In", "Unit", "Meaning"), parts.quantities(_features(s, body))),
         leaves=Template(trunk["leaves"]).substitute(height=f"{body.height:.4g}"),
         seconds=literal(s.episode_seconds),
         figures=markdown_table(("Figure", "Unit", "Meaning"), rows_of("summary")),
         vector_arguments=markdown_table(("Argument", "Default", "Meaning"), _vector_arguments()),
-        bold=WORDS["bold"] if what.defaults else "",
-        settings=markdown_table(head, [*own.settings(s, defaults), *PICTURES]),
+        bold=WORDS["bold"] if definition.defaults else "",
+        settings=markdown_table(head, [*parts.settings(s, defaults), *PICTURES]),
         terrain=WORDS["terrain"] + markdown_table(head, rows_of("hills", _hills())) if s.terrain else "",
     )
     return _tidy(text)
@@ -114,14 +116,18 @@ def _hills() -> dict[str, str]:
     return {name: literal(value) for name, value in HILLS.items()}
 
 
-def _rewards(what: Task, weights: Mapping[str, float]) -> str:
+def _rewards(task: Task, weights: Mapping[str, float]) -> str:
     """Write the table of the reward's terms."""
-    rows = [(f"`{t.key}`", f"`{t.name}`", f"{weights[t.name]:g}", t.unit, t.meaning) for t in what.terms]
+    rows = [(f"`{t.key}`", f"`{t.name}`", f"{weights[t.name]:g}", t.unit, t.meaning) for t in task.terms]
     return markdown_table(("Term", "Weight", "Default", "Unit", "Meaning"), rows)
 
 
 def page_of(id: str) -> str:
-    """The manual page of a registered id, of one's own as "module:id", too; `ParameterError` of another."""
+    """Return the manual page of a registered id, or of an id of one's own, which may be "module:id".
+
+    Raises:
+        ParameterError: an unknown id.
+    """
     ids = {f"hoof_env/{name}-v0": task for task, name in _NAMES.items()}
     if isinstance(id, str) and "/" in id and not id.startswith("hoof_env/"):
         return page(id)
@@ -129,28 +135,28 @@ def page_of(id: str) -> str:
 
 
 def index() -> str:
-    """All ids in one table, in Markdown."""
+    """Write the page with the table of all ids, in Markdown."""
     rows = []
     for task, name in _NAMES.items():
-        what = TASKS.get(task, TASKS["leg"])
+        definition = TASKS.get(task, TASKS["leg"])
         native = "yes" if task in TASKS else "no"
-        summary = what.summary if task in TASKS else str(HorseLegMOEnv.__doc__).splitlines()[0]
+        summary = definition.summary if task in TASKS else str(HorseLegMOEnv.__doc__).splitlines()[0]
         link = f"[`hoof_env/{name}-v0`]({name}.md)"
-        actions = str(len(what.body(what.settings({})).action_names))
-        rows.append((link, summary, actions, str(len(_observed(what))), what.reference, native))
+        actions = str(len(definition.body(definition.settings({})).action_names))
+        rows.append((link, summary, actions, str(len(_observed(definition))), definition.reference, native))
     head = ("id", "what it is", "action", "observation", "reference gait", "native vector environment")
     return Template(WORDS["index"]).substitute(table=markdown_table(head, rows))
 
 
 def write_pages(out: Path, films: Path | None = None) -> list[Path]:
-    """Write all pages and the index into a folder, which is made if need be, and return the files.
+    """Write all pages and the index into a folder, which is made if it does not exist; return the files.
 
-    What a page shares with that of `HorseLeg` is a link to it (`without_common`); `page` has all of it.
+    Parts that a page shares with the page of `HorseLeg` are replaced by a link (`without_common`).
 
     Args:
-        out: the folder.
-        films: folder of trained policies, as agents.ship writes it. Each page shows the film of its policy
-            there. None for pages without films.
+        out: folder of the pages.
+        films: folder of trained policies, in the form of agents.ship. Each page shows the film of its policy.
+            None for pages without films.
 
     Raises:
         DataFileError: a policy has no film.
@@ -158,11 +164,13 @@ def write_pages(out: Path, films: Path | None = None) -> list[Path]:
     """
     shown = {name: "" if films is None else _find_film(films, name, out) for name in _NAMES.values()}
     texts = {f"{name}.md": page(task, shown[name]) for task, name in _NAMES.items()}
+    # This id is `HorseLeg` with another reward: its page says so, and needs no table of the observation.
     texts["HorseLegMO.md"] = _tidy(
         texts["HorseLegMO.md"].replace(_observations(TASKS["leg"], OneLeg(TASKS["leg"].settings({}))), "")
     )
     for name in _NAMES.values():
-        if name not in (COMMON, "HorseLegMO"):  # which says by itself what it shares
+        if name not in (COMMON, "HorseLegMO"):
+            # With the page's own id in the examples, so that these count as equal.
             common = texts[f"{COMMON}.md"].replace(f"/{COMMON}-v0", f"/{name}-v0")
             texts[f"{name}.md"] = without_common(texts[f"{name}.md"], COMMON, common)
     texts["README.md"] = index()
@@ -190,11 +198,16 @@ PICTURES = (
 
 
 def _tidy(text: str) -> str:
+    """Remove the empty lines that words without content leave behind."""
     return re.sub(r"\n{3,}", "\n\n", text)
 
 
 def _find_film(films: Path, name: str, out: Path) -> str:
-    """Find the film of an id, or of the id whose policy stands for it, as a page in `out` links to it."""
+    """Return the path of the film of an id, or of the id with the same policy, relative to the folder `out`.
+
+    Raises:
+        DataFileError: there is no film.
+    """
     for id in (f"hoof_env/{name}-v0", STANDS_FOR.get(f"hoof_env/{name}-v0", "")):
         film = films / id.rpartition("/")[2] / "film.gif"
         if film.is_file():
@@ -203,37 +216,42 @@ def _find_film(films: Path, name: str, out: Path) -> str:
 
 
 def _film(name: str, kind: str, film: str) -> str:
+    """Write the paragraph that shows a film."""
     shown = WORDS[f"{kind}_film"]
     return Template(WORDS["film"].strip()).substitute(name=name, film=film, shown=shown)
 
 
-def _observed(what: Task) -> list[observation.Entry]:
-    settings = what.settings({})
-    return observation.observed(settings.observation, settings.trunk, settings.drive, what.entries)
+def _observed(task: Task) -> list[observation.Entry]:
+    """Return the entries that are observed by default."""
+    settings = task.settings({})
+    return observation.observed(settings.observation, settings.trunk, settings.drive, task.entries)
 
 
 def _features(s: Settings, body: Body) -> Features:
+    """Return the features of the engine of an environment, without making one."""
     return Features(body.harmonics, s.hoof_stiffness is not None, body.limits is not None)
 
 
 def _objectives(weights: Mapping[str, float]) -> str:
-    """The three rewards of `HorseLegMO-v0`: the terms of each, and the weights of those that are not 0."""
+    """Write the table of the rewards of `HorseLegMO-v0`: terms of each, and weights that are not 0."""
     rows = []
     for number, objective in enumerate(OBJECTIVES):
-        own = [term for term in TASKS["leg"].terms if term.objective == objective]
-        each = ", ".join(f"{weights[term.name]:g} {term.unit}" for term in own if weights[term.name])
-        rows.append((str(number), objective, " + ".join(f"`{term.key}`" for term in own), each))
+        terms = [term for term in TASKS["leg"].terms if term.objective == objective]
+        each = ", ".join(f"{weights[term.name]:g} {term.unit}" for term in terms if weights[term.name])
+        rows.append((str(number), objective, " + ".join(f"`{term.key}`" for term in terms), each))
     return markdown_table(("Num", "Objective", "Terms", "Weights by default"), rows)
 
 
-def _observations(what: Task, body: Body) -> str:
-    own = page_of_body(body)
-    entries = enumerate(_observed(what))
-    rows = [(str(k), e.name, own.scaling(e.scale, body), e.unit, e.group) for k, e in entries]
+def _observations(task: Task, body: Body) -> str:
+    """Write the table of the observation."""
+    parts = page_of_body(body)
+    entries = enumerate(_observed(task))
+    rows = [(str(k), e.name, parts.scaling(e.scale, body), e.unit, e.group) for k, e in entries]
     return markdown_table(("Num", "Observation", "Scaling", "Unit before scaling", "Group"), rows)
 
 
 def _start(settings: Settings, options: Mapping[str, float]) -> str:
+    """Write the sentence about the start of an episode, with the task's reset options."""
     trunk = TABLES[settings.trunk]
     if settings.trunk == "free":
         return "; ".join((WORDS["start_horse"], trunk["speed"], trunk["height"], WORDS["start_target"]))
@@ -250,6 +268,7 @@ def _start(settings: Settings, options: Mapping[str, float]) -> str:
 
 
 def _vector_arguments() -> list[tuple[str, ...]]:
+    """Return the rows of the arguments that only the vector environment has."""
     from hoof_env.envs.vector import HorseLegVectorEnv
 
     arguments = inspect.signature(HorseLegVectorEnv).parameters
@@ -260,7 +279,7 @@ def _vector_arguments() -> list[tuple[str, ...]]:
 
 
 def literal(value: Any) -> str:
-    """A plain value as Python writes it, numbers short."""
+    """Write a plain value in Python, numbers with as few digits as identify them."""
     if isinstance(value, Mapping):
         return "{" + ", ".join(f'"{key}": {literal(item)}' for key, item in value.items()) + "}"
     if isinstance(value, (list, tuple)):

@@ -1,4 +1,4 @@
-"""Parts of a manual page that differ between bodies: one leg, and a horse."""
+"""Parts of a manual page that differ between one leg and a horse."""
 
 from __future__ import annotations
 
@@ -24,16 +24,17 @@ from hoof_env.tasks.one_leg import OneLeg
 from hoof_env.tasks.settings import PER_EPISODE, Settings
 
 GAIT = [entry for entry in observation.ENTRIES if entry.group == "gait"]
+"""Entries about the gait: the parameters, then their rates."""
 
 
 class BodyPage(ABC):
     """Words and tables of a page that are a body's own.
 
     Attributes:
-        kind: prefix of its words in `manual.toml`.
+        kind: prefix of the body's words in `manual.toml`.
         words: words that fill in the page's template.
-        option_ranges: ranges of its numeric reset options.
-        table_prefix: prefix of its tables in `manual.toml`.
+        option_ranges: ranges of the numeric reset options.
+        table_prefix: prefix of the body's tables in `manual.toml`.
     """
 
     kind: str
@@ -58,29 +59,32 @@ class BodyPage(ABC):
         return list(PER_EPISODE)
 
     def quantities(self, features: Features) -> list[tuple[str, ...]]:
-        """Return the rows of what is measured and recorded, those of a control step from where they are
-        declared."""
-        own = TABLES["quantities"] | TABLES.get(f"{self.table_prefix}quantities", {})
-        found = [(", ".join(f"`{one}`" for one in names.split(", ")), *cells) for names, cells in own.items()]
+        """Return the rows of measured and recorded quantities."""
+        table = TABLES["quantities"] | TABLES.get(f"{self.table_prefix}quantities", {})
+        rows: list[tuple[str, ...]] = []
+        for names, cells in table.items():
+            rows.append((", ".join(f"`{name}`" for name in names.split(", ")), *cells))
+        # Sums of a control step have their units and meanings where they are declared.
         for name in stride_sums(features):
             quantity = StrideSums.notes[name]
-            found.append((f"`{name}`", "measured", quantity.unit, quantity.text))
-        return found
+            rows.append((f"`{name}`", "measured", quantity.unit, quantity.text))
+        return rows
 
     def options(self) -> Iterable[tuple[str, ...]]:
         """Yield the rows of the reset options."""
         for name, (unit, meaning) in TABLES[f"{self.table_prefix}options"].items():
+            # Options that are no numbers, such as a gait, have no range.
             low, high = self.option_ranges.get(name, (0.0, 0.0))
             within = f"{low:.7g} to {high:.7g}" if math.isfinite(high) else f"from {low:g}"
             yield f"`{name}`", unit, "" if low == high else within, meaning
 
     def infos(self, s: Settings) -> list[tuple[str, ...]]:
-        """Return the rows of what infos say."""
-        found = rows_of(f"{self.table_prefix}info")
-        return [row for row in found if row[0] != "`target_speed`" or s.target_speed is not None]
+        """Return the rows of the entries of infos."""
+        rows = rows_of(f"{self.table_prefix}info")
+        return [row for row in rows if row[0] != "`target_speed`" or s.target_speed is not None]
 
     def target_reward(self, s: Settings) -> str:
-        """Return the words about rewards at a commanded speed, if there are some."""
+        """Return the words about rewards at a commanded speed, "" for none."""
         return ""
 
 
@@ -121,7 +125,7 @@ class LegPage(BodyPage):
         return scale.text
 
     def target_reward(self, s: Settings) -> str:
-        """Return the words about rewards at a commanded speed, if there is one."""
+        """Return the words about rewards at a commanded speed, "" without one."""
         return WORDS["target_reward"] if s.target_speed else ""
 
 
@@ -146,22 +150,23 @@ class HorsePage(BodyPage):
         bounds = QUICK.to_array()[:, 1]
         rows = []
         for k, span in enumerate(horse.SPANS):
-            what = ("times 1 + action", "-") if k == 0 else ("plus", "rad")
+            # The first action of a leg scales the crank's speed, see `horse_gaits.command_gait`.
+            operation, unit = ("times 1 + action", "-") if k == 0 else ("plus", "rad")
             fastest = f"{bounds[k]:g} {GAIT[len(LIMITS) + k].unit}"
             numbers = ", ".join(str(ACTED * leg + k) for leg in range(COUNT))
-            rows.append((numbers, GAIT[k].name, what[0], f"{-span:g}", f"{span:g}", what[1], fastest))
+            rows.append((numbers, GAIT[k].name, operation, f"{-span:g}", f"{span:g}", unit, fastest))
         head = ("Num", "Offset of the reference's", "Is", "At -1", "At +1", "Unit", "Fastest change")
         return markdown_table(head, rows)
 
     def settings(self, s: Settings, defaults: Mapping[str, str]) -> list[tuple[str, ...]]:
-        """Return the rows of the settings that a horse takes, with those defaults."""
-        own = TABLES["horse_settings"]
+        """Return the rows of the settings that a horse accepts, with those defaults."""
+        of_horse = TABLES["horse_settings"]
         contexts = (s, replace(s, hoof_stiffness=None))  # some settings need a rigid hoof
-        return [
-            (f"`{name}`", defaults[name], *own.get(name, cells))
-            for name, cells in TABLES["settings"].items()
-            if name not in horse.LEG_ONLY_SETTINGS and any(_can_be(name, each) for each in contexts)
-        ]
+        rows: list[tuple[str, ...]] = []
+        for name, cells in TABLES["settings"].items():
+            if name not in horse.LEG_ONLY_SETTINGS and any(_can_be(name, each) for each in contexts):
+                rows.append((f"`{name}`", defaults[name], *of_horse.get(name, cells)))
+        return rows
 
     def parameters(self, s: Settings) -> list[str]:
         """Return the names of the settings that an episode can change."""
@@ -178,7 +183,7 @@ def page_of_body(body: Body) -> BodyPage:
 
 
 def _can_be(name: str, settings: Settings) -> bool:
-    """Return True if a setting has an effect with one of the drives."""
+    """True if a setting has an effect with one of the drives."""
     for drive in ("prescribed", "motor"):
         with suppress(ParameterError):
             check_effect(name, replace(settings, drive=drive))

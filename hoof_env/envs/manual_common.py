@@ -1,4 +1,4 @@
-"""What manual pages share: a page that refers to another one for the sections that are the same."""
+"""Removal of the parts that a manual page shares with another page, to which it then refers."""
 
 from __future__ import annotations
 
@@ -8,41 +8,42 @@ from difflib import SequenceMatcher
 
 
 def without_common(page: str, name: str, other: str) -> str:
-    """Replace what a page shares with another page by links to that page's sections.
+    """Replace the parts that a page shares with another page by links to that page's sections.
 
-    Paragraphs that stand in the same section of both go, and so do equal rows of tables. A section stays
-    whole where the other page's has a paragraph without a counterpart, and a table where the other one has a
-    name that it lacks: a reader would take them for said here, too.
+    Paragraphs that are in the same section of both pages are removed, and so are equal rows of tables. A
+    section is kept whole if that of the other page has a paragraph without a counterpart, and a table if the
+    other one has a name that it lacks: with a link, readers would apply them to this page, too.
 
     Args:
-        page: the page in Markdown.
-        name: of the other page, which lies beside it as NAME.md.
+        page: page in Markdown.
+        name: name of the other page, which is NAME.md in the same folder.
         other: the other page.
 
     Returns:
-        The page in Markdown, with the headings that it had.
+        The page in Markdown, with all of its headings.
     """
     others = {_title(section): section for section in _sections(other)}
-    found = []
+    sections = []
     for section in _sections(page):
         title = _title(section)
         left = _differing(_blocks(section), _blocks(others[title])) if title in others else None
         if left is None:
-            found.append(section)
+            sections.append(section)
             continue
+        # The anchor that Markdown renderers give to a heading.
         anchor = title.strip("# ").lower().replace(" ", "-")
         start = f"As in [{name}]({name}.md#{anchor})"
-        found.append("\n\n".join((title, f"{start}, but for:" if left else f"{start}.", *left)) + "\n\n")
-    return "".join(found).rstrip() + "\n"
+        sections.append("\n\n".join((title, f"{start}, but for:" if left else f"{start}.", *left)) + "\n\n")
+    return "".join(sections).rstrip() + "\n"
 
 
 def _sections(page: str) -> list[str]:
-    """Divide a page before each heading of the second or third rank."""
+    """Divide a page before each heading of the second or third level."""
     return re.split(r"(?m)^(?=###? )", page)
 
 
 def _title(section: str) -> str:
-    """Return the heading of a section; the part before all others has its title, which no other page has."""
+    """Return the heading of a section; of the first part of a page its title, which no other page has."""
     return section.partition("\n")[0]
 
 
@@ -54,8 +55,9 @@ def _blocks(section: str) -> list[str]:
 
 
 def _differing(own: Sequence[str], others: Sequence[str]) -> list[str] | None:
-    """Return the blocks that another section lacks, or None where that one has more than these replace."""
+    """Return the blocks that another section lacks; None if that one has blocks without a counterpart."""
     left = []
+    # Without the heuristic for junk, which would treat frequent blocks as different.
     for kind, i, i_end, j, j_end in SequenceMatcher(None, others, own, autojunk=False).get_opcodes():
         if kind == "equal":
             continue
@@ -66,8 +68,8 @@ def _differing(own: Sequence[str], others: Sequence[str]) -> list[str] | None:
 
 
 def _differing_rows(block: str, others: Sequence[str]) -> str:
-    """Return a table without the rows that another one has, too, if it has all names of that one; another
-    block whole."""
+    """Return a table without the rows of another one with the same head, if it has all names of that one; any
+    other block unchanged."""
     rows = block.split("\n")
     names = {_first_cell(row) for row in rows}
     for other in (text.split("\n") for text in others if block.startswith("|")):
@@ -77,4 +79,5 @@ def _differing_rows(block: str, others: Sequence[str]) -> str:
 
 
 def _first_cell(row: str) -> str:
+    """Return the first cell of a row of a table, the name; "" of another line."""
     return row.split("|")[1] if row.startswith("|") else ""

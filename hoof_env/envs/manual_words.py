@@ -1,4 +1,4 @@
-"""Tables of the manual pages: `manual.toml` with the numbers that the environments run on."""
+"""Tables of the manual pages: `manual.toml`, filled with the numbers that environments run on."""
 
 from __future__ import annotations
 
@@ -25,38 +25,59 @@ HERE = Path(__file__).parent
 
 
 def tables() -> dict[str, dict[str, Any]]:
-    """Return what `manual.toml` says, by table and name: unit and meaning, or the words of a page."""
+    """Return the tables of `manual.toml`, and those of the settings, by table and name: unit and meaning, or
+    the words of a page. Words that begin with $ are replaced by numbers and choices."""
     names = {
-        "presets": preset_names(), "trunks": ONE_LEG, "schemes": SCHEMES, "paper_schemes": INTEGRATORS,
-        "normal_laws": NORMAL_LAWS, "friction_laws": FRICTION_LAWS, "horse_gaits": horse_gaits(),
-    }  # fmt: skip
-    values = {name: ", ".join(f'\\"{one}\\"' for one in choices) for name, choices in names.items()}
+        "presets": preset_names(),
+        "trunks": ONE_LEG,
+        "schemes": SCHEMES,
+        "paper_schemes": INTEGRATORS,
+        "normal_laws": NORMAL_LAWS,
+        "friction_laws": FRICTION_LAWS,
+        "horse_gaits": horse_gaits(),
+    }
+    # Escaped, because they are put into strings of TOML.
+    values = {name: ", ".join(f'\\"{choice}\\"' for choice in choices) for name, choices in names.items()}
     numbers = {
-        "lowest": leg_starts.LOWEST, "highest": leg_starts.HIGHEST,
-        "spacing": SPACING, "margin": leg_starts.MARGIN,
-        "start_speed": leg_starts.START_SPEED, "horse_mass": horse.MASS, "fastest": FASTEST,
-        "smallest_size": SIZES[0], "largest_size": SIZES[1],
-        "speed_spread": 100 * horse.SPEED_SPREAD, "pitch_spread": horse.PITCH_SPREAD,
-        "phase_spread": horse.PHASE_SPREAD, "fall_pitch": horse.PITCH, "fall_low": horse.HEIGHT[0],
-        "fall_high": horse.HEIGHT[1], "clearance": 100 * horse.CLEARANCE, "followed": FOLLOWED,
+        "lowest": leg_starts.LOWEST,
+        "highest": leg_starts.HIGHEST,
+        "spacing": SPACING,
+        "margin": leg_starts.MARGIN,
+        "start_speed": leg_starts.START_SPEED,
+        "horse_mass": horse.MASS,
+        "fastest": FASTEST,
+        "smallest_size": SIZES[0],
+        "largest_size": SIZES[1],
+        "speed_spread": 100 * horse.SPEED_SPREAD,
+        "pitch_spread": horse.PITCH_SPREAD,
+        "phase_spread": horse.PHASE_SPREAD,
+        "fall_pitch": horse.PITCH,
+        "fall_low": horse.HEIGHT[0],
+        "fall_high": horse.HEIGHT[1],
+        "clearance": 100 * horse.CLEARANCE,
+        "followed": FOLLOWED,
         "carried": round(100 * CARRIED),
-        "crank_bound": FilterSettings().crank_rate, "swing_bound": FilterSettings().swing_rate,
-        "bearing": BEARING, "full_allowance": BEARING * LONGEST_STRIDE,
-    }  # fmt: skip
+        "crank_bound": FilterSettings().crank_rate,
+        "swing_bound": FilterSettings().swing_rate,
+        "bearing": BEARING,
+        "full_allowance": BEARING * LONGEST_STRIDE,
+    }
     numbers |= {f"{name}_{end}": WIDEST[name][k] for name in WIDEST for k, end in enumerate(("low", "high"))}
     values |= {name: f"{number:g}" for name, number in numbers.items()}
     text = (HERE / "manual.toml").read_text(encoding="utf-8")
-    found = tomllib.loads(Template(text).safe_substitute(values))
+    # Before parsing; safe_substitute, because `page` fills in the words that are left.
+    filled_tables = tomllib.loads(Template(text).safe_substitute(values))
     plain = {name: value.replace('\\"', '"') for name, value in values.items()}
 
     def filled(about: About, text: str) -> list[str]:
+        """Return unit and meaning of a setting."""
         return [about.unit, Template(text).safe_substitute(plain)]
 
-    found["settings"] = {name: filled(about, about.text) for name, about in ABOUT.items()}
-    found["horse_settings"] = {
+    filled_tables["settings"] = {name: filled(about, about.text) for name, about in ABOUT.items()}
+    filled_tables["horse_settings"] = {
         name: filled(about, about.of_horse) for name, about in ABOUT.items() if about.of_horse
     }
-    return found
+    return filled_tables
 
 
 TABLES = tables()
@@ -64,8 +85,10 @@ WORDS = TABLES["words"]
 
 
 def rows_of(table: str, values: Mapping[str, str] | None = None) -> list[tuple[str, ...]]:
-    """Return the rows of a table of `manual.toml`: names, what `values` has of them, and cells."""
-    return [
-        (", ".join(f"`{one}`" for one in name.split(", ")), *([values[name]] if values else []), *cells)
-        for name, cells in TABLES[table].items()
-    ]
+    """Return the rows of a table of `manual.toml`: names, values of these names if there are `values`, and
+    the cells of the table."""
+    rows: list[tuple[str, ...]] = []
+    for names, cells in TABLES[table].items():
+        quoted = ", ".join(f"`{name}`" for name in names.split(", "))
+        rows.append((quoted, *([values[names]] if values else []), *cells))
+    return rows

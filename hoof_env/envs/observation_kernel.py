@@ -1,4 +1,4 @@
-"""Observation of a control step: the entries of a task in one kernel."""
+"""Kernels of the observation: all entries of a task in one kernel."""
 
 from __future__ import annotations
 
@@ -22,8 +22,8 @@ from hoof_env.tasks.observation import Entry, ObservationInputs
 
 
 def slots_of(entries: tuple[Entry, ...]) -> tuple[list[int], int, int]:
-    """Where the entries stand while they are scaled: those that saturate first, as whole vectors. Returns the
-    slots of the entries, how many vectors they are, and how many slots there are."""
+    """Return the slots in which entries are scaled, the number of vectors of those that saturate, and the
+    number of slots. Entries that saturate have the first slots, filled up to whole vectors."""
     saturating = [k for k, entry in enumerate(entries) if entry.scale.saturates]
     others = [k for k, entry in enumerate(entries) if not entry.scale.saturates]
     vectors = -(-len(saturating) // LANES)
@@ -33,19 +33,19 @@ def slots_of(entries: tuple[Entry, ...]) -> tuple[list[int], int, int]:
 
 
 def _with_entries(entries: tuple[Entry, ...], layouts: Memories, scaled: bool) -> Callable[..., Any]:
-    """A function that puts the entries that are observed into their slots: scaled but for tanh, or as they
-    are measured. Those of this package are compiled once for all tasks that have them in these slots."""
+    """Return a function that puts the observed entries into their slots: scaled except for tanh, or as
+    measured. Entries of this package are compiled once for all tasks that have them in these slots."""
     placed = tuple(zip(entries, slots_of(entries)[0], strict=True))
-    ours = tuple(one for one in placed if not from_outside(functions_of(one[0])))
-    own = tuple(one for one in placed if one not in ours)
-    if not own or not ours:
-        return (_put_ours if ours else _put_all)(placed, layouts, scaled)
-    return _one_and_other(_put_ours(ours, layouts, scaled), _put_all(own, layouts, scaled))
+    built_in = tuple(each for each in placed if not from_outside(functions_of(each[0])))
+    foreign = tuple(each for each in placed if each not in built_in)
+    if not foreign or not built_in:
+        return (_put_ours if built_in else _put_all)(placed, layouts, scaled)
+    return _one_and_other(_put_ours(built_in, layouts, scaled), _put_all(foreign, layouts, scaled))
 
 
 def _put_all(placed: tuple[tuple[Entry, int], ...], layouts: Memories, scaled: bool) -> Callable[..., Any]:
-    """A function that puts entries into the slots beside them. numba has no loop over functions, so each half
-    is a function of its own."""
+    """Return a function that puts each entry into its slot. numba cannot loop over functions, so each half of
+    the entries is a function of its own."""
     if len(placed) == 1:
         return _with_entry(*placed[0], layouts, scaled)
     middle = len(placed) // 2
@@ -53,11 +53,14 @@ def _put_all(placed: tuple[tuple[Entry, int], ...], layouts: Memories, scaled: b
     return _one_and_other(*halves)
 
 
+# Kept for entries of this package only: those of users may change while their names stay.
 _put_ours = lru_cache(maxsize=32)(_put_all)
-"""The same for entries of this package."""
+"""`_put_all` for entries of this package."""
 
 
 def _one_and_other(one: Callable[..., Any], other: Callable[..., Any]) -> Callable[..., Any]:
+    """Return a function that calls two others."""
+
     @inline_llvm
     def put_both(addresses, lanes, scene, numbers, n):  # type: ignore[no-untyped-def]
         one(addresses, lanes, scene, numbers, n)
@@ -67,9 +70,11 @@ def _one_and_other(one: Callable[..., Any], other: Callable[..., Any]) -> Callab
 
 
 def _with_entry(entry: Entry, slot: int, layouts: Memories, scaled: bool) -> Callable[..., Any]:
+    """Return a function that puts one entry into its slot, lane by lane if its functions take no lanes."""
     measure = inline_llvm(entry.measure)
     apply = entry.scale.apply
     scale = inline_llvm(apply) if scaled and apply is not None else inline_llvm(lambda x, scene: x)
+    # Checks, with messages that name the entry, that users' functions return numbers.
     number = number_of(entry.title)
     scaled_number = number_of(f"the scale of {entry.title}")
 
@@ -78,6 +83,7 @@ def _with_entry(entry: Entry, slot: int, layouts: Memories, scaled: bool) -> Cal
         if scene.task.observation_columns[slot] >= 0:
             numbers[slot] = scaled_number(scale(number(measure(scene)), scene))
 
+    # For users' functions of ordinary numbers: each lane has memory views of its own.
     @inline_llvm
     def put_one_by_one(addresses, lanes, scene, numbers, n):  # type: ignore[no-untyped-def]
         if scene.task.observation_columns[slot] >= 0:
@@ -92,14 +98,14 @@ def _with_entry(entry: Entry, slot: int, layouts: Memories, scaled: bool) -> Cal
 
 
 class Observers(Kernels):
-    """Kernels of the observation, which tasks with the same entries share; they take what those of
-    `StepKernels` take.
+    """Kernels of the observation, which tasks with the same entries share; their arguments are those of
+    `step.StepKernels`.
 
     Attributes:
-        observe_one, observe_batch: observations without a step.
-        measure_one: puts what is observed, before it is scaled, into an array of doubles, shape (count,
+        observe_one, observe_batch: kernels that observe without a step.
+        measure_one: kernel that writes the entries before scaling into an array of doubles, shape (count,
             columns).
-        observe: a part of other kernels; observes n and, with lanes, its neighbours.
+        observe: part of other kernels that observes row n and, with lanes, its neighbours.
     """
 
     observe_one: Any
@@ -109,11 +115,12 @@ class Observers(Kernels):
 
 
 def functions_of(entry: Entry) -> list[Callable[..., Any]]:
+    """Return the functions of an entry: of its measurement and its scale."""
     return [part for part in (entry.measure, entry.scale.apply) if part]
 
 
 def from_outside(functions: list[Callable[..., Any]]) -> list[Callable[..., Any]]:
-    """Those that are not of this package."""
+    """Return the functions that are not of this package."""
     return [function for function in functions if not str(function.__module__).startswith("hoof_env.")]
 
 
@@ -124,18 +131,20 @@ def observers_of(entries: tuple[Entry, ...], terms: int, features: Features, bod
     """Return the kernels of the observation for some entries; tasks with the same ones share them.
 
     Args:
-        entries: all that can be observed.
+        entries: entries that can be observed.
         terms: number of the reward's terms, for the layout of the episode's memory.
-        features: of the engine.
+        features: features of the engine.
         body: the body's own parts.
     """
-    own = from_outside([part for entry in entries for part in functions_of(entry)])
-    key = (entries, terms, features, body, fingerprint(*own))
-    found: Observers = _OBSERVERS.get(key, lambda: _made(entries, terms, features, body), bool(own))
-    return found
+    foreign = from_outside([part for entry in entries for part in functions_of(entry)])
+    # Helpers and constants of a user's function may have changed since, as in a notebook.
+    key = (entries, terms, features, body, fingerprint(*foreign))
+    kernels: Observers = _OBSERVERS.get(key, lambda: _made(entries, terms, features, body), bool(foreign))
+    return kernels
 
 
 def _made(entries: tuple[Entry, ...], terms: int, features: Features, body: BodyKernels) -> Observers:
+    """Make the kernels; numba compiles them when they are called."""
     layouts = memories_of(body.episode, terms, features, body.legs)
     slots = slots_of(entries)[2]
     task_record = task_type(terms, slots, layouts.gait, body.task_fields)
@@ -201,10 +210,11 @@ def _observe(
     @inline_source
     def observe(addresses, lanes, task, n, memory):  # type: ignore[no-untyped-def]
         numbers = rows(memory, lanes, None)
+        # Entries that are not observed, and the slots that fill up vectors, also go through tanh.
         for slot in range(slots):
             numbers[slot] = 0.0
         put_scaled(addresses, lanes, inputs_of(addresses, lanes, task, n), numbers, n)
-        # All entries that saturate stand first, so that one environment takes their tanh in vectors, too
+        # All entries that saturate come first, so that one environment takes their tanh in vectors, too.
         if lanes == 1:
             together = rows(memory, LANES, None)
             for k in range(vectors):

@@ -1,4 +1,4 @@
-"""What a control step brought, and whether the episode goes on: see `step`."""
+"""Outcome of a control step, and end of the episode: parts of the kernels of `step`."""
 
 from __future__ import annotations
 
@@ -11,8 +11,9 @@ from hoof_env.tasks.reward import BEARING, LONGEST_STRIDE, Outcome
 
 @inline_llvm
 def bear(episode, impulse, seconds):  # type: ignore[no-untyped-def]
-    """What of an impulse over the weight [s] bearing is paid for: all within the allowance, and what goes
-    beyond it is taken off again. The allowance grows with time and is used up by the impulse."""
+    """Return the part of an impulse over the weight for which bearing is rewarded [s]: all within the
+    allowance, less the part beyond it. The allowance grows with time, and the impulse uses it up; see
+    `reward.BEARING`."""
     allowance = minimum(episode.allowance + BEARING * seconds, BEARING * LONGEST_STRIDE)
     borne = minimum(impulse, allowance)
     episode.allowance = allowance - borne
@@ -21,7 +22,7 @@ def bear(episode, impulse, seconds):  # type: ignore[no-untyped-def]
 
 @inline_llvm
 def sum_up(first_leg, layouts, works, sums):  # type: ignore[no-untyped-def]
-    """Add up what all legs did in the step, 0 where the engine failed."""
+    """Write the sums over all legs of the step into `sums`, 0 where the engine failed."""
     for k in range(layouts.sums):
         total = first_leg.sums[k]
         for i in range(1, layouts.legs):
@@ -32,7 +33,7 @@ def sum_up(first_leg, layouts, works, sums):  # type: ignore[no-untyped-def]
 
 @inline_llvm
 def put_together(layouts, k, one, other):  # type: ignore[no-untyped-def]
-    """Return the sum of two values of the k-th of `StrideSums`, or the larger one of a peak."""
+    """Return the sum of two values of the k-th of `StrideSums`, of a peak the larger value."""
     if (layouts.peaks >> k) & 1:
         return maximum(one, other)
     return one + other
@@ -40,12 +41,14 @@ def put_together(layouts, k, one, other):  # type: ignore[no-untyped-def]
 
 @inline_llvm
 def find_outcome(task, trunk, leg, episode, layouts, sums):  # type: ignore[no-untyped-def]
-    """Return what the step brought; `sums` is memory for `StrideSums`."""
-    works = has_moved(trunk.result)  # else the state is of before: nothing is paid
+    """Return the outcome of the step; `sums` is memory for `StrideSums`."""
+    # Where the engine failed the state is that of before the step: nothing is rewarded.
+    works = has_moved(trunk.result)
     x = trunk.report.place.real
     y = trunk.report.place.imag
     sum_up(leg, layouts, works, sums)
     progress = x - episode.x_before
+    # A fixed trunk does not travel: what counts is how far hooves in stance slide backward.
     if task.stays:
         progress = leg.sums.travel
     episode.x_before = x
@@ -77,9 +80,11 @@ def add_up(outcome, episode, layouts):  # type: ignore[no-untyped-def]
 
 @inline_llvm
 def decide(task, outcome, episode):  # type: ignore[no-untyped-def]
-    """Whether the episode ends, and whether another speed is commanded from the next step on."""
+    """Count the step, and return masks of the rows in which the episode ends, and in which another speed is
+    commanded from the next step on."""
     steps = episode.steps + 1.0
     late = where(steps >= task.episode_steps, float(TRUNCATED), 0.0)
+    # A failure in the last step counts as a failure, not as the end of the time.
     ended = where(outcome.failed > 0.0, float(FAILED), late)
     switched = steps >= episode.switch
     episode.steps = steps
@@ -90,7 +95,8 @@ def decide(task, outcome, episode):  # type: ignore[no-untyped-def]
 
 @inline_llvm
 def outcome_of_one(outcome, lane, trunk, leg, episode, layouts, sums):  # type: ignore[no-untyped-def]
-    """Return one lane of an `Outcome`, ordinary numbers; `sums` is memory for its `StrideSums`."""
+    """Return one lane of an `Outcome` as ordinary numbers, for terms that take no lanes. `trunk`, `leg` and
+    `episode` are memory of that lane, `sums` is memory for its `StrideSums`."""
     for k in range(layouts.sums):
         sums[k] = lane_of(outcome.sums[k], lane)
     return Outcome(

@@ -1,7 +1,8 @@
-"""The paper's solver (Eq. 8, `dynamics.constrained`) in the place of the engine's kernels.
+"""The paper's solver (Eq. 8, `dynamics.constrained`) in place of the engine's kernels.
 
-It takes commands from the engine's memory and writes there what reward and observation read, so that they are
-the same for both. One environment after the other, some ten thousand times slower.
+It reads commands from the engine's memory and writes there the values that reward and observation read, so
+that these are the same for both. It solves one environment after the other and is some ten thousand times
+slower.
 """
 
 from __future__ import annotations
@@ -29,20 +30,31 @@ Records = NDArray[np.void]
 
 ACCOUNT = np.dtype(
     [
-        ("open", "?"), ("began", "f8"), ("peak", "f8"), ("steepest", "f8"), ("load", "f8"),
-        ("running", "f8"), ("count", "i8"), ("impulse", "f8"), ("loaded", "f8"),
+        ("open", "?"),
+        ("began", "f8"),
+        ("peak", "f8"),
+        ("steepest", "f8"),
+        ("load", "f8"),
+        ("running", "f8"),
+        ("count", "i8"),
+        ("impulse", "f8"),
+        ("loaded", "f8"),
     ]
-)  # fmt: skip
-"""A stance as `dynamics.observables.StanceCounter` has it, and over the episode the impulse of the normal
-force [N s] and the time under load [s]."""
+)
+"""Record type of a stance, fields of `dynamics.observables.StanceCounter`, and of the impulse of the normal
+force [N s] and the time under load [s] over the episode."""
 
 APART = 1.0
-"""A linkage that violates its constraints by more [m, rad] has diverged, though its numbers may still be
+"""Largest violation of the constraints [m, rad]: beyond it the solution has diverged, even if its numbers are
 finite, up to 1e300."""
 
 
 def check_paper(settings: Settings) -> None:
-    """`ParameterError` where settings ask of the paper's solver what it cannot do."""
+    """Check that the paper's solver supports the settings.
+
+    Raises:
+        ParameterError: it does not.
+    """
     only = {
         "trunk": "fixed",
         "drive": "prescribed",
@@ -51,18 +63,25 @@ def check_paper(settings: Settings) -> None:
         "hoof_stiffness": None,
     }
     for name, expected in only.items():
-        given = getattr(settings, name)
-        if given != expected and not (expected is None and not given):
-            raise ParameterError(f'{name}: expected {expected!r} with solver="paper", got {given!r}')
+        value = getattr(settings, name)
+        # An empty mapping is as good as None.
+        if value != expected and not (expected is None and not value):
+            raise ParameterError(f'{name}: expected {expected!r} with solver="paper", got {value!r}')
 
 
 class PaperSolver:
     """Legs solved as in the paper, one for each environment of an engine.
 
     Attributes:
-        legs: the solvers.
-        traces: the rows of each one's last control step; the one where it is after a start or a failure.
-        apart: whose loops came apart by more than `APART` in the last control step, which then failed.
+        legs: solvers, one for each environment.
+        traces: rows of the last control step of each leg; a single row after a start or a failure.
+        apart: True for legs with a violation of the constraints above `APART` in the last control step, which
+            then failed; shape (num_envs,).
+
+    Args:
+        settings: settings for which `check_paper` passes.
+        engine: engine with the memory that the solver reads and writes.
+        substeps: substeps of a control step.
     """
 
     def __init__(self, settings: Settings, engine: TrunkEngine, substeps: int) -> None:
@@ -71,24 +90,37 @@ class PaperSolver:
         self.substeps = substeps
         self.legs = [
             ConstrainedLeg(
-                engine.limbs[0].geometry, engine.ground, s.sim_dt, engine.filters,
-                s.baumgarte_alpha, s.baumgarte_beta, s.integrator, engine.trunk.height,
+                engine.limbs[0].geometry,
+                engine.ground,
+                s.sim_dt,
+                engine.filters,
+                s.baumgarte_alpha,
+                s.baumgarte_beta,
+                s.integrator,
+                engine.trunk.height,
             )
             for _ in range(engine.num_envs)
-        ]  # fmt: skip
+        ]
         self.traces = [new_trace(1) for _ in self.legs]
         self.apart = np.zeros(len(self.legs), bool)
         self._accounts: Records = np.zeros(len(self.legs), ACCOUNT)
         self._threshold = LIFT_OFF * engine.weight
 
     def compile(self, gait: GaitParameters) -> None:
-        """Have all kernels compiled, or loaded, by a step of a leg that is thrown away."""
+        """Compile or load all kernels by a step of a temporary leg."""
         leg = copy.deepcopy(self.legs[0])
         trace = leg.reset(gait)
         leg.advance(gait.to_array(), trace)
 
     def start(self, envs: Sequence[int], gaits: Floats, crank_angle: Floats, x: Floats) -> None:
-        """Start some environments; with gaits, crank angles and places as in `leg_starts.Start`."""
+        """Start some environments.
+
+        Args:
+            envs: environments that start.
+            gaits: gait parameters, shape (len(envs), 4).
+            crank_angle: crank angles [rad], shape (len(envs),).
+            x: places of O [m], shape (len(envs),).
+        """
         for k, env in enumerate(envs):
             gait = GaitParameters.from_array(gaits[k])
             self.traces[env] = self.legs[env].reset(gait, float(crank_angle[k]), x=float(x[k]))
@@ -96,13 +128,15 @@ class PaperSolver:
             self._put(env, self._memory())
 
     def advance(self) -> None:
-        """One control step of all, under the commands in the engine's memory."""
+        """Take one control step of all legs, under the commands in the engine's memory."""
         memory = self._memory()
         for env, leg in enumerate(self.legs):
             trace = new_trace(self.substeps)
             kept = leg.state.copy()
+            # Only the last row, which stays if the step fails.
             self.traces[env] = self.traces[env][-1:]
-            result = leg.advance(memory.command[0, :, env].copy(), trace)  # not strided, as alone
+            # A copy, because a strided command would be another type for numba than that of a leg alone.
+            result = leg.advance(memory.command[0, :, env].copy(), trace)
             self.apart[env] = result is Result.OK and np.abs(leg.closure().error).max() > APART
             if self.apart[env]:
                 result = Result.NOT_FINITE
@@ -116,15 +150,15 @@ class PaperSolver:
                 self._put(env, memory)
 
     def record(self, env: int) -> dict[str, Floats]:
-        """What `Recording.last` gives: the rows of the last control step by name, shaped as `TrunkEngine.run`
-        shapes them."""
+        """Return the rows of the last control step by name, in the shapes of `TrunkEngine.run`; see
+        `Recording.last`."""
         trace = self.traces[env]
         of_trunk = {*TRUNK_STATE, *TRUNK_REPORT}
         shapes = {name: (-1, 1) if name in of_trunk else (-1, 1, 1) for name in TRACE.names or ()}
         return {name: trace[name].reshape(shape).copy() for name, shape in shapes.items()}
 
     def get_state(self) -> dict[str, Any]:
-        """What changes besides the engine's memory."""
+        """Return everything that changes outside the engine's memory."""
         states = [{name: array.copy() for name, array in vars(leg.state).items()} for leg in self.legs]
         return {
             "legs": states,
@@ -133,9 +167,14 @@ class PaperSolver:
         }
 
     def read_state(self, state: Any) -> tuple[list[ConstrainedState], Records, Records]:
-        """What `get_state` gave, as `set_state` takes it; `ParameterError` of anything else."""
+        """Check a state of `get_state` and convert it to the arguments of `set_state`.
+
+        Raises:
+            ParameterError: `state` is not one of as many legs.
+        """
         try:
-            legs = [_state_like(leg.state, one) for leg, one in zip(self.legs, state["legs"], strict=True)]
+            pairs = zip(self.legs, state["legs"], strict=True)
+            legs = [_state_like(leg.state, leg_state) for leg, leg_state in pairs]
             accounts = np.array(state["accounts"], ACCOUNT)
             last = np.array(state["last"], TRACE)
             if not len(accounts) == len(last) == len(legs):
@@ -149,7 +188,7 @@ class PaperSolver:
         return legs, accounts, last
 
     def set_state(self, legs: Sequence[ConstrainedState], accounts: Records, last: Records) -> None:
-        """Put back what `read_state` gave, after the engine's memory."""
+        """Restore the results of `read_state`, after the engine's memory."""
         self._accounts = accounts
         memory = self._memory()
         for env, (leg, leg_state) in enumerate(zip(self.legs, legs, strict=True)):
@@ -158,20 +197,23 @@ class PaperSolver:
             self._put(env, memory)
 
     def _memory(self) -> Memory:
+        """Return views of the engine's memory by name."""
         data, _, _, _, constants, reactions = self.engine.arrays
         return memory_of(data, self.engine.num_envs, constants, reactions, self.engine.features)
 
     def _put(self, env: int, memory: Memory) -> None:
-        now = self.traces[env][-1]
-        memory.trunk[:, env] = [now[name] for name in TRUNK_STATE]
-        memory.trunk_report[:, env] = [now[name] for name in TRUNK_REPORT]
-        memory.limbs[0, :, env] = [now[name] for name in LEG_STATE]
-        memory.limb_report[0, :, env] = [now[name] for name in LEG_REPORT]
+        """Write the present state and report of a leg into the engine's memory."""
+        last = self.traces[env][-1]
+        memory.trunk[:, env] = [last[name] for name in TRUNK_STATE]
+        memory.trunk_report[:, env] = [last[name] for name in TRUNK_REPORT]
+        memory.limbs[0, :, env] = [last[name] for name in LEG_STATE]
+        memory.limb_report[0, :, env] = [last[name] for name in LEG_REPORT]
         account = self._accounts[env]
         memory.strides[0, :, env] = account[["open", "began", "peak", "steepest", "load", "running"]].item()
 
     def _sum(self, env: int, trace: Records) -> dict[str, float]:
-        """Return the `layout.StrideSums` of a control step by name; the account goes on."""
+        """Return the `layout.StrideSums` of a control step by name, and update the account of the episode.
+        The engine's kernels have the same sums in `dynamics.observables.count_stride`."""
         h = self.legs[env].sim_dt
         *stance, impulse_before, loaded_before = self._accounts[env].item()
         since = StanceCounter(self._threshold, *stance)
@@ -187,17 +229,19 @@ class PaperSolver:
         powers = trace["crank_power"], trace["hip_power"]
         columns = trace["theta"], normal, force, sliding, rubbing, *powers
         growth = higher = steeper = work = travel = slip = 0.0
+        # Substep by substep, in the order in which the engine adds.
         rows = zip(*(values.tolist() for values in columns), strict=True)
         for theta, n, f, slid, rubbed, crank, hip in rows:
-            grown = since.add(theta, n, f, h)
-            growth = growth + grown[0]
-            higher = higher + grown[1]
-            steeper = steeper + grown[2]
+            increases = since.add(theta, n, f, h)
+            growth = growth + increases[0]
+            higher = higher + increases[1]
+            steeper = steeper + increases[2]
             work += h * (max(crank, 0.0) + max(hip, 0.0))
             impulse += h * n
             if n > 0.0:
                 loaded += h
                 travel -= h * slid / n
+            # Sliding counts in stance only, not under the small forces of landing and lift-off.
             if n > self._threshold:
                 slip += h * rubbed / n
         self._accounts[env] = *astuple(since)[1:], impulse, loaded
@@ -215,8 +259,15 @@ class PaperSolver:
         }
 
 
-def _state_like(own: ConstrainedState, given: Mapping[str, Any]) -> ConstrainedState:
-    """A copy of a given state with the types and shapes of one's own: kernels take NumPy's records and write
-    to them, but `np.array` makes arrays of them, and to those of a pickle nothing can be written."""
-    parts = {name: np.array(given[name], v.dtype).reshape(v.shape)[()] for name, v in vars(own).items()}
+def _state_like(model: ConstrainedState, values: Mapping[str, Any]) -> ConstrainedState:
+    """Copy a state, with the types and shapes of another one.
+
+    Raises:
+        KeyError, TypeError, ValueError: a part is missing or has another shape.
+    """
+    parts = {}
+    for name, part in vars(model).items():
+        # [()] makes a record of an array without axes: kernels write to records, and those of a pickle are
+        # read-only.
+        parts[name] = np.array(values[name], part.dtype).reshape(part.shape)[()]
     return ConstrainedState(**parts)

@@ -1,6 +1,6 @@
-"""Scripted policies: gaits of a preset or a file, and the simplest things a policy can do wrong.
+"""Scripted policies: gaits of a preset or a file, and simple policies that a good reward must not favour.
 
-All have Stable-Baselines3's `predict`, so that scripted and trained policies are interchangeable.
+All have the method `predict` of Stable-Baselines3, so that scripted and trained policies are interchangeable.
 """
 
 from __future__ import annotations
@@ -26,14 +26,14 @@ Action = NDArray[np.float32]
 
 
 class Scripted:
-    """A policy as a function of (observation, time since the episode began [s]), for one environment or many.
+    """Policy that is a function of observation and time since the start of the episode [s], for one
+    environment or many.
 
     Args:
-        act: gives the action, shape (4,), for an observation of shape (k,) and a time. To serve many
-            environments it must also take shapes (n, k) and (n,) and give (n, 4), or (4,) for all.
+        act: function of an observation, shape (k,), and a time that returns the action, shape (4,). For many
+            environments it must also take shapes (n, k) and (n,) and return (n, 4), or (4,) for all.
         dt: control step [s].
-        start: reset options that its episodes begin with, unless others are given: that of a gait starts in
-            this gait.
+        start: reset options of the policy's episodes, unless others are given; a gait starts in this gait.
     """
 
     def __init__(self, act: Any, dt: float, start: Mapping[str, Any] | None = None) -> None:
@@ -43,18 +43,23 @@ class Scripted:
         self.reset()
 
     def reset(self) -> None:
-        """Start an episode, in all environments."""
+        """Restart the clocks of all environments."""
         self._steps = np.zeros((), int)
 
     def predict(
         self, observation: Any, state: Any = None, episode_start: Any = None, deterministic: bool = True
     ) -> tuple[Action, None]:
-        """Action for an observation, or actions for many, shape (n, 4).
+        """Return the action for an observation, or the actions for many, shape (n, 4), and no state.
 
-        `episode_start` (bool, or an array with one entry for each environment) restarts clocks, and so does
-        another number of environments.
+        Args:
+            observation: observation, shape (k,), or (n, k) of n environments.
+            state: ignored; it belongs to the interface.
+            episode_start: True where an episode starts, a bool or an array of shape (n,): the clock is
+                restarted there.
+            deterministic: ignored; it belongs to the interface.
         """
         rows = np.shape(observation)[:-1]
+        # Another number of environments than at the last call: these are new episodes.
         if self._steps.shape != rows:
             self._steps = np.zeros(rows, int)
         if episode_start is not None:
@@ -66,21 +71,21 @@ class Scripted:
 
 
 def start_of(policy: Any) -> dict[str, Any]:
-    """Reset options that episodes of a policy begin with; none of a policy that says nothing of it."""
+    """Return the reset options of a policy's episodes, an empty mapping for a policy without any."""
     return dict(getattr(policy, "start", None) or {})
 
 
 def policy_names(env: Any) -> list[str]:
-    """Return the names accepted by `make_policy` for an environment, see `body.Body.policy_names`."""
+    """Return the names that `make_policy` accepts for an environment, see `body.Body.policy_names`."""
     return list(env.unwrapped.batch.body.policy_names)
 
 
 def heading_seen(env: Any) -> Any:
-    """A function that reads where the gait is heading, shape (..., 4), from observations of an environment of
-    one leg, shape (..., k); see `one_leg.heading_now`.
+    """Return a function of observations of one leg, shape (..., k), that returns the parameters towards which
+    the gait is heading, shape (..., 4); see `one_leg.heading_now`.
 
     Raises:
-        ParameterError: the environment does not observe it.
+        ParameterError: the environment does not observe its gait.
     """
     leg: Any = env.unwrapped
     if "gait" not in leg.settings.observation:
@@ -97,6 +102,7 @@ def heading_seen(env: Any) -> Any:
     rate_bounds = body.filters.to_array()[:, 1]
 
     def heading(observation: Any) -> Any:
+        """Undo the scaling of the observation: gait plus lead times rate."""
         seen = np.asarray(observation, float)
         if not seen.ndim:
             raise ParameterError(
@@ -110,8 +116,8 @@ def heading_seen(env: Any) -> Any:
 
 
 def towards(env: Any, gait_at: Any) -> Any:
-    """A function of observations and times that goes to the gait that `gait_at` gives for them, as fast as is
-    allowed; see `LegBase.action_for`."""
+    """Return a function of observations and times that returns the actions towards the gait that `gait_at`
+    returns for them, as fast as is allowed; see `LegBase.action_for`."""
     batch = env.unwrapped.batch
     heading = heading_seen(env)
     reach = batch.body.reach(batch.engine, batch.dt)
@@ -123,16 +129,21 @@ def towards(env: Any, gait_at: Any) -> Any:
 
 
 def make_policy(name: str, env: Any, seed: int = 0) -> Scripted:
-    """A scripted policy for an environment.
+    """Make a scripted policy for an environment.
 
-    A gait name starts in that gait and keeps it. "idle" stops the crank and holds the swing; "random" draws a
-    new action every step; "bang-bang" flips all actions between their limits every quarter of a second;
-    "drag" turns the hoof to the ground, stops there and rubs it to and fro with the swing; "airborne" turns
-    it to its highest place and stops there. Of a horse "reference" is the zero action, the gait around which
-    actions lie.
+    The name of a gait starts in that gait and keeps it. "idle" stops the crank and holds the swing; "random"
+    draws a new action in every step; "bang-bang" switches all actions between their limits every quarter of a
+    second; "drag" turns the hoof to the ground, stops there and moves it back and forth with the swing;
+    "airborne" turns it to its highest position and stops there. For a horse, "reference" is the zero action:
+    the gait from which actions make offsets.
+
+    Args:
+        name: one of `policy_names`.
+        env: environment of this package, wrapped or not.
+        seed: seed of "random".
 
     Raises:
-        ParameterError: unknown name, or a policy that must see what the environment does not observe.
+        ParameterError: an unknown name, or a policy that needs an entry that is not observed.
     """
     leg: Any = getattr(env, "unwrapped", None)
     if not hasattr(leg, "gaits"):
@@ -158,13 +169,22 @@ def make_policy(name: str, env: Any, seed: int = 0) -> Scripted:
 
 
 def _bang_bang(count: int, observation: Any, time: Any) -> Any:
+    """Return the actions of "bang-bang"."""
     is_high = np.asarray(time / 0.25).astype(int)[..., None] % 2
     return np.where(is_high, np.ones(count), -np.ones(count))
 
 
 def constant_gait(gait: GaitParameters, env: Any, starts_in_it: bool = False) -> Scripted:
-    """A policy that goes to a gait and keeps it, in an episode that perhaps starts in it; `ParameterError` of
-    one that cannot be commanded."""
+    """Make a policy that goes to a gait and keeps it.
+
+    Args:
+        gait: gait parameters.
+        env: environment of one leg.
+        starts_in_it: True if episodes start in this gait.
+
+    Raises:
+        ParameterError: the gait cannot be commanded.
+    """
     values = gait.to_array()
     env.unwrapped.batch.body.check_reachable("gait", values)
     start = {"gait": gait} if starts_in_it else None
@@ -172,7 +192,13 @@ def constant_gait(gait: GaitParameters, env: Any, starts_in_it: bool = False) ->
 
 
 def _at_a_posture(name: str, env: Any, middle: float) -> Scripted:
-    """ "drag" or "airborne": turn the crank, which turns one way only, to an angle and stop it there."""
+    """Make the policy "drag" or "airborne", which turns the crank to an angle and stops it there.
+
+    Args:
+        name: name of the policy.
+        env: environment of one leg.
+        middle: swing offset of "drag" [rad].
+    """
     leg: Any = env.unwrapped
     seen = [f"{function}(crank angle)" for function in ("sin", "cos")]
     if not set(seen) <= set(leg.observation_names):
@@ -186,10 +212,13 @@ def _at_a_posture(name: str, env: Any, middle: float) -> Scripted:
     posture, target = extreme_posture(leg_profile(leg.geometry), rests, name == "drag")
 
     def hold(observation: Any, time: Any) -> Any:
-        here = np.asarray(observation, float)
-        ahead = (target - np.arctan2(here[..., sine], here[..., cosine])) % (2 * np.pi)
+        """Return the gait that turns the crank to its target, and swings in "drag"."""
+        numbers = np.asarray(observation, float)
+        # The crank turns one way only: the target is always ahead.
+        ahead = (target - np.arctan2(numbers[..., sine], numbers[..., cosine])) % (2 * np.pi)
+        # As fast as four fifths of the largest deceleration can stop in time.
         speed = np.minimum(np.minimum(2 * ahead, np.sqrt(1.6 * brakes * ahead)), 2 * np.pi)
-        # a crank that was too fast to stop there goes round once more
+        # A crank that was too fast to stop at its target turns once more.
         speed = np.where((ahead > 0.05) & (ahead < 2 * np.pi - 0.3), speed, 0.0)
         swing = 0.15 * np.sin(np.pi * np.asarray(time)) if name == "drag" else 0.0
         return np.stack(np.broadcast_arrays(speed, posture[1] + swing, *posture[2:]), -1)
@@ -198,15 +227,15 @@ def _at_a_posture(name: str, env: Any, middle: float) -> Scripted:
 
 
 def open_loop(parameters: Mapping[str, Any], env: Any) -> Scripted:
-    """A policy that sees nothing but its own gait and the time: it goes to a constant gait, or to one with a
-    first harmonic of a clock,
+    """Make a policy that observes only its own gait and the time. It goes to a constant gait, or to one with
+    a first harmonic of a clock,
 
-        g(t) = constant + sin * sin(2 pi f t) + cos * cos(2 pi f t),   t the time since the episode began.
+        g(t) = constant + sin * sin(2 pi f t) + cos * cos(2 pi f t),   t: time since the start of the episode.
 
     Args:
-        parameters: "constant", gait parameters, shape (4,), or (n, 4) for n environments; and, if there is a
-            clock, "sin" and "cos" of the same shape and "frequency_hz", a number or shape (n,). The sum is
-            kept within the limits of the leg.
+        parameters: "constant", gait parameters, shape (4,), or (n, 4) for n environments; and with a clock
+            "sin" and "cos" of the same shape and "frequency_hz", a number or shape (n,). The sum is clipped
+            to the limits of the leg.
         env: environment of one leg.
 
     Raises:
@@ -222,6 +251,7 @@ def open_loop(parameters: Mapping[str, Any], env: Any) -> Scripted:
     rate = 2 * np.pi * np.asarray(parameters["frequency_hz"], float)
 
     def gait_at(observation: Any, time: Any) -> Any:
+        """Return g(t)."""
         phase = np.asarray(rate * time)[..., None]
         return np.clip(constant + sine * np.sin(phase) + cosine * np.cos(phase), body.low, body.high)
 
@@ -229,28 +259,29 @@ def open_loop(parameters: Mapping[str, Any], env: Any) -> Scripted:
 
 
 STANDS_FOR = {"hoof_env/HorseLegMO-v0": "hoof_env/HorseLeg-v0"}
-"""A policy of the second id is one of the first: the same leg, and the sum of its rewards is the other's."""
+"""Ids that share the policies of another id, by their own: the leg is the same, and the sum of the first
+one's rewards is the reward of the second."""
 
 
 FORM = "gait"
-"""What the numbers of a gait's file are: gait parameters in their units. Files of before have actions."""
+"""Form of the numbers in a gait's file: gait parameters in their units. Older files hold actions."""
 
 
 def open_loop_record(path: Path) -> dict[str, Any]:
-    """What the file of an open-loop gait holds, which `agents.open_loop` writes: "parameters" of one
+    """Read the file of an open-loop gait, which `agents.open_loop` writes: a mapping with "parameters" of one
     environment as `open_loop` takes them, and their "form".
 
     Raises:
-        DataFileError: it is no such file, or one whose numbers are actions of an older form.
+        DataFileError: not such a file, or its numbers are actions of an older form.
     """
     try:
         record: dict[str, Any] = parse_json(path.read_text(encoding="utf-8"))
-        given = record["parameters"]
+        parameters = record["parameters"]
         shapes = {"constant": (4,), "sin": (4,), "cos": (4,), "frequency_hz": ()}
-        clocked = "frequency_hz" in given
-        if set(given) != (set(shapes) if clocked else {"constant"}):
-            raise ValueError(f"parameters {sorted(given)}")
-        for name, value in given.items():
+        clocked = "frequency_hz" in parameters
+        if set(parameters) != (set(shapes) if clocked else {"constant"}):
+            raise ValueError(f"parameters {sorted(parameters)}")
+        for name, value in parameters.items():
             if np.shape(value) != shapes[name] or not np.isfinite(np.asarray(value, float)).all():
                 raise ValueError(f"{name} {value!r}")
     except (OSError, ValueError, TypeError, KeyError, AttributeError) as error:
@@ -267,14 +298,19 @@ def open_loop_record(path: Path) -> dict[str, Any]:
 
 
 GAITS = Path(__file__).parents[1] / "data" / "gaits"
-"""Open-loop gaits that come with the package, as `agents.open_loop` found them."""
+"""Folder of the open-loop gaits of the package, which `agents.open_loop` found."""
 
 
 def load_open_loop(path_or_env_id: str | Path, env: Any) -> Scripted:
-    """The policy of a gait file for an environment; or, for the id of one, of the best gait that is stored.
-    Warns if it was found for another id, with other settings, or by another version.
+    """Make the policy of an open-loop gait. Warn if the gait was found for another id, with other settings,
+    or by another version.
 
-    `DataFileError` if there is none or it cannot be read.
+    Args:
+        path_or_env_id: file of a gait, or the id of an environment for its best gait in the package.
+        env: environment of one leg.
+
+    Raises:
+        DataFileError: there is no such gait, it cannot be read, or the environment is a horse.
     """
     path = Path(path_or_env_id)
     if path.suffix != ".json":
@@ -284,6 +320,7 @@ def load_open_loop(path_or_env_id: str | Path, env: Any) -> Scripted:
         if not files:
             known = ", ".join(sorted(file.name for file in GAITS.glob("*.json"))) or "none"
             raise DataFileError(f"open-loop gait of {name}: expected one of those in {GAITS.name}/: {known}")
+        # Of a constant and a clocked gait the one with the higher mean return.
         path = max(files, key=lambda file: open_loop_record(file)["score"]["mean"]["return"])
     record = open_loop_record(path)
     leg = env.unwrapped
@@ -299,8 +336,9 @@ def load_open_loop(path_or_env_id: str | Path, env: Any) -> Scripted:
     if (made_with := record.get("versions", {}).get("hoof-env", __version__)) != __version__:
         unlike.append(f"hoof-env {made_with}, here {__version__}")
     for key, there in record.get("env_kwargs", {}).items():
-        if (now := json.loads(json.dumps(getattr(leg.settings, key, None), default=str))) != there:
-            unlike.append(f"{key}={there!r}, here {now!r}")
+        # Through JSON, as the record's value went: tuples are lists there.
+        if (present := json.loads(json.dumps(getattr(leg.settings, key, None), default=str))) != there:
+            unlike.append(f"{key}={there!r}, here {present!r}")
     if unlike:
         warnings.warn(f"open-loop gait {path}: found for {'; '.join(unlike)}", stacklevel=2)
     return open_loop(record["parameters"], env)

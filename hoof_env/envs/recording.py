@@ -1,8 +1,7 @@
-"""What happened between two control steps: the substeps are run again, on an engine of their own.
+"""Recording of the substeps between two control steps, by running them again on another engine.
 
-The kernels keep sums of a control step, not its substeps; who wants to see those pays for them. Of a step
-that nobody asks about there is a copy of where it ended, and no more: the substeps have the same bits
-whenever they are run again from there.
+The kernels keep the sums of a control step, not its substeps. A recording only copies the memory at the end
+of each step. When substeps are asked for, they are run again from there, and have the same bits.
 """
 
 from __future__ import annotations
@@ -21,38 +20,47 @@ from hoof_env.envs.batch import EpisodeBatch
 from hoof_env.render.instant import columns_of, instants_of
 from hoof_env.render.renderer import USUAL_SIZE, Renderer
 
-SHOWN = 4.0  # seconds before a picture that it can show
+SHOWN = 4.0  # longest time before a picture that it can show [s]
 
 Record = dict[str, NDArray[np.float64]]
 
 
 class Recording:
-    """Substeps of one environment of a batch, and pictures of them, `size` wide and high [pixels]."""
+    """Substeps of one environment of a batch, and pictures of them.
+
+    Attributes:
+        batch: batch of episodes.
+        env: index of the environment.
+        size: width and height of pictures [pixels].
+        renderer: renderer of the pictures, None before the first one.
+    """
 
     def __init__(self, batch: EpisodeBatch, env: int = 0, size: tuple[int, int] = USUAL_SIZE) -> None:
         self.batch = batch
         self.env = env
         self.size = size
-        self._ends: deque[Any] = deque(maxlen=round(SHOWN / batch.dt) + 2)  # of control steps; first a start
-        self._unseen = 0  # of them, which no picture shows yet
+        # Memory at the end of control steps; the first one is a start, or the last end before what is shown.
+        self._ends: deque[Any] = deque(maxlen=round(SHOWN / batch.dt) + 2)
+        self._unseen = 0  # number of the last ends that no picture shows yet
         self.renderer: Any = None
         self._engine: TrunkEngine | None = None
         self._conditions = batch.conditions.of(env)
         self._find()
 
     def _find(self) -> None:
-        """What is copied at the end of a control step: the engine's memory of this environment, or the record
-        of the paper's solver."""
+        """Set the function that copies the end of a control step: the engine's memory of this environment, or
+        the record of the paper's solver, which cannot run substeps again."""
         paper = self.batch.paper
         env = self.env
         column = self.batch.engine.arrays[0][:, env]
         self._end = (lambda: paper.record(env)) if paper else column.copy
 
     def begin(self) -> None:
-        """After a reset or a jump to another state: what was before did not lead to it."""
+        """Begin anew after a reset or another state, to which earlier steps did not lead."""
         conditions = self.batch.conditions.of(self.env)
+        # Other settings: engine and renderer may have another ground.
         if conditions is not self._conditions and (conditions or self._conditions):
-            self.close()  # it may have drawn another ground
+            self.close()
             self._conditions = conditions
             self._engine = None
         self._ends.clear()
@@ -60,31 +68,34 @@ class Recording:
         self.add()
 
     def add(self) -> None:
-        """After a control step: remember where it ended."""
+        """Keep the end of a control step."""
         self._ends.append(self._end())
         self._unseen += 1
 
     def last(self) -> Record:
-        """State and report by name at each substep of the last control step; of where it is, after a reset or
-        a step that could not be simulated."""
+        """Return state and report by name at each substep of the last control step; after a reset, or a step
+        that could not be simulated, of the present instant only."""
         if not self._ends:
             self.begin()
         return self._record(-1)
 
     def _record(self, k: int) -> Record:
-        """What led to the k-th end, which is counted from the last one, -1."""
+        """Return the substeps that led to the k-th end, counted from the last one, -1."""
         end = self._ends[k]
         if self.batch.paper:
-            found: Record = end
-            return found
+            of_solver: Record = end
+            return of_solver
         form = engine_layout(self.batch.engine.features)
+        # The first end has no predecessor, and a failed step did not lead to its end: no substeps.
         if k == -len(self._ends) or broken(end[form.trunk_memory.rows("result")])[0]:
             return self._run(end, None, 0)
         command = self.batch.engine.command_in(end)
         record = self._run(self._ends[k - 1], command, self.batch.substeps)
+        # Without the first instant, which is the end of the step before.
         return {name: values[1:] for name, values in record.items()}
 
     def _run(self, column: NDArray[np.float64], command: Any, steps: int) -> Record:
+        """Run substeps from a column of the engine's memory, under a command."""
         if self._engine is None:
             self._engine = self.batch.alone(self.env)
         self._engine.set_column(0, column)
@@ -93,18 +104,32 @@ class Recording:
         return record
 
     def frame(self, mode: str, fps: float) -> Any:
-        """A picture of what happened since the last one, at most `SHOWN` seconds; None of a window."""
+        """Draw what happened since the last picture, at most the last `SHOWN` seconds. Return an array of
+        shape (H, W, 3), None if it is drawn into a window.
+
+        Args:
+            mode: render mode, "rgb_array" or "human".
+            fps: pictures per second.
+        """
         hips = self.batch.body.hips
         terrain = self.batch.conditions.of(self.env).get("terrain", self.batch.engine.terrain)
         if self.renderer is None:
             weight = float(self.batch.episode_rows.weight[self.env])
             self.renderer = Renderer(
-                self.batch.body.geometry, mode, fps, self.size, self.batch.settings.trunk, weight,
-                LIFT_OFF * weight / self.batch.legs, terrain, hips,
-            )  # fmt: skip
+                self.batch.body.geometry,
+                mode,
+                fps,
+                self.size,
+                self.batch.settings.trunk,
+                weight,
+                LIFT_OFF * weight / self.batch.legs,
+                terrain,
+                hips,
+            )
         if not self._ends:
             self.begin()
-        if self._unseen >= len(self._ends):  # also the start of what is remembered
+        # A new episode, or more steps than are kept: the lines of the picture begin anew.
+        if self._unseen >= len(self._ends):
             self.renderer.reset()
         unseen = min(self._unseen, len(self._ends))
         if self.renderer.is_empty:
@@ -118,7 +143,7 @@ class Recording:
         return self.renderer.frame()
 
     def _commanded(self, k: int) -> NDArray[np.float64]:
-        """What was commanded in the control step of the k-th end, shape (legs, gait parameters)."""
+        """Return the command of the control step of the k-th end, shape (legs, gait parameters)."""
         engine = self.batch.engine
         return engine.command_in(engine.column(self.env) if self.batch.paper else self._ends[k])
 
@@ -129,12 +154,13 @@ class Recording:
             self.renderer = None
 
     def __getstate__(self) -> dict[str, Any]:
-        """Copies and pickles leave the window behind; it belongs to this process and this environment."""
+        """Return the attributes without engine and window, which belong to this process and environment."""
         return {name: value for name, value in vars(self).items() if name != "_end"} | {
             "renderer": None,
             "_engine": None,
         }
 
     def __setstate__(self, state: dict[str, Any]) -> None:
+        """Set the attributes, and find the memory of this process."""
         vars(self).update(state)
         self._find()

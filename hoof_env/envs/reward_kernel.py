@@ -1,4 +1,4 @@
-"""Reward of a control step: the terms of a task in one kernel."""
+"""Part of the kernels of a step that computes the reward: all terms of a task in one function."""
 
 from __future__ import annotations
 
@@ -18,10 +18,11 @@ from hoof_env.tasks.horse_terms import HORSE_TERMS
 from hoof_env.tasks.reward import TERMS, Term
 
 BUILT_IN_TERMS = tuple(term.name for term in TERMS)
+"""Names of the terms of one leg."""
 
 
 def is_user_term(term: Term) -> bool:
-    """Whether a term is from outside the package, so that nobody knows what it does with broken reports."""
+    """True for a user's term, which may not handle the NaN of a failed simulation."""
     return term.name not in BUILT_IN_TERMS and term not in HORSE_TERMS
 
 
@@ -30,6 +31,11 @@ def sum_of_terms(terms: tuple[Term, ...], layouts: Memories, k: int = 0) -> Call
     and returns their sum.
 
     Terms of this package behind the last one from outside are compiled once for all tasks with them.
+
+    Args:
+        terms: terms of the task, from the k-th on.
+        layouts: layouts of the memory of a step.
+        k: number of the first term.
     """
     if not terms:
         return inline_llvm(lambda addresses, lanes, task, outcome, episode, n, spare, total: total)
@@ -49,15 +55,17 @@ def _first_and_rest(terms: tuple[Term, ...], layouts: Memories, k: int) -> Calla
 
     @inline_llvm
     def add_term(addresses, lanes, task, outcome, episode, n, spare, total):  # type: ignore[no-untyped-def]
+        # Where the engine failed the reports that a user's term may read are of the point of failure.
         if is_from_outside:
-            works = has_moved(outcome.trunk.result)  # else the reports that it may read are of where it broke
+            works = has_moved(outcome.trunk.result)
             episode.terms[k] = where(works, episode.terms[k], 0.0)
         total = episode.terms[k] if is_first else total + episode.terms[k]
         return rest(addresses, lanes, task, outcome, episode, n, spare, total)
 
     @inline_llvm
     def compute_term(addresses, lanes, task, outcome, episode, n, spare, total):  # type: ignore[no-untyped-def]
-        episode.terms[k] = number(compute(outcome, task.weights[k])) + 0.0  # no -0 where it weighs nothing
+        # + 0.0 makes 0 of the -0 that a weight of 0 gives.
+        episode.terms[k] = number(compute(outcome, task.weights[k])) + 0.0
         return add_term(addresses, lanes, task, outcome, episode, n, spare, total)
 
     @inline_llvm

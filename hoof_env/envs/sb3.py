@@ -1,4 +1,4 @@
-"""The native vector environment as Stable-Baselines3's `VecEnv`."""
+"""Native vector environment with the interface of Stable-Baselines3's `VecEnv`."""
 
 from __future__ import annotations
 
@@ -25,18 +25,19 @@ class Sb3VecEnv(VecEnv):
     """`num_envs` environments of an id for Stable-Baselines3, all stepped in one call.
 
     Wrap it in `VecMonitor` for episode returns. When an episode ends its info has "terminal_observation",
-    "TimeLimit.truncated" and "episode_summary"; nothing else is in the infos, for a dictionary an environment
-    and step costs more than the simulation: `terms` and `measured` are of the last step. `reset_infos` has
-    what `reset` says of each environment's present episode, drawn parameters too.
+    "TimeLimit.truncated" and "episode_summary". Infos contain nothing else, because a dictionary for each
+    environment and step costs more than the simulation: `terms` and `measured` are those of the last step.
+    `reset_infos` contains the info of the reset of each environment's present episode, drawn parameters
+    included.
 
     Args:
-        env_id: registered id of the family.
-        num_envs: how many.
+        env_id: registered id of this package.
+        num_envs: number of environments.
         settings: arguments of the environment, and `num_threads`.
 
     Attributes:
-        terms: of the last rewards by name, shape (num_envs,) each.
-        measured: what the last step's infos measure, shape (num_envs, ...), by position or by name; where an
+        terms: terms of the last rewards by name, shape (num_envs,) each.
+        measured: measurements of the last step, shape (num_envs, ...), by position or by name; where an
             episode ended, at the start of the next one.
 
     Raises:
@@ -55,7 +56,8 @@ class Sb3VecEnv(VecEnv):
             envs = gym.make_vec(env_id, num_envs, **many).unwrapped
         except ParameterError:
             raise
-        except (gym.error.Error, ModuleNotFoundError, TypeError):  # an unknown id, or one of another package
+        # An unknown id, or one of another package: its environments do not take these arguments.
+        except (gym.error.Error, ModuleNotFoundError, TypeError):
             envs = None
         if not isinstance(envs, HorseLegVectorEnv):
             raise ParameterError(f"env_id: expected an id of this package with many at once, got {env_id!r}")
@@ -68,42 +70,50 @@ class Sb3VecEnv(VecEnv):
         super().__init__(num_envs, envs.single_observation_space, envs.single_action_space)
 
     def __setattr__(self, name: str, value: Any) -> None:
-        """As of any object, but for settings, which `HorseLegVectorEnv` refuses, too."""
+        """Set an attribute.
+
+        Raises:
+            FixedSettingError: a setting, which `HorseLegVectorEnv` refuses, too.
+        """
         if name in SETTINGS:
             raise fixed_setting(name)
         super().__setattr__(name, value)
 
     def reset(self) -> NDArray[np.float32]:
-        """Observations at the start of all episodes."""
+        """Start all episodes, with the seeds and options that were set for the next reset; return the
+        observations."""
         seeds = list(self._seeds)
-        groups: list[tuple[Any, list[int]]] = []  # options, and the environments that have them
+        # Options, and the environments that have them: each group is one call of the vector environment.
+        groups: list[tuple[Any, list[int]]] = []
         for env, options in enumerate(self._options):
             rows = next((rows for known, rows in groups if known == (options or None)), None)
             if rows is None:
                 groups.append((options or None, [env]))
             else:
                 rows.append(env)
-        for options, _ in groups:  # what is refused changes nothing
+        # All before the first reset, so that refused options change nothing.
+        for options, _ in groups:
             check_options(self.envs.batch, options)
         self.reset_infos: list[dict[str, Any]] = [{} for _ in range(self.num_envs)]
         for options, rows in groups:
             mask = np.zeros(self.num_envs, bool)
             mask[rows] = True
-            some = {**(options or {}), "reset_mask": mask}
-            observations, infos = self.envs.reset(seed=seeds, options=some)
+            masked = {**(options or {}), "reset_mask": mask}
+            observations, infos = self.envs.reset(seed=seeds, options=masked)
             for env in rows:
                 self.reset_infos[env] = row_of(infos, env)
         self.measured = infos["measured"]
+        # Stable-Baselines3 uses seeds and options once.
         self._reset_seeds()
         self._reset_options()
         return observations
 
     def step_async(self, actions: NDArray[Any]) -> None:
-        """Keep the actions."""
+        """Keep the actions for `step_wait`."""
         self._actions = actions
 
     def step_wait(self) -> Any:
-        """Take the step."""
+        """Take a control step; return observations, rewards, ends of episodes, and infos of these only."""
         observations, rewards, terminated, truncated, infos = self.envs.step(self._actions)  # type: ignore[arg-type]
         self.terms = {name: infos[name] for name in self.terms}
         self.measured = infos["measured"]
@@ -113,6 +123,7 @@ class Sb3VecEnv(VecEnv):
             final = infos["final_info"]
             figures = infos["final_info"]["episode_summary"]
             names = [name for name in figures if not name.startswith("_")]
+            # With SAME_STEP `infos` are already those of the next episode.
             for name in self.terms:
                 self.terms[name] = np.where(dones, final[name], infos[name])
             started = {key: values for key, values in infos.items() if key in self.reset_infos[0]}
@@ -126,31 +137,41 @@ class Sb3VecEnv(VecEnv):
         return observations, rewards.astype(np.float32), dones, each
 
     def close(self) -> None:
-        """Give everything back."""
+        """Close the vector environment."""
         self.envs.close()
 
     def get_images(self) -> Sequence[NDArray[np.uint8] | None]:
-        """Frames of the environments that are drawn."""
+        """Return pictures of the environments that are drawn."""
         return list(self.envs.render() or ())[: self.envs.drawn]
 
     def get_attr(self, attr_name: str, indices: Any = None) -> list[Any]:
-        """As `HorseLegVectorEnv.get_attr`."""
+        """Return an attribute of some environments, or of all, see `HorseLegVectorEnv.get_attr`."""
         return self.envs.call_on(attr_name, self._get_indices(indices))
 
     def set_attr(self, attr_name: str, value: Any, indices: Any = None) -> None:
-        """As `HorseLegVectorEnv.set_attr`, of some environments or of all."""
+        """Store an attribute of some environments, or of all, see `HorseLegVectorEnv.set_attr`; one value for
+        all of these."""
         self.envs.set_attr_of(attr_name, dict.fromkeys(self._get_indices(indices), value))
 
     def env_method(self, method_name: str, *args: Any, indices: Any = None, **kwargs: Any) -> list[Any]:
-        """As `HorseLegVectorEnv.call`; ParameterError where some are meant by a method of all together."""
+        """Call a method of some environments, or of all, see `HorseLegVectorEnv.call`.
+
+        Raises:
+            ParameterError: `indices` are some environments only, and the method is one of all together.
+        """
         if method_name not in (*PER_ENV, "get_wrapper_attr", "has_wrapper_attr"):
             self._whole("env_method", indices)
         return self.envs.call_on(method_name, self._get_indices(indices), *args, **kwargs)
 
     def env_is_wrapped(self, wrapper_class: Any, indices: Any = None) -> list[bool]:
-        """Nothing is wrapped."""
+        """Return False for each environment: single ones do not exist and cannot be wrapped."""
         return [False for _ in self._get_indices(indices)]
 
     def _whole(self, name: str, indices: Any) -> None:
+        """Check that indices are those of all environments.
+
+        Raises:
+            ParameterError: they are not.
+        """
         if len(list(self._get_indices(indices))) != self.num_envs:
             raise ParameterError(f"{name}: expected all environments, which are one, got {indices!r}")

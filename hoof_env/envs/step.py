@@ -1,9 +1,9 @@
-"""A control step, in five verbs: apply the action, advance the engine, compute the reward, decide whether the
-episode goes on, observe.
+"""Kernels of a control step: apply the action, advance the engine, find its outcome and decide whether the
+episode ends, compute the reward, observe.
 
-One source for one environment and for `LANES` side by side, so that a row of a batch has the bits of the
-environment alone. Terms of the reward and entries of the observation are a task's (`reward_kernel`,
-`observation_kernel`), what actions mean is a body's (`tasks.body`).
+The source is the same for one environment and for `LANES` side by side, so that a row of a batch has the bits
+of the environment alone. Terms of the reward and entries of the observation are those of a task
+(`reward_kernel`, `observation_kernel`), the meaning of actions is that of a body (`tasks.body`).
 """
 
 from __future__ import annotations
@@ -42,18 +42,19 @@ from hoof_env.tasks.reward import Term
 NOT_A_NUMBER = -1
 SOME_ENDED = 1
 SOME_SWITCHED = 2
-"""Return codes of a step. NOT_A_NUMBER: an action was NaN or infinite and no environment was advanced;
-otherwise the sum of what happened in some environment: an episode ended, another speed is commanded."""
+"""Return codes of a step. NOT_A_NUMBER: an action was NaN or infinite and no environment was advanced.
+Otherwise the code is a sum of SOME_ENDED (an episode ended) and SOME_SWITCHED (a new commanded speed)."""
 
 
 class StepKernels(Kernels):
-    """Kernels of a task; each takes the array of `addresses.ADDRESSES`. What ends in `_one` goes through the
-    environments one by one, what ends in `_batch` takes `LANES` at a time.
+    """Kernels of a task. The argument of each is the array of `addresses.ADDRESSES`. Kernels that end in
+    `_one` run environments one by one, those that end in `_batch` run `LANES` at a time.
 
     Attributes:
-        step_one, step_batch: a control step; they return one of the codes above.
-        apply_one, finish_one: the parts before and behind the engine, for a solver that is not a kernel.
-        observers: of the observation alone.
+        step_one, step_batch: control step; they return one of the codes above.
+        apply_one, finish_one: parts before and after the engine, for a solver that is not a kernel. The first
+            one returns True if all actions are finite, the second one a code.
+        observers: kernels of the observation alone.
     """
 
     step_one: Any
@@ -73,17 +74,24 @@ def step_kernels(
     features: Features = PLAIN,
     body: BodyKernels = LEG_KERNELS,
 ) -> StepKernels:
-    """Return the kernels of tasks with these terms, entries and law of contact, on an engine of this kind and
-    a body with these parts.
+    """Return the kernels of tasks with the same parts, which share them.
+
+    Args:
+        terms: terms of the reward.
+        entries: entries that can be observed.
+        contact_law: user's law of the normal force; None for the engine's.
+        features: features of the engine.
+        body: the body's own parts.
 
     Raises:
-        ParameterError: one of the functions reaches what cannot be read.
+        ParameterError: one of the functions refers to something that cannot be read.
     """
     key = (terms, entries, contact_law, features, body)
-    own = from_outside(_functions(terms, entries, contact_law))
-    now = fingerprint(*own)  # what a function names may be another's by now, as in a notebook
-    found: StepKernels = _KEPT.get((*key, now), lambda: _made(own, *key), bool(own))
-    return found
+    foreign = from_outside(_functions(terms, entries, contact_law))
+    # Helpers and constants of a user's function may have changed since, as in a notebook.
+    present = fingerprint(*foreign)
+    kernels: StepKernels = _KEPT.get((*key, present), lambda: _made(foreign, *key), bool(foreign))
+    return kernels
 
 
 def _functions(
@@ -96,7 +104,7 @@ def _functions(
 
 
 def _made(
-    own: list[Callable[..., Any]],
+    foreign: list[Callable[..., Any]],
     terms: tuple[Term, ...],
     entries: tuple[Entry, ...],
     contact_law: Callable[..., Any] | None,
@@ -104,11 +112,13 @@ def _made(
     body: BodyKernels,
 ) -> StepKernels:
     """Make the kernels; numba compiles them when they are called."""
-    refresh(*own)
+    # Helpers that a user's functions call are compiled anew if they have changed.
+    refresh(*foreign)
     layouts = memories_of(body.episode, len(terms), features, body.legs)
     slots = slots_of(entries)[2]
     task_record = task_type(len(terms), slots, layouts.gait, body.task_fields)
     functions = _functions(terms, entries, contact_law)
+    # All that the compiled code depends on: the name under which it is in numba's cache on disk.
     identity = fingerprint(*functions, _flags(terms, entries), layouts.episode.names, (FAILED, TRUNCATED))
     identity += f" {tuple(features)} {body.legs} legs, {task_record.descr}"
     observers = observers_of(entries, len(terms), features, body)
@@ -170,6 +180,7 @@ def _are_numbers(body: BodyKernels) -> Callable[..., Any]:
         actions = singles_at(addresses[AT.actions])
         count = addresses[AT.data + COLUMNS]
         good = True
+        # All columns, not the block of this thread: either all threads take the step or none does.
         for k in range(count * actions_per_row):
             good &= absolute(float(actions[k])) < np.inf
         return good
@@ -206,9 +217,11 @@ def _finish(
         of_step = rows(sums, lanes, layouts.stride_sums)
         outcome = find_outcome(task, trunk, leg, episode, layouts, of_step)
         add_up(outcome, episode, layouts)
+        # Before the observation, which shows the speed that is commanded in the next step.
         ended, switched = decide(task, outcome, episode)
         on_switch(task, episode, switched)
         nothing = full_like(episode, 0.0)
+        # Memory behind the sums, for those of one lane.
         spare = offset(sums, layouts.sums * lanes)
         reward = compute_reward(addresses, lanes, task, outcome, episode, n, spare, nothing)
         write(reward, doubles_at(addresses[AT.rewards]), n, 1)
@@ -244,8 +257,9 @@ def _step(
         happened = 0
         scratch = doubles(scratch_size * lanes)
         memory = doubles(slots * lanes)
-        sums = doubles(sums_size * (lanes + 1))  # and those of one lane, for terms that take no lanes
-        # One group of lanes after the other: its memory stays in the cache from action to observation
+        # Also for the sums of one lane, for terms that take no lanes.
+        sums = doubles(sums_size * (lanes + 1))
+        # One group of lanes after the other: its memory stays in the cache from action to observation.
         for n in range(addresses[BEGIN], addresses[END], lanes):
             apply(addresses, lanes, task, n, scratch)
             advance(

@@ -1,8 +1,8 @@
-"""The family as a native vector environment: all episodes in one call, time limit and autoreset its own.
+"""Native vector environment: all episodes in one call, with its own time limit and autoreset.
 
-Row i has the bits of the single environment that was seeded alike: with `reset(seed=s)` row i draws from the
-generator that `gym.make(id).reset(seed=s + i)` would have. What one may ask of each environment is what
-Gymnasium's own vector environments let one ask.
+Row i has the bits of a single environment with the same seed: with `reset(seed=s)` row i draws from the
+generator that `gym.make(id).reset(seed=s + i)` would have. `call`, `get_attr` and `set_attr` accept what
+those of `SyncVectorEnv` do.
 """
 
 from __future__ import annotations
@@ -33,11 +33,15 @@ from hoof_env.tasks.keywords import Keywords
 
 Floats = NDArray[np.float64]
 
-MOST_ENVS = 1_000_000
+MOST_ENVS = 1_000_000  # largest number of environments
 
 
 def mode_of(value: Any) -> AutoresetMode:
-    """An `AutoresetMode`, given as such, by its name or by its value."""
+    """Return an `AutoresetMode`, from one, its name, or its value.
+
+    Raises:
+        ParameterError: an unknown mode.
+    """
     known = {key: mode for mode in AutoresetMode for key in (mode, mode.name, mode.value)}
     try:
         return known[value]
@@ -52,31 +56,33 @@ class HorseLegVectorEnv(  # type: ignore[misc]  # generators are of all
     """`num_envs` environments of a task, stepped together.
 
     Args:
-        num_envs: how many, 1 to `MOST_ENVS`.
-        num_threads: threads that share them in `step`; they change no bit.
-        task, settings: as of `HorseLegEnv`.
+        num_envs: number of environments, 1 to `MOST_ENVS`.
+        num_threads: threads that share the environments in a step; their number changes no bit.
+        task, settings: arguments of `HorseLegEnv`.
         autoreset_mode: an `AutoresetMode`, its name or its value: NEXT_STEP, SAME_STEP or DISABLED.
-        max_episode_steps: episodes are no longer than so many control steps, as under Gymnasium's TimeLimit;
-            else `episode_seconds` alone ends them.
-        render_mode: "rgb_array"; `render` gives a frame of each environment.
-        rendered: how many are drawn, the first ones; frames of the others are black. None is all, of at most
-            `MOST_DRAWN`.
-        width, height: of each picture [pixels].
+        max_episode_steps: largest number of control steps of an episode, like that of Gymnasium's TimeLimit;
+            None for `episode_seconds` alone.
+        render_mode: "rgb_array"; `render` returns a picture of each environment.
+        rendered: number of environments that are drawn, the first ones; pictures of the others are black.
+            None draws all, if they are at most `MOST_DRAWN`.
+        width, height: size of each picture [pixels].
 
     Attributes:
-        drawn: how many are drawn.
+        drawn: number of environments that are drawn.
 
-    Rewards are float64, shape (num_envs,). Infos are those of the single environment as arrays; when an
-    episode ends they have its figures, too, as "episode_summary", one array for each figure, with masks under
-    "_episode_summary", and why it failed as "failure".
+    Rewards are float64, shape (num_envs,). Infos are those of the single environment as arrays. When an
+    episode ends they also contain its figures as "episode_summary", one array for each figure, with masks
+    under "_episode_summary", and the reason of a failure as "failure".
 
     Raises:
         ParameterError: a bad argument, option or action.
     """
 
     metadata: ClassVar[dict[str, Any]] = {  # type: ignore[misc]
-        "render_modes": ["rgb_array"], "render_fps": 50, "autoreset_mode": AutoresetMode.NEXT_STEP
-    }  # fmt: skip
+        "render_modes": ["rgb_array"],
+        "render_fps": 50,
+        "autoreset_mode": AutoresetMode.NEXT_STEP,
+    }
 
     def __init__(
         self,
@@ -94,10 +100,10 @@ class HorseLegVectorEnv(  # type: ignore[misc]  # generators are of all
     ) -> None:
         self.num_envs = count("num_envs", num_envs, most=MOST_ENVS)
         self.autoreset_mode = mode_of(autoreset_mode)
-        one = self._make(task, settings, self.num_envs, render_mode, (width, height), num_threads)
+        spaces = self._make(task, settings, self.num_envs, render_mode, (width, height), num_threads)
         if max_episode_steps is not None:
             self.batch.limit(count("max_episode_steps", max_episode_steps))
-        self.single_observation_space, self.single_action_space = one
+        self.single_observation_space, self.single_action_space = spaces
         self.observation_space = batch_space(self.single_observation_space, self.num_envs)
         self.action_space = batch_space(self.single_action_space, self.num_envs)
         self.metadata["autoreset_mode"] = self.autoreset_mode
@@ -118,8 +124,13 @@ class HorseLegVectorEnv(  # type: ignore[misc]  # generators are of all
         """Start episodes: in all environments, or in those of `options["reset_mask"]`.
 
         Args:
-            seed: of the first; the i-th has `seed + i`. Or one each, None to go on with its generator.
-            options: as of the single environment, the same for all; "reset_mask", bool of shape (num_envs,).
+            seed: seed of the first environment; the i-th has `seed + i`. Or a seed for each, None to continue
+                with its generator.
+            options: options of `HorseLegEnv.reset`, the same for all environments, and "reset_mask", a bool
+                array of shape (num_envs,), for the environments that start; by default all.
+
+        Returns:
+            Observations, float32, shape (num_envs, numbers), 0 where there is no episode yet, and the infos.
 
         Raises:
             ParameterError: a bad seed, option or mask.
@@ -127,6 +138,7 @@ class HorseLegVectorEnv(  # type: ignore[misc]  # generators are of all
         self._check_open("reset")
         rest: Any = dict(options) if isinstance(options, Mapping) else options
         mask = check_mask(rest.pop("reset_mask", None) if isinstance(rest, dict) else None, self.num_envs)
+        # Before the generators are seeded, so that a refused reset changes nothing.
         checked = check_options(self.batch, rest)
         self._seed(seed, mask)
         parameters = self._start(np.flatnonzero(mask), checked)
@@ -142,11 +154,17 @@ class HorseLegVectorEnv(  # type: ignore[misc]  # generators are of all
     def step(
         self, actions: NDArray[np.float32]
     ) -> tuple[NDArray[np.float32], NDArray[Any], NDArray[Any], NDArray[Any], dict[str, Any]]:
-        """One control step of all.
+        """Take a control step of all environments.
+
+        Args:
+            actions: actions, shape (num_envs, numbers), as of `HorseLegEnv.step`.
+
+        Returns:
+            Observations, rewards, terminated, truncated, and infos.
 
         Raises:
             ParameterError: actions of a wrong shape or type, or not finite.
-            ResetNeeded: `reset` was not called, or with autoreset disabled an episode that ended.
+            ResetNeeded: `reset` was not called, or, with autoreset disabled, an episode has ended.
         """
         self._check_started("step")
         batch = self.batch
@@ -163,7 +181,8 @@ class HorseLegVectorEnv(  # type: ignore[misc]  # generators are of all
         how = batch.episode_rows.ended[:n]
         terminated = how == FAILED
         truncated = how == TRUNCATED
-        if again is not None:  # NEXT_STEP: these were not stepped, they start
+        # NEXT_STEP: these environments start in this call; their step above does not count.
+        if again is not None:
             terminated[again] = False
             truncated[again] = False
             self._start(np.flatnonzero(again), {})
@@ -181,7 +200,14 @@ class HorseLegVectorEnv(  # type: ignore[misc]  # generators are of all
         return self._observed(), rewards, terminated, truncated, infos
 
     def _same_step(self, final: dict[str, Any], done: NDArray[np.bool_]) -> dict[str, Any]:
-        """Start again at once what ended; the infos then, with what it ended with."""
+        """Start ended episodes again at once. Return the infos of the starts, with the last observations and
+        infos as "final_obs" and "final_info".
+
+        Args:
+            final: infos of the step.
+            done: True for environments that ended an episode, shape (num_envs,).
+        """
+        # Objects, as Gymnasium gives final observations: None for the other environments.
         last = np.full(self.num_envs, None, dtype=object)
         for env in np.flatnonzero(done):
             last[env] = self.batch.observations[env].copy()
@@ -196,23 +222,25 @@ class HorseLegVectorEnv(  # type: ignore[misc]  # generators are of all
         return infos | {"final_info": final, "_final_info": done.copy()}
 
     def render(self) -> tuple[NDArray[np.uint8], ...] | None:
-        """A frame of each environment, (H, W, 3) uint8: those that are drawn, then black ones."""
+        """Return a picture of each environment, uint8 of shape (H, W, 3): those that are drawn, then black
+        ones; warn and return None without a render_mode."""
         if self.render_mode is None:
             gym.logger.warn("render() was called without a render_mode: pass render_mode='rgb_array'")
             return None
         self._check_started("render")
         fps = self.metadata["render_fps"]
         frames = [self._watched[env].frame("rgb_array", fps) for env in range(self.drawn)]
+        # One pixel with strides of 0: a million black pictures need no memory.
         black = np.broadcast_to(np.uint8(0), frames[0].shape)
         return (*frames, *[black] * (self.num_envs - len(frames)))
 
     def close_extras(self, **kwargs: Any) -> None:
-        """Give the renderers back."""
+        """Close the renderers; `VectorEnv.close` calls this."""
         self._phase = "closed"
         for recording in self._watched.values():
             recording.close()
 
-    # What one may ask of each
+    # Values of each environment
 
     @property
     def weight(self) -> Floats:
@@ -220,8 +248,8 @@ class HorseLegVectorEnv(  # type: ignore[misc]  # generators are of all
         return self.batch.episode_rows.weight[: self.num_envs].copy()
 
     def record(self, env: int = 0) -> dict[str, Floats]:
-        """State and report of an environment at every substep of the last control step, see
-        `HorseLegEnv.record`. From the first call on its substeps are kept, which takes time in every step.
+        """Return state and report of an environment at every substep of the last control step, see
+        `HorseLegEnv.record`. The first call switches its recording on, which takes time in every step.
 
         Raises:
             ResetNeeded: an environment has no episode yet.
@@ -233,12 +261,13 @@ class HorseLegVectorEnv(  # type: ignore[misc]  # generators are of all
             self._watched[env] = Recording(self.batch, env)
         return self._watched[env].last()
 
-    # Parts of it
+    # Parts of reset and step
 
     def _start(self, envs: NDArray[np.int64], options: Mapping[str, Any]) -> dict[str, Any]:
-        """Start episodes; the parameters that were set or drawn for them, by name."""
+        """Start episodes; return the parameters that were set or drawn for them, by name."""
         parameters = self.batch.reset(envs, [self._generators[env] for env in envs], options)
         self._started[envs] = True
+        # Steps are refused until every environment has had a first episode.
         if self._phase == "new" and self._started.all():
             self._phase = "running"
         if self._watched:
@@ -247,17 +276,20 @@ class HorseLegVectorEnv(  # type: ignore[misc]  # generators are of all
         return parameters
 
     def _remember(self) -> None:
+        """Add the step to the recordings."""
         for env, recording in self._watched.items():
-            if not self._ended[env]:  # else it has just begun
+            if not self._ended[env]:  # else it has just started, and `_start` began its recording
                 recording.add()
 
     def _observed(self) -> NDArray[np.float32]:
+        """Return the observations, a copy that later steps do not change."""
         return self.batch.observations[: self.num_envs].copy()
 
     # State
 
     def get_state(self) -> dict[str, Any]:
-        """Everything that changes, generators included: continuing from it is bit-identical.
+        """Return everything that changes, generators included: episodes that continue from it have the same
+        bits.
 
         Raises:
             ResetNeeded: there are no episodes yet.
@@ -266,8 +298,8 @@ class HorseLegVectorEnv(  # type: ignore[misc]  # generators are of all
         return {**self._state_of_batch(), "ended": self._ended.copy(), "generator": generators}
 
     def set_state(self, state: Mapping[str, Any]) -> NDArray[np.float32]:
-        """Put back what `get_state` gave, here or of a single environment, which then goes on in every row:
-        many actions can be tried from one state. Returns the observations there.
+        """Restore a state of `get_state`; return the observations. With a state of a single environment every
+        row continues from it, so that many actions can be tried from one state.
 
         Raises:
             ParameterError: a state of another id, geometry, setting or number of environments.
@@ -287,6 +319,7 @@ class HorseLegVectorEnv(  # type: ignore[misc]  # generators are of all
             raise ParameterError(f"state: expected one of {n} environments, got one of {ended.size}")
         if not isinstance(states, (list, tuple)) or len(states) != n:
             raise ParameterError(f"state['generator']: expected a list of {n}, got {states!r:.60}")
+        # The last checks: nothing has changed until here.
         generators = [generator_of(values) for values in states]
         set_state(self.batch, state)
         self._ended = ended

@@ -1,4 +1,4 @@
-"""Checks of what callers give to vector environments."""
+"""Checks of the arguments of vector environments."""
 
 from __future__ import annotations
 
@@ -11,14 +11,20 @@ from hoof_env.envs.base import array_of
 from hoof_env.errors import ParameterError, count
 
 MOST_DRAWN = 16
-"""Environments that are drawn by default, at most; a picture takes as long as some hundred steps."""
+"""Largest number of environments that are drawn by default; a picture takes as long as some hundred steps."""
 
 
 def check_drawn(rendered: Any, n: int, render_mode: str | None) -> int:
-    """Return how many of n environments are drawn.
+    """Return the number of environments that are drawn.
+
+    Args:
+        rendered: argument of `HorseLegVectorEnv`.
+        n: number of environments.
+        render_mode: render mode.
 
     Raises:
-        ParameterError: more than there are, some without a render_mode, or a number is needed.
+        ParameterError: more environments than there are, a number without a render_mode, or no number for
+            more than `MOST_DRAWN` environments.
     """
     if render_mode is None:
         if rendered is not None:
@@ -36,10 +42,10 @@ def check_drawn(rendered: Any, n: int, render_mode: str | None) -> int:
 
 
 def check_mask(given: Any, n: int) -> NDArray[np.bool_]:
-    """Return the reset option "reset_mask", shape (n,); None is all.
+    """Return the reset option "reset_mask" of n environments, shape (n,); None stands for all.
 
     Raises:
-        ParameterError: no bool array of that shape, or one without a True.
+        ParameterError: not a bool array of that shape, or one without a True.
     """
     if given is None:
         return np.ones(n, bool)
@@ -54,20 +60,22 @@ def check_mask(given: Any, n: int) -> NDArray[np.bool_]:
 
 
 def check_actions(actions: Any, shape: tuple[int, int]) -> NDArray[np.float32]:
-    """Return actions as float32.
+    """Convert actions to float32.
 
     Raises:
         ParameterError: another shape or type, or numbers that are not finite.
     """
-    given = array_of(actions)
-    if given.dtype.kind not in "fiu" or given.shape != shape:
+    array = array_of(actions)
+    if array.dtype.kind not in "fiu" or array.shape != shape:
         raise ParameterError(
             f"actions: expected finite numbers in [-1, 1], shape {shape}, "
-            f"got {given.dtype} of shape {given.shape}"
+            f"got {array.dtype} of shape {array.shape}"
         )
-    with np.errstate(over="ignore"):  # to infinity, which is refused
-        given = given.astype(np.float32, copy=False)
-    if not np.isfinite(given).all():
-        rows = np.flatnonzero(~np.isfinite(given).all(1)).tolist()
+    # Too large numbers become infinite in float32, which is refused below.
+    with np.errstate(over="ignore"):
+        array = array.astype(np.float32, copy=False)
+    # The kernel checks, too, but does not know which rows are wrong.
+    if not np.isfinite(array).all():
+        rows = np.flatnonzero(~np.isfinite(array).all(1)).tolist()
         raise ParameterError(f"actions: expected finite numbers in [-1, 1], got others in rows {rows[:8]}")
-    return given
+    return array

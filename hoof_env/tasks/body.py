@@ -1,7 +1,7 @@
-"""Interface of what carries legs: one leg under a trunk (`one_leg.OneLeg`), or a horse (`horse.Horse`).
+"""Interface of bodies: one leg under a trunk (`one_leg.OneLeg`), or a horse (`horse.Horse`).
 
-Environments know bodies by this interface alone. A body says what actions mean, where episodes start, which
-engine moves it, and which functions its kernels have.
+Environments know bodies by this interface alone. A body defines the meaning of actions, the starts of
+episodes, the parts of its engine, and its own functions in the kernels.
 """
 
 from __future__ import annotations
@@ -24,18 +24,19 @@ Floats = NDArray[np.float64]
 
 
 class BodyKernels(NamedTuple):
-    """Parts of the kernels of a step that are a body's own; kernels of equal ones are shared.
+    """Parts of the kernels of a step that are a body's own. Bodies with equal parts share their kernels.
 
     Attributes:
         legs: number of legs.
-        episode: layout of an episode's memory, `episode.Episode` or one with more fields.
-        task_fields: further fields of the task's record, as of a NumPy record type.
-        scratch_size: numbers of scratch memory that `command` needs for each row.
+        episode: layout of an episode's memory, `episode.Episode` or a subclass with more fields.
+        task_fields: further fields of the task's record, in the form that `numpy.dtype` takes.
+        scratch_size: size of the scratch memory that `command` needs for each row, in numbers.
         command: inlined function of task, actions, episode, first leg, number of gait parameters, row n and
             scratch memory, which turns the actions of row n into commands.
         on_switch: inlined function of task, episode and the mask of rows in which another speed is commanded.
     """
 
+    # Functions and plain values only: kernels are kept under the hash of this tuple.
     legs: int
     episode: Any
     task_fields: tuple[Any, ...]
@@ -45,23 +46,24 @@ class BodyKernels(NamedTuple):
 
 
 class Body(Protocol):
-    """A trunk on one leg or several.
+    """Trunk on one leg or several.
 
     Attributes:
-        kernels: see `BodyKernels`.
-        leg_prefixes: what stands before a quantity's name for each leg, "" for a single leg.
-        geometry: of a leg.
+        kernels: parts of the kernels of a step, see `BodyKernels`.
+        leg_prefixes: prefix of a quantity's name for each leg, "" for a single leg.
+        geometry: geometry of a leg; all legs have the same linkage.
         height: nominal height of the trunk [m].
         hips: crank centres on the trunk by the names of the legs [m]; empty where O is the trunk's place.
         gaits: gaits by name.
         harmonics, filters, limits, step_error: arguments of the engine.
         command_step: largest change from one commanded speed to the next [m/s].
-        start_names, gait_names: names of what infos say of an episode's start.
+        start_names, gait_names: names of the numbers with which infos describe an episode's start.
         action_names: names of the actions, leg after leg.
-        action_form: tag of what actions mean, "rates" or "offsets".
-        finite_fields: fields of the episode's memory that must be finite in a state, beside the weight.
+        action_form: tag of the meaning of actions, "rates" or "offsets".
+        finite_fields: fields of the episode's memory that must be finite in a state; the weight always must.
     """
 
+    # Fixed when a body is made: settings that change later (`conditions.CHANGEABLE`) do not affect them.
     kernels: BodyKernels
     leg_prefixes: tuple[str, ...]
     geometry: Geometry
@@ -84,13 +86,13 @@ class Body(Protocol):
         """Names of the scripted policies."""
 
     def parts(self, s: Settings) -> tuple[Trunk, Ground, tuple[Limb, ...]]:
-        """Make trunk, ground and legs of some settings."""
+        """Make trunk, ground and legs from settings of `parameters.resolved`."""
 
     def commanded_speeds(self, s: Settings) -> tuple[float, float] | None:
         """Return the lowest and highest commanded speed [m/s]; None if no speed is commanded."""
 
     def constants(self, engine: TrunkEngine, dt: float) -> dict[str, Any]:
-        """Return the body's part of the task's record, for a control step of `dt` [s]."""
+        """Return the body's part of the task's record by field, for a control step of `dt` [s]."""
 
     def check_options(self, options: Any, trunk: Trunk, settings: Settings) -> dict[str, Any]:
         """Check reset options; return them with numbers and gaits converted.
@@ -102,17 +104,17 @@ class Body(Protocol):
     def draw(
         self, options: Mapping[str, Any], generators: Sequence[np.random.Generator], engine: TrunkEngine
     ) -> Start:
-        """Draw starts of episodes, one for each generator."""
+        """Draw starts of episodes, one for each generator, except for values that the options set."""
 
     def complete_start(
         self, start: Start, targets: Floats, options: Mapping[str, Any], engine: TrunkEngine
     ) -> None:
-        """Complete starts with what depends on the commanded speeds [m/s]."""
+        """Complete starts with values that depend on the commanded speeds [m/s], shape (n,)."""
 
     def begin_episodes(
         self, episode: Mapping[str, Any] | Any, which: NDArray[np.int64], start: Start
     ) -> None:
-        """Write the body's own fields of the episodes' memory."""
+        """Write the body's own fields of the episodes' memory, in the rows `which`."""
 
     def action_for(self, gaits: Any, engine: TrunkEngine, dt: float) -> NDArray[np.float32]:
-        """Return the actions that go towards gaits, see `LegBase.action_for`."""
+        """Return the actions that move towards gaits, see `LegBase.action_for`."""

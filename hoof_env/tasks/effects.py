@@ -1,4 +1,4 @@
-"""Check of settings that have no effect with the others."""
+"""Check for settings that have no effect in combination with the others."""
 
 from __future__ import annotations
 
@@ -10,8 +10,17 @@ from hoof_env.tasks.settings import NEEDED, Settings
 
 
 def check_effect(name: str, settings: Settings, within: str = "") -> None:
-    """Raise `ParameterError` where a setting that somebody names, perhaps `within` another argument or
-    option, has no effect beside the others."""
+    """Check that a setting has an effect in combination with the others.
+
+    Args:
+        name: name of the setting.
+        settings: all settings, this one included.
+        within: argument or option that contains the setting, for the message; "" for none.
+
+    Raises:
+        ParameterError: the setting has no effect.
+    """
+    # Not in `NEEDED`, which has lists of values: here any number disables the laws that the settings are for.
     if name in ("friction_law", "friction_slow", "friction_fast") and settings.hoof_stiffness is not None:
         named = f"{within}: {name!r}" if within else name
         raise ParameterError(
@@ -19,19 +28,20 @@ def check_effect(name: str, settings: Settings, within: str = "") -> None:
             f"hoof_stiffness={settings.hoof_stiffness!r}"
         )
     needed, values = NEEDED.get(name, ("", ()))
-    given: Any = getattr(settings, needed, None)
-    if needed and (given not in values if values else _is_one(given)):
+    present: Any = getattr(settings, needed, None)
+    if needed and (present not in values if values else _is_one(present)):
         good = " or ".join(f"{needed}={value!r}" for value in values) or f"a range of {needed}"
         named = f"{within}: {name!r}" if within else name
-        if needed == "trunk" and "free" in (given, *values):  # which no argument changes
-            who = "a horse" if given == "free" else "one leg"
-            raise ParameterError(f"{named}: expected none of {who}, where it has no effect")
+        # The trunk is part of the task: the message cannot ask for another one.
+        if needed == "trunk" and "free" in (present, *values):
+            body = "a horse" if present == "free" else "one leg"
+            raise ParameterError(f"{named}: expected none of {body}, where it has no effect")
         raise ParameterError(
-            f"{named}: expected {good} beside it, without which it has no effect, got {needed}={given!r}"
+            f"{named}: expected {good} beside it, without which it has no effect, got {needed}={present!r}"
         )
 
 
-def _is_one(given: Any) -> bool:
-    """Whether nothing can be drawn: no range, or one whose ends are the same."""
-    ends = tuple(given) if isinstance(given, Iterable) else (given, given)
+def _is_one(value: Any) -> bool:
+    """True if nothing can be drawn: `value` is a single number or None, or a range with equal ends."""
+    ends = tuple(value) if isinstance(value, Iterable) else (value, value)
     return len(ends) == 2 and bool(ends[0] == ends[1])

@@ -1,5 +1,5 @@
-"""What an episode keeps between its steps, and what does not change in it: rows of memory and a record, both
-read and written by the kernels of `step`."""
+"""Memory of an episode, which changes from step to step, and record of a task's constants. The kernels of
+`envs.step` read both and write the first."""
 
 from __future__ import annotations
 
@@ -15,41 +15,50 @@ from hoof_env.simd.layout import Block, Constants, Layout, Row, Size
 from hoof_env.tasks.reward import TERMS
 
 ACTIONS = len(PARAMETERS)
-"""Of a leg."""
+"""Number of actions of one leg."""
 
 FAILED = 1
 TRUNCATED = 2
-"""How an episode ended, in the place of 0."""
+"""Values of `Episode.ended` at the end of an episode."""
 
 ACTION = Size("action", ACTIONS)
 REWARD = Size("reward", len(TERMS))
 
 
 class Episode(Layout):
-    """Memory of an episode."""
+    """Memory of an episode. Units are in the comments."""
 
+    # Saved states hold these rows: with another row, or another order, older states are not readable.
     steps: Row  # control steps so far
     allowance: Row  # impulse over the weight that bearing is still paid for [s], see `reward.BEARING`
     x_before: Row  # x of the trunk before this step [m]
     target: Row  # commanded speed [m/s]; infinite if there is none
-    weight: Row  # of trunk and leg [N]
-    time: Row  # simulated [s]
-    distance: Row  # forward [m]
-    sums: StrideSums  # of all legs and steps so far
-    terms: Annotated[Block, REWARD]  # of the last reward
+    weight: Row  # weight of trunk and leg [N]
+    time: Row  # simulated time [s]
+    distance: Row  # forward travel [m]
+    sums: StrideSums  # sums over all legs and steps so far
+    terms: Annotated[Block, REWARD]  # terms of the last reward
     ended: Row  # 0, `FAILED` or `TRUNCATED`
-    switch: Row  # the control step after which another speed is commanded
-    next_target: Row  # and which [m/s]
+    switch: Row  # control step after which another speed is commanded
+    next_target: Row  # that speed [m/s]
 
 
 @cache
 def episode_layout(layout: Any, terms: int, features: Features = PLAIN, legs: int = 1) -> Any:
-    """Return the layout of an episode's memory, `Episode` or one with more fields, sized for a number of
-    terms and legs and an engine with these features."""
+    """Return the layout of an episode's memory, sized for an engine.
+
+    Args:
+        layout: `Episode` or a subclass with more fields.
+        terms: number of the reward's terms.
+        features: features of the engine.
+        legs: number of legs.
+    """
     return features.of(layout).sized(action=legs * ACTIONS, reward=terms)
 
 
 class _Memories(NamedTuple):
+    """Fields of `Memories`."""
+
     episode: Any
     trunk: Any
     leg: Any
@@ -63,9 +72,18 @@ class _Memories(NamedTuple):
 
 
 class Memories(Constants, _Memories):
-    """Layouts of what a step works on, how many rows the trunk's has, how many legs there are and how many
-    gait parameters each has, whether the engine has limits, the layout of `StrideSums`, how many there are
-    and which of these are peaks."""
+    """Layouts of the memory that a step works on, constants of its kernels.
+
+    Attributes:
+        episode, trunk, leg: layouts of the memory of episode, trunk and leg.
+        trunk_rows: number of rows of the trunk's memory.
+        legs: number of legs.
+        gait: number of gait parameters of a leg.
+        has_limits: True if the engine has limits.
+        stride_sums: layout of `StrideSums`.
+        sums: number of stride sums.
+        peaks: bit mask of the stride sums that are peaks.
+    """
 
 
 @cache
@@ -73,26 +91,51 @@ def memories_of(layout: Any, terms: int, features: Features, legs: int = 1) -> M
     """Return the layouts of an engine with these features and of episodes with a number of terms and legs."""
     form = engine_layout(features)
     return Memories(
-        episode_layout(layout, terms, features, legs), form.trunk_memory, form.leg_memory,
-        form.trunk_rows, legs, form.gait, form.has_limits, features.of(StrideSums), form.sums, PEAKS,
-    )  # fmt: skip
+        episode=episode_layout(layout, terms, features, legs),
+        trunk=form.trunk_memory,
+        leg=form.leg_memory,
+        trunk_rows=form.trunk_rows,
+        legs=legs,
+        gait=form.gait,
+        has_limits=form.has_limits,
+        stride_sums=features.of(StrideSums),
+        sums=form.sums,
+        peaks=PEAKS,
+    )
 
 
 def task_type(terms: int, entries: int, gait: int = ACTIONS, more: tuple[Any, ...] = ()) -> np.dtype[Any]:
-    """Return the record type of a task's constants, with `more` fields of the body's own."""
+    """Return the record type of a task's constants.
+
+    Args:
+        terms: number of the reward's terms.
+        entries: number of slots of the observation, see `envs.observation_kernel.slots_of`.
+        gait: number of gait parameters of a leg.
+        more: further fields of the body's own.
+    """
     return np.dtype(
         [
-            ("reach", "f8", (gait,)), ("lead", "f8"),  # of an action of 1; of a command [s]
-            ("half", "f8", (gait,)),  # of a range
-            ("low", "f8", (gait,)), ("high", "f8", (gait,)),  # within these
-            ("middle", "f8", (gait,)), ("rate_bound", "f8", (gait,)),  # (value - middle) / half is observed
-            ("weights", "f8", (terms,)), ("episode_seconds", "f8"),  # of the reward
-            ("h", "f8"), ("substeps", "i8"), ("dt", "f8"), ("episode_steps", "i8"),
-            ("height", "f8"), ("lowest", "f8"), ("highest", "f8"),  # of the trunk: nominal and extreme [m]
-            ("stays", "?"),  # a fixed trunk
+            ("reach", "f8", (gait,)),  # distance at which an action of 1 puts the command, see `OneLeg.reach`
+            ("lead", "f8"),  # time by which a command is ahead of the gait [s], see `one_leg.lead_of`
+            ("half", "f8", (gait,)),  # half range of a parameter, for a horse span of an action
+            ("low", "f8", (gait,)),  # lowest command
+            ("high", "f8", (gait,)),  # highest command
+            ("middle", "f8", (gait,)),  # middle of the range: (value - middle) / half is observed
+            ("rate_bound", "f8", (gait,)),  # largest rate of a parameter, by which its rate is scaled
+            ("weights", "f8", (terms,)),  # weights of the reward's terms
+            ("episode_seconds", "f8"),
+            ("h", "f8"),  # substep [s]
+            ("substeps", "i8"),  # substeps of a control step
+            ("dt", "f8"),  # control step [s]
+            ("episode_steps", "i8"),  # control steps after which an episode is truncated
+            ("height", "f8"),  # nominal height of the trunk [m]
+            ("lowest", "f8"),  # height of the trunk at or below which an episode fails [m]
+            ("highest", "f8"),  # height of the trunk at or above which an episode fails [m]
+            ("stays", "?"),  # True for a fixed trunk
             ("observation_size", "i8"),
-            ("observation_columns", "i8", (entries,)),  # of the observation; -1: not observed
+            ("observation_columns", "i8", (entries,)),  # column of the entry in each slot; -1: not observed
             *more,
         ],
+        # The kernels read every field with one aligned load.
         align=True,
-    )  # fmt: skip
+    )

@@ -1,14 +1,14 @@
-"""The body of `Horse-v0`: a trunk on four legs, in the plane. `one_leg` is the other body there is.
+"""Body of `Horse-v0`: a trunk on four legs, in the plane. The other body is in `one_leg`.
 
-A horse of 475 kg, its hips 1.4 m high. The legs are the linkage of the preset, scaled, with the segment
-masses of Buchner and others (1997, see `leg.limb_masses`); springs of 24 kN/m at toe and heel give a limb
-the stiffness of a horse's distal spring: 127 mm under 12.8 N/kg (McGuigan & Wilson 2003). Radius of gyration
-and hips are assumed: the leg stands half a metre behind its crank centre, so that the fore feet are half a
-metre before the trunk's centre and the hind feet 0.7 m behind.
+The horse has a mass of 475 kg and its hips are 1.4 m high. Its legs are the linkage of the preset, scaled,
+with the segment masses of Buchner and others (1997, see `leg.limb_masses`). Springs of 24 kN/m at toe and
+heel give a limb the stiffness of a horse's distal spring: 127 mm under 12.8 N/kg (McGuigan & Wilson 2003).
+Radius of gyration and hips are assumed: the leg stands half a metre behind its crank centre, so that the fore
+feet are half a metre before the trunk's centre and the hind feet 0.7 m behind.
 
-A `size` other than 1 is a similar animal, with its motors and the filters of its commands: lengths go with
-it, masses with its cube, stiffnesses with its square, speeds and times with its root, and all else by its
-dimension. The ground's stiffness and the time steps are the world's and stay.
+A `size` other than 1 is a similar animal, motors and command filters included: lengths are proportional to
+the size, masses to its cube, stiffnesses to its square, speeds and times to its root, and all other
+quantities follow from their dimension. The ground's stiffness and the time steps do not scale.
 """
 
 from __future__ import annotations
@@ -71,52 +71,59 @@ HIP_HEIGHT = 1.4  # [m]
 MASS = 475.0  # [kg]
 GYRATION = 0.5  # radius of gyration of the trunk about its centre [m]
 HIPS = {"fore": 1.0, "hind": -0.2}  # crank centres, forward from the trunk's centre [m]
-STAND = -0.5  # of a hoof from its crank centre, in the middle of a stance [m]
+STAND = -0.5  # x of a hoof from its crank centre, in the middle of a stance [m]
 PITCH = 0.5
 HEIGHT = (0.75, 1.8)
 CLEARANCE = 0.02
-"""Where it has fallen: +-pitch [rad], heights of the trunk [m], of a joint over the ground [m]."""
-GAP = 0.005  # between the lowest rigid hoof and the ground at a start [m]
-HOOF_STIFFNESS = 24000.0  # of a horse of size 1, by default [N/m]
-SAG = MASS * GRAVITY / (4 * HOOF_STIFFNESS)  # of two legs that bear the weight [m]
+"""Limits beyond which a horse has fallen: +-pitch [rad], lowest and highest trunk [m], lowest joint over the
+ground [m]."""
+GAP = 0.005  # clearance of the lowest rigid hoof at a start [m]
+HOOF_STIFFNESS = 24000.0  # default for a horse of size 1 [N/m]
+# Two legs with two hoof points each bear the weight.
+SAG = MASS * GRAVITY / (4 * HOOF_STIFFNESS)  # compression of the springs at a start [m]
 DEFAULT_MOTION: dict[str, Any] = {"vx": 1.0, "vy": 0.0, "pitch": 0.0, "pitch_rate": 0.0}
-"""How a trunk starts in a gait that is not a reference gait."""
+"""Motion of the trunk at a start in a gait that is not a reference gait, scaled as by `trunk_motion`."""
 
 SPANS = (0.03, 0.04, 0.04, 0.04)
-"""What actions of 1 change after a while: of the crank's speed [-], of the swing's offset, sine and cosine
-[rad]."""
+"""Changes under a constant action of 1: of the crank's speed [-], of the swing's offset, sine and cosine
+coefficient [rad]."""
 
 STEP_ERROR = 0.03
-"""With 0.01 semi-implicit Euler would take three steps for a millisecond; speeds, peaks and duty factors of
-the reference gaits are the same to a hundredth."""
+"""Error after a contact for which the engine chooses its step [-]. With 0.01 semi-implicit Euler would take
+three steps for a millisecond; speeds, peaks and duty factors of the reference gaits are the same to a
+hundredth."""
 
-FILTERS = {"quick": QUICK, "slow": FilterSettings()}  # of commands, by the setting `filters`
+FILTERS = {"quick": QUICK, "slow": FilterSettings()}  # command filters, by the setting `filters`
 
 LEG_ONLY_SETTINGS = "trunk", "hip_height", "solver"
-"""Settings of which a horse takes nothing but the default."""
+"""Settings of which a horse accepts only the default."""
 
 OPTIONS = {
-    "phase": (-1e6, 1e6), "speed": (-20.0, 20.0), "pitch": (-0.4, 0.4), "x": (-1e5, 1e5),
+    "phase": (-1e6, 1e6),
+    "speed": (-20.0, 20.0),
+    "pitch": (-0.4, 0.4),
+    "x": (-1e5, 1e5),
     "target_speed": (0.1, 20.0),
-}  # fmt: skip
+}
 """Numeric reset options and their ranges [strides, m/s, rad, m, m/s]; "gait" and "parameters" are the
 others."""
 
 COMMAND_STEP = 0.5
-"""From one commanded speed to the next at most [m/s]: the reference gait changes at once with the command,
-and after larger changes horses fall, see docs/evidence/horse.md."""
+"""Largest change from one commanded speed to the next [m/s]: the reference gait changes at once with the
+command, and after larger changes horses fall, see docs/evidence/horse.md."""
 
 SPEED_SPREAD = 0.1
 PITCH_SPREAD = 0.02
 PHASE_SPREAD = 0.02
-"""How far starts are from the gait: of the commanded speed [-], pitch [rad], each crank [strides]."""
+"""Largest deviations of a start from its gait: of the speed over the commanded one [-], of the pitch [rad],
+of each crank [strides]."""
 
 
 class HorseEpisode(Episode):
     """Memory of an episode of a horse."""
 
-    gait: GaitRows  # around which its actions lie
-    offset: Annotated[Block, ACTION]  # what actions have made of it so far, 1 is the whole span
+    gait: GaitRows  # gait from which actions make offsets
+    offset: Annotated[Block, ACTION]  # offsets that actions have made so far, in units of `SPANS`
 
 
 HORSE_KERNELS = BodyKernels(
@@ -133,17 +140,17 @@ POLICIES = ("reference", "random", "bang-bang")
 
 
 class Horse:
-    """Four legs on a free trunk.
+    """Four legs on a free trunk, see `body.Body`.
 
     Attributes:
-        size, speed_scale: its length over that of a horse of 475 kg, and its speed likewise [-].
-        gaits: that were found, as an animal of this size has them, by name.
-        gait: around which actions lie whatever speed is commanded; None for those of `reference_gaits`.
-        hips: places of the crank centres on the trunk [m], by leg.
-        harmonics, filters, limits, step_error: of the engine.
-        command_step: from one commanded speed to the next at most [m/s].
-        start_names, gait_names: of what an episode starts with.
-        action_names: of its actions, leg after leg.
+        size: length over that of a horse of 475 kg [-].
+        speed_scale: speed over that of a horse of 475 kg, the root of the size [-].
+        gaits: stored gaits by name, converted to the size of the animal.
+        gait: gait from which actions make offsets at all commanded speeds; None for `reference_gaits`.
+        lowest, highest: heights of the trunk beyond which the animal has fallen [m].
+
+    Raises:
+        ParameterError: a setting is out of range, or one that a horse does not accept.
     """
 
     kernels = HORSE_KERNELS
@@ -181,15 +188,17 @@ class Horse:
         self.command_step = COMMAND_STEP * self.speed_scale
         self.lowest, self.highest = (self.size * height for height in HEIGHT)
         spring = self._spring(s)
+        # A start sags in proportion to it; 0 stands for rigid hooves.
         self._softness = 0.0 if spring is None else HOOF_STIFFNESS * self.size**2 / spring.stiffness
         self.limits: Limits | None = Limits(
             (-PITCH, PITCH), (self.lowest, self.highest), CLEARANCE * self.size
         )
 
     def parts(self, s: Settings) -> tuple[Trunk, Ground, tuple[Limb, ...]]:
-        """Trunk, ground and legs of some settings."""
+        """Make trunk, ground and legs from settings, see `Body.parts`."""
         size = self.size
         mass = check_number("trunk_mass", s.trunk_mass, low=0, exclusive_low=True) * size**3
+        # The legs keep their masses: `trunk_mass` is that of the trunk alone, which a reset may draw.
         inertia = mass * (GYRATION * size) ** 2
         trunk = Trunk("free", mass, drag=0.0, height=self.height, pitch_inertia=inertia)
         drive = self._drive(s)
@@ -205,13 +214,16 @@ class Horse:
         size = self.size
         if not isinstance(drive, Motor):
             return drive
+        # Torque is weight times length, inertia mass times length squared, a gain torque times time.
         return replace(
-            drive, speed_gain=drive.speed_gain * size**4.5, torque_limit=drive.torque_limit * size**4,
+            drive,
+            speed_gain=drive.speed_gain * size**4.5,
+            torque_limit=drive.torque_limit * size**4,
             rotor_inertia=drive.rotor_inertia * size**5,
-        )  # fmt: skip
+        )
 
     def _ground(self, s: Settings, mass: float) -> Ground:
-        """The world's ground; only the speeds below which its laws are softened are the animal's."""
+        """Make the ground: only the threshold speeds of its laws scale with the animal."""
         ground = ground_of(s, mass)
         names = "approach_floor", "friction_slow", "friction_fast"
         return replace(ground, **{name: self.speed_scale * getattr(ground, name) for name in names})
@@ -228,29 +240,40 @@ class Horse:
             damping = HoofSpring.with_ratio(stiffness, MASS / COUNT).damping
         else:
             damping = check_number("hoof_damping", s.hoof_damping, low=0, exclusive_low=True)
+        # Damping is stiffness times time.
         return HoofSpring(stiffness * self.size**2, damping * self.size**2.5)
 
     def commanded_speeds(self, s: Settings) -> tuple[float, float]:
-        """Lowest and highest commanded speed [m/s]."""
+        """Return the lowest and highest commanded speed [m/s]."""
         return check_range("target_speed", s.target_speed, 0.1)
 
     def constants(self, engine: TrunkEngine, dt: float) -> dict[str, Any]:
-        """Of the task's record: spans of actions and bounds of commands."""
+        """Return the body's part of the task's record: spans of actions, bounds of commands, and the
+        reference gaits."""
         gait = 2 + 2 * self.harmonics
         low, high = np.transpose([*list(WIDEST.values())[:4], *[WIDEST["higher"]] * (gait - 4)])
         high[0] = rates(self.size)[1]
         half = np.zeros(gait)
         half[:ACTED] = SPANS
         return {
-            "half": half, "low": low, "high": high, "height": self.height,
-            "lowest": -np.inf, "highest": np.inf,  # the engine's own limits end episodes
+            "half": half,
+            "low": low,
+            "high": high,
+            "height": self.height,
+            # The engine's own limits end episodes, see `Horse.limits`.
+            "lowest": -np.inf,
+            "highest": np.inf,
             **reference_constants(self.speed_scale, follows=self.gait is None),
-        }  # fmt: skip
+        }
 
     # Starts
 
     def check_options(self, options: Any, trunk: Trunk, settings: Settings) -> dict[str, Any]:
-        """Reset options with their values checked; `ParameterError` of others."""
+        """Check reset options; return them with numbers and gaits converted.
+
+        Raises:
+            ParameterError: an unknown option or a bad value.
+        """
         checked = checked_options(options, OPTIONS)
         if checked.get("gait") is not None:
             checked["gait"] = gait_numbers("options['gait']", checked["gait"], self.gaits, self.size)
@@ -259,52 +282,60 @@ class Horse:
     def draw(
         self, options: Mapping[str, Any], generators: Sequence[np.random.Generator], engine: TrunkEngine
     ) -> Start:
-        """Starts of episodes, one for each generator, but for what the options fix: in the stride of the gait
-        that `complete_start` takes, each crank, speed and pitch a little off."""
+        """Draw the phase of the stride, and small deviations of speed, pitch and cranks, one start for each
+        generator; `complete_start` adds them to the gait. Options replace drawn values."""
         n = len(generators)
+        # All numbers are drawn whatever the options are, so that an option does not change the others.
         drawn = np.array([generator.random(3 + COUNT) for generator in generators])
         off = 2 * drawn - 1
-        begun = {
-            "phase": drawn[:, 0], "speed": 1 + SPEED_SPREAD * off[:, 1], "pitch": PITCH_SPREAD * off[:, 2],
+        values = {
+            "phase": drawn[:, 0],
+            "speed": 1 + SPEED_SPREAD * off[:, 1],
+            "pitch": PITCH_SPREAD * off[:, 2],
             "x": np.zeros(n),
-        }  # fmt: skip
+        }
         if engine.terrain != FLAT:
-            begun["x"] = start_anywhere(engine.terrain, begun["x"], options, generators)
-        begun |= {name: np.full(n, options[name]) for name in begun if name in options}
+            values["x"] = start_anywhere(engine.terrain, values["x"], options, generators)
+        values |= {name: np.full(n, options[name]) for name in values if name in options}
         commands = np.zeros((COUNT, 2 + 2 * self.harmonics, n))
         theta = PHASE_SPREAD * off[:, 3:].T
-        return Start(begun, np.empty(0), commands, theta, {})
+        return Start(values, np.empty(0), commands, theta, {})
 
     def complete_start(
         self, start: Start, targets: Floats, options: Mapping[str, Any], engine: TrunkEngine
     ) -> None:
-        """Complete starts with the gaits of the commanded speeds [m/s]. In a reference gait the trunk moves
-        as it does in that, along the ground between its feet; in others it is as low as the springs of two
-        legs give under the weight."""
-        begun = start.values
-        own = options.get("gait")
-        start.gaits = self.reference(targets, own)
-        start.theta[:] = crank_angles(start.gaits, begun["phase"], start.theta)
+        """Complete starts with the gaits of the commanded speeds [m/s], shape (n,). In a reference gait the
+        trunk starts with the stored motion, along the ground between the feet. In other gaits it starts at
+        the height at which the springs of two legs bear the weight."""
+        values = start.values
+        option = options.get("gait")
+        start.gaits = self.reference(targets, option)
+        start.theta[:] = crank_angles(start.gaits, values["phase"], start.theta)
         start.commands[:] = commands_of(start.gaits, start.theta, start.commands.shape[1])
-        is_known = own is None and self.gait is None
-        motion = trunk_motion(targets / self.speed_scale, begun["phase"]) if is_known else DEFAULT_MOTION
-        slope = self._slope(engine.terrain, begun["x"])
+        is_known = option is None and self.gait is None
+        motion = trunk_motion(targets / self.speed_scale, values["phase"]) if is_known else DEFAULT_MOTION
+        slope = self._slope(engine.terrain, values["x"])
+        # Until here speed and pitch are deviations, see `draw`.
         if "speed" not in options:
-            begun["speed"] = begun["speed"] * targets * motion["vx"]
+            values["speed"] = values["speed"] * targets * motion["vx"]
         if "pitch" not in options:
-            begun["pitch"] = begun["pitch"] + motion["pitch"] + slope
-        x, y = self._hoofs(start, begun["pitch"], engine)
+            values["pitch"] = values["pitch"] + motion["pitch"] + slope
+        x, y = self._hoofs(start, values["pitch"], engine)
         hoof = (y * np.cos(slope) - x * np.sin(slope)).min((0, 1))
-        # of the lowest hoof over the slope; below it is what the springs have given
+        # Height of the lowest hoof over the slope; below it is the compression of the springs.
         lift = hoof + self.height * motion["y"] if is_known else np.full(len(hoof), -SAG * self.size)
+        # A rigid hoof starts above the ground: no contact begins inside it.
         lift = np.where(lift < 0, self._softness * lift, lift) + (0 if self._softness else GAP * self.size)
-        ground = engine.terrain.height_at(begun["x"] + x)
+        ground = engine.terrain.height_at(values["x"] + x)
         rate = start.gaits[:, 0]
         start.trunk = {
-            "x": begun["x"], "y": (ground - y).max((0, 1)) + lift / np.cos(slope), "vx": begun["speed"],
-            "vy": self.height * rate * motion["vy"] + begun["speed"] * np.tan(slope), "pitch": begun["pitch"],
+            "x": values["x"],
+            "y": (ground - y).max((0, 1)) + lift / np.cos(slope),
+            "vx": values["speed"],
+            "vy": self.height * rate * motion["vy"] + values["speed"] * np.tan(slope),
+            "pitch": values["pitch"],
             "pitch_rate": rate * motion["pitch_rate"],
-        }  # fmt: skip
+        }
 
     @property
     def policy_names(self) -> list[str]:
@@ -312,50 +343,55 @@ class Horse:
         return list(POLICIES)
 
     def begin_episodes(self, episode: Any, which: NDArray[np.int64], start: Start) -> None:
-        """Write the gaits around which actions lie, and offsets of 0."""
+        """Write the gaits from which actions make offsets, and offsets of 0."""
         episode.gait[:, which] = start.gaits.T
         episode.offset[:, which] = 0.0
 
     def _slope(self, terrain: Terrain, x: Floats) -> Floats:
-        """Of the ground from the hind feet to the fore feet of animals at `x` [rad]."""
+        """Return the slope of the ground between hind and fore feet of animals at `x` [rad], shape (n,)."""
         fore, hind = ((HIPS[pair] + STAND) * self.size for pair in ("fore", "hind"))
         return np.arctan2(terrain.height_at(x + fore) - terrain.height_at(x + hind), fore - hind)
 
     def _hoofs(self, start: Start, pitch: Floats, engine: TrunkEngine) -> tuple[Floats, Floats]:
-        """x and y of all toes and heels from the centre of trunks that pitch so [rad], in metres, shape
-        (4, 2, n) each."""
-        found = []
+        """Return x and y of all toes and heels relative to the trunk's centre [m], shape (4, 2, n) each, for
+        pitches [rad], shape (n,)."""
+        of_pairs = []
         n = len(pitch)
-        for k in range(0, COUNT, 2):  # the legs of a pair have one profile and one hip
+        # The legs of a pair have the same profile and hip: one call for both.
+        for k in range(0, COUNT, 2):
             gaits = np.concatenate(start.commands[k : k + 2], axis=1).T
             angles = start.theta[k : k + 2].ravel()
             turn = np.tile(pitch * self.geometry.travel, 2)
             points = hoof_points(engine.profiles[k], gaits, angles, turn)
             hip = engine.limbs[k].hip[0] * np.array([np.cos(pitch), np.sin(pitch)])
-            found.append([at + of.reshape(2, 2, n) for at, of in zip(hip, points, strict=True)])
-        x, y = np.array(found).transpose(1, 0, 3, 2, 4).reshape(2, COUNT, 2, n)
+            of_pairs.append([at + of.reshape(2, 2, n) for at, of in zip(hip, points, strict=True)])
+        x, y = np.array(of_pairs).transpose(1, 0, 3, 2, 4).reshape(2, COUNT, 2, n)
         return x, y
 
     # Gaits
 
     def reference(self, targets: Floats, given: Any = None) -> Floats:
-        """Numbers of the gaits around which actions lie at commanded speeds [m/s], shape (n, 16)."""
-        own = self.gait if given is None else given
-        if own is not None:
-            numbers = gait_numbers("gait", own, self.gaits, self.size)
+        """Return the numbers of the gaits from which actions make offsets at commanded speeds [m/s], shape
+        (n, 16): `given`, else `gait`, else the reference gaits."""
+        fixed = self.gait if given is None else given
+        if fixed is not None:
+            numbers = gait_numbers("gait", fixed, self.gaits, self.size)
             return np.array(np.broadcast_to(numbers, (len(targets), len(NAMES))))
-        found = reference_gaits(np.asarray(targets) / self.speed_scale)
-        found[:, 0] /= self.speed_scale
-        return found
+        # Stored for a horse of size 1: similar animals have the same gait at the same Froude number.
+        gaits = reference_gaits(np.asarray(targets) / self.speed_scale)
+        gaits[:, 0] /= self.speed_scale
+        return gaits
 
     def action_for(self, gait: Any, engine: TrunkEngine, dt: float) -> NoReturn:
-        """There is none: `ParameterError`."""
+        """Raise `ParameterError`: actions of a horse are offsets and do not move towards a gait."""
         raise ParameterError(
             "action_for: expected an environment of one leg; actions of a horse lie around a gait, zeros are"
             f" that gait, and the argument gait= makes it one of {', '.join(self.gaits)}"
         )
 
 
+# Kept, because `parts` is called for every drawn set of parameters.
 @cache
 def _limb(geometry: Geometry, pair: str, mass: float) -> Geometry:
+    """Return a leg with the segment masses of a fore or hind limb, for a mass of the animal [kg]."""
     return with_limb_masses(geometry, pair, mass)

@@ -1,10 +1,10 @@
-"""Gaits of a horse, and the commands that keep one up: the zero action of `Horse-v0`.
+"""Gaits of a horse, and the commands that maintain one: the zero action of `Horse-v0`.
 
-A gait has one rate of the crank for all legs, how far the fore pair is ahead of the hind pair, and for each
-pair the crank's speed and the leg's swing as harmonics of the crank's angle; left and right are half a stride
-apart. The speed within a stride is a function of the angle, not of time, and cranks that have fallen out of
-step are pulled back into it (Kuramoto 1984): each is sped up or slowed down with the sine of how far it is
-from the others, `COUPLING` of its speed at most.
+A gait has one rate of the crank for all legs, a lead of the fore pair over the hind pair, and for each pair
+the crank's speed and the leg's swing as harmonics of the crank's angle. Left and right are half a stride
+apart. The speed within a stride is a function of the angle, not of time. Cranks that are out of step are
+pulled back (Kuramoto 1984): the speed of each changes with the sine of its phase difference from the others,
+by the part `COUPLING` at most.
 """
 
 from __future__ import annotations
@@ -43,46 +43,52 @@ Floats = NDArray[np.float64]
 
 PAIRS = ("fore", "hind")
 LEGS = ("left_fore", "right_fore", "left_hind", "right_hind")
-"""In the order of an engine's limbs."""
+"""Names of the legs, in the order of an engine's limbs."""
 
 LIMITS = {
-    "speed_cos": (-0.6, 0.6), "speed_sin": (-0.6, 0.6), "swing_offset": WIDEST["swing_offset"],
-    "swing_sin": WIDEST["swing_sin"], "swing_cos": WIDEST["swing_cos"],
-    "swing_sin_2": WIDEST["higher"], "swing_cos_2": WIDEST["higher"],
-}  # fmt: skip
-"""Lowest and highest of each number of a pair: a harmonic of the crank's speed over its mean [-], and offset
-and two harmonics of the swing [rad]."""
+    # Below 1 / sqrt(2) each, so that the speed within a stride never changes its sign.
+    "speed_cos": (-0.6, 0.6),
+    "speed_sin": (-0.6, 0.6),
+    "swing_offset": WIDEST["swing_offset"],
+    "swing_sin": WIDEST["swing_sin"],
+    "swing_cos": WIDEST["swing_cos"],
+    "swing_sin_2": WIDEST["higher"],
+    "swing_cos_2": WIDEST["higher"],
+}
+"""Lowest and highest value of each number of a pair: a harmonic of the crank's speed over its mean [-], and
+offset and two harmonics of the swing [rad]."""
 
 PAIR = tuple(LIMITS)
-SWING = 5  # of these are the swing's
+SWING = 5  # number of these that are about the swing
 COUNT = len(LEGS)
 ACTED = 4  # actions of each leg
-SCRATCH_SIZE = 3 * COUNT  # numbers that `command_gait` needs room for
+SCRATCH_SIZE = 3 * COUNT  # numbers of scratch memory for `command_gait`: speed and phase of each leg
 NAMES = ("rate", "lead", *(f"{pair}_{name}" for pair in PAIRS for name in PAIR))
-"""Of the numbers of a gait, in their order."""
+"""Names of the numbers of a gait, in their order."""
 
 SIZES = 0.25, 2.0
-"""Smallest and largest horse over one of 475 kg [-]; the filters of a smaller one's commands would be too
-quick for the usual time step."""
+"""Smallest and largest length over that of a horse of 475 kg [-]; the command filters of a smaller one would
+be too fast for the usual time step."""
 SLOWEST = 0.1
 FASTEST = 6 * np.pi
-"""Rate of a gait, and a crank within a stride, of a horse of 475 kg [rad/s]."""
-LEADS = (-10.0, 10.0)  # of a gait [strides]
-COUPLING = 0.2  # most that falling out of step changes the speed of a crank [-]
+"""Lowest and highest rate of a gait, and highest speed of a crank within a stride, of a horse of 475 kg
+[rad/s]."""
+LEADS = (-10.0, 10.0)  # range of leads [strides]
+COUPLING = 0.2  # largest change of a crank's speed that is out of step [-]
 
 
 @dataclass(frozen=True)
 class HorseGait:
-    """A gait of a horse.
+    """Gait of a horse.
 
     Attributes:
-        rate: of the cranks of the animal that takes it, averaged over a stride [rad/s].
-        lead: how far the fore pair is ahead of the hind pair [strides]; whole strides do not count, and half
-            ones change left and right.
-        fore, hind: the numbers of a pair, in the order of `LIMITS`.
+        rate: mean speed of the cranks over a stride, for the size of the animal [rad/s].
+        lead: phase of the fore pair ahead of the hind pair [strides]; a whole stride changes nothing, half a
+            stride exchanges left and right.
+        fore, hind: numbers of a pair, in the order of `LIMITS`.
 
     Raises:
-        ParameterError: a number is not finite or outside its limits, or a pair has not seven.
+        ParameterError: a number is not finite or outside its limits, or a pair does not have seven.
     """
 
     rate: float
@@ -91,6 +97,7 @@ class HorseGait:
     hind: tuple[float, ...]
 
     def __post_init__(self) -> None:
+        # The size is not known here: any rate that some horse can take is accepted.
         check_number("rate", self.rate, low=rates(SIZES[1])[0], high=rates(SIZES[0])[1])
         check_number("lead", self.lead, low=LEADS[0], high=LEADS[1])
         for pair in PAIRS:
@@ -108,16 +115,16 @@ class HorseGait:
             object.__setattr__(self, pair, tuple(checked))
 
     def of_size(self, size: float) -> HorseGait:
-        """The similar gait of an animal so many times as long."""
+        """Return the similar gait of an animal that is `size` times as long."""
         return replace(self, rate=self.rate / math.sqrt(size))
 
     def to_array(self) -> Floats:
-        """The numbers in the order of `NAMES`, shape (16,)."""
+        """Return the numbers in the order of `NAMES`, shape (16,)."""
         return np.array([self.rate, self.lead, *self.fore, *self.hind])
 
     @classmethod
     def from_array(cls, values: Any) -> HorseGait:
-        """Inverse of `to_array`."""
+        """Make a gait from numbers in the order of `NAMES`, shape (16,)."""
         array = np.asarray(values, float)
         if array.shape != (len(NAMES),):
             raise ParameterError(f"gait of a horse: expected {len(NAMES)} numbers, got shape {array.shape}")
@@ -126,35 +133,45 @@ class HorseGait:
 
 
 def checked_size(given: float | None) -> float:
-    """The setting `size`, where None is 1; `ParameterError` of one outside `SIZES`."""
+    """Return the setting `size`, 1 for None; raise `ParameterError` for a size outside `SIZES`."""
     return check_number("size", 1.0 if given is None else given, low=SIZES[0], high=SIZES[1])
 
 
 def rates(size: float) -> tuple[float, float]:
-    """Lowest and highest rate of the gaits of a horse of some size [rad/s]."""
+    """Return the lowest and highest rate of gaits of a horse of some size [rad/s]."""
     return SLOWEST / math.sqrt(size), FASTEST / math.sqrt(size)
 
 
 def bounds(size: float = 1.0) -> Floats:
-    """Lowest and highest of each number of a gait of a horse of some size, shape (2, 16)."""
-    found: Floats = np.transpose([rates(size), LEADS, *[*LIMITS.values()] * len(PAIRS)])
-    return found
+    """Return the lowest and highest value of each number of a gait of a horse of some size, shape (2, 16)."""
+    limits: Floats = np.transpose([rates(size), LEADS, *[*LIMITS.values()] * len(PAIRS)])
+    return limits
 
 
 @cache
 def _data() -> dict[str, Any]:
+    """Read the stored gaits and reference gaits."""
     file = resources.files("hoof_env").joinpath("data", "horse", "gaits.json")
     return dict(json.loads(file.read_text(encoding="utf-8")))
 
 
 def horse_gaits() -> dict[str, HorseGait]:
-    """The gaits that were found for a horse of 475 kg, by name."""
+    """Return the stored gaits, which are for a horse of 475 kg, by name."""
     return {name: HorseGait.from_array(values) for name, values in _data()["gaits"].items()}
 
 
 def gait_numbers(name: str, given: Any, gaits: Mapping[str, HorseGait], size: float) -> Floats:
-    """The numbers of a gait of a horse of some size, from the name of one of `gaits`, a `HorseGait` or its
-    numbers; of many, shape (n, 16), from theirs. `ParameterError` from anything else."""
+    """Return the numbers of a gait, shape (16,), or of several, shape (n, 16).
+
+    Args:
+        name: name of the argument in messages.
+        given: name of one of `gaits`, a `HorseGait`, or numbers, shape (16,) or (n, 16).
+        gaits: known gaits by name.
+        size: size of the horse, on which the limits of the rate depend [-].
+
+    Raises:
+        ParameterError: an unknown name, another shape, or a number outside its limits.
+    """
     if isinstance(given, str):
         given = gaits[check_choice(name, given, gaits)]
     if isinstance(given, HorseGait):
@@ -180,52 +197,58 @@ def gait_numbers(name: str, given: Any, gaits: Mapping[str, HorseGait], size: fl
 
 @cache
 def _reference() -> tuple[Floats, Floats, Floats]:
-    """Speeds [m/s] of the stored reference gaits, shape (m,), those gaits, (m, 16), and how the trunk moves
-    in them, (m, 3, coefficients)."""
+    """Return the speeds [m/s] of the stored reference gaits, shape (m,), those gaits, (m, 16), and the motion
+    of the trunk in them, (m, 3, coefficients)."""
     stored = _data()["reference"]
     speeds, gaits, trunk = (np.array(stored[name]) for name in ("speeds", "gaits", "trunk"))
     return speeds, gaits, trunk
 
 
 def reference_type() -> list[Any]:
-    """What `refer_to_target` reads of a task's record: whether it is to, its speed scale, and the stored
-    speeds and gaits."""
+    """Return the fields of a task's record that `refer_to_target` reads: a flag that switches it on, the
+    speed scale, and the stored speeds and gaits."""
     n = len(_reference()[0])
     return [("follows", "?"), ("speed_scale", "f8"), ("speeds", "f8", (n,)), ("gaits", "f8", (n, len(NAMES)))]
 
 
 def reference_constants(speed_scale: float, follows: bool) -> dict[str, Any]:
-    """Their values for a horse whose speed is `speed_scale` times that of one of 475 kg."""
+    """Return values for the fields of `reference_type`, for a speed over that of a horse of 475 kg [-];
+    `follows` is True if the gait follows the commanded speed."""
     speeds, gaits, _ = _reference()
     return {"follows": follows, "speed_scale": speed_scale, "speeds": speeds, "gaits": gaits}
 
 
 def _mixed(speeds: Floats, values: Floats) -> Floats:
-    """Values that go with speeds [m/s], shape (n, ...), between those of the stored ones."""
+    """Interpolate values at the stored speeds, shape (m, ...), to other speeds [m/s]; shape (n, ...)."""
     stored = _reference()[0]
+    # Outside the stored speeds the value of the nearest one is taken.
     at = np.clip(speeds, stored[0], stored[-1])
     k = np.minimum(np.searchsorted(stored, at, "right"), len(stored) - 1)
     part = (at - stored[k - 1]) / (stored[k] - stored[k - 1])
     part = part.reshape(-1, *[1] * (values.ndim - 1))
-    found: Floats = (1 - part) * values[k - 1] + part * values[k]
-    return found
+    interpolated: Floats = (1 - part) * values[k - 1] + part * values[k]
+    return interpolated
 
 
 def reference_gaits(speeds: Floats) -> Floats:
-    """The gaits that go with speeds [m/s] of a horse of 475 kg, shape (n, 16): between those that are stored
-    they are mixed, beyond them the rate alone changes."""
+    """Return the reference gaits of a horse of 475 kg at speeds [m/s], shape (n, 16): interpolated between
+    the stored ones, and with a proportional rate beyond them."""
     stored, gaits, _ = _reference()
-    found = _mixed(speeds, gaits)
-    found[:, 0] *= speeds / np.clip(speeds, stored[0], stored[-1])
-    return found
+    numbers = _mixed(speeds, gaits)
+    numbers[:, 0] *= speeds / np.clip(speeds, stored[0], stored[-1])
+    return numbers
 
 
 def trunk_motion(speeds: Floats, phase: Floats) -> dict[str, Floats]:
-    """How the trunk of a horse of 475 kg moves at a phase of its stride [strides] where it keeps up the
-    reference gaits of some speeds [m/s], all of shape (n,): "y" over the height of the hips [-] and its rate
-    "vy" over the rate of the crank [1/rad], "vx" over the speed [-], "pitch" [rad] and "pitch_rate" over the
-    rate of the crank [-]. From simulation, in harmonics of half a stride, after which left is right."""
-    mixed = np.moveaxis(_mixed(speeds, _reference()[2]), 0, -1)  # of y, vx, pitch: mean, cosine and sine, ...
+    """Return the motion of the trunk of a horse of 475 kg in its reference gaits, from simulation, for speeds
+    of the gaits [m/s] and phases of the stride [strides], shape (n,).
+
+    The values are "y" over the height of the hips [-] and its rate "vy" over the rate of the crank [1/rad],
+    "vx" over the speed [-], "pitch" [rad] and "pitch_rate" over the rate of the crank [-], shape (n,) each.
+    """
+    # Rows are y, vx and pitch; columns the mean, then a cosine and a sine coefficient of each harmonic.
+    mixed = np.moveaxis(_mixed(speeds, _reference()[2]), 0, -1)
+    # Harmonics of half a stride, after which left and right are exchanged and the trunk moves alike.
     order = 2 * np.arange(1, mixed.shape[1] // 2 + 1)[:, None]
     cosine = np.cos(2 * np.pi * order * phase)
     sine = np.sin(2 * np.pi * order * phase)
@@ -235,36 +258,39 @@ def trunk_motion(speeds: Floats, phase: Floats) -> dict[str, Floats]:
 
 
 class PairGait(Layout):
-    """A pair's numbers, in the order of `LIMITS`."""
+    """Numbers of a pair, in the order of `LIMITS`."""
 
     wave: Vector  # cosine and sine coefficient of the crank's speed over its mean [-]
     swing: Annotated[Block, SWING]  # coefficients [rad]
 
 
 class GaitRows(Layout):
-    """A gait in the kernels' memory, in the order of `NAMES`."""
+    """Memory of a gait, in the order of `NAMES`."""
 
-    rate: Row  # [rad/s]
-    lead: Row  # [strides]
+    rate: Row  # mean speed of the cranks [rad/s]
+    lead: Row  # lead of the fore pair [strides]
     fore: PairGait
     hind: PairGait
 
 
 class Stride:
-    """How the crank's angle goes through a stride, in closed form.
+    """Relation between crank angle and phase of a stride, in closed form.
 
-    Its speed is a constant times 1 + Re(conj(w) z) with z = e^(i theta) and w = cosine + i sine coefficient,
-    so that theta is to the phase, which grows evenly in time, what the true anomaly of a Kepler orbit with
-    eccentricity |w| is to the eccentric one, but for constant angles:
+    The speed of the crank is a constant times 1 + Re(conj(w) z) with z = e^(i theta) and w = cosine + i sine
+    coefficient. The phase grows uniformly in time. Up to constant angles theta is related to the phase as the
+    true anomaly of a Kepler orbit with eccentricity |w| is to the eccentric anomaly:
 
         e^(i phase) = (half z + fold conj(z) + w) / (1 + Re(conj(w) z)),
         half = (1 + r) / 2,   fold = w^2 / (2 + 2 r),   r = sqrt(1 - |w|^2),
 
-    and the other way round with -w. Complex numbers are pairs of arrays: NumPy rounds products of complex
-    ones as many as there are.
+    and the inverse is the same with -w.
+
+    Args:
+        cosine, sine: coefficients of the crank's speed over its mean, of any shape.
     """
 
     def __init__(self, cosine: Floats, sine: Floats) -> None:
+        # Pairs of real arrays: NumPy's rounding of complex products depends on the number of elements.
         self.wave = cosine, sine
         self.r = np.sqrt(1 - (cosine * cosine + sine * sine))
         self.half = (1 + self.r) / 2
@@ -272,20 +298,21 @@ class Stride:
         self.fold = (cosine * cosine - sine * sine) / by, 2 * cosine * sine / by
 
     def begin(self) -> tuple[Floats, Floats]:
-        """`phase` at angle 0."""
+        """Return `phase` at angle 0."""
         (u, v) = self.wave
         (f, g) = self.fold
         return (self.half + f + u) / (1 + u), (g + v) / (1 + u)
 
     def phase(self, x: Floats, y: Floats) -> tuple[Floats, Floats]:
-        """e^(i phase) where e^(i theta) is x + i y."""
+        """Return e^(i phase) for e^(i theta) = x + i y, as real and imaginary part."""
         return self._map(x, y, 1.0)
 
     def angle(self, x: Floats, y: Floats) -> tuple[Floats, Floats]:
-        """Inverse of `phase`."""
+        """Return e^(i theta) for e^(i phase) = x + i y, as real and imaginary part."""
         return self._map(x, y, -1.0)
 
     def _map(self, x: Floats, y: Floats, sign: float) -> tuple[Floats, Floats]:
+        """Evaluate the formula of the class with w, or with -w for a `sign` of -1."""
         (u, v) = self.wave
         (f, g) = self.fold
         speed = 1 + sign * (u * x + v * y)
@@ -296,14 +323,15 @@ class Stride:
 
 
 def _pairs(gaits: Floats) -> Floats:
-    """The numbers of the pairs, shape (2, 7, n)."""
+    """Return the numbers of the pairs, shape (2, 7, n)."""
     pairs = gaits[:, 2:].reshape(len(gaits), len(PAIRS), len(PAIR))
+    # Contiguous along n: NumPy's loops over strided arrays may round differently.
     return np.ascontiguousarray(pairs.transpose(1, 2, 0))
 
 
 def crank_angles(gaits: Floats, phase: Floats, off: Floats) -> Floats:
-    """Angles [rad] of the cranks of gaits, shape (n, 16), at a phase of the stride, shape (n,), from which
-    each is off, shape (4, n), both [strides]; shape (4, n)."""
+    """Return the angles of the cranks [rad], shape (4, n), in gaits, shape (n, 16), at phases of the stride
+    [strides], shape (n,), from which the cranks deviate by `off` [strides], shape (4, n)."""
     wave = np.repeat(_pairs(gaits)[:, :2], 2, axis=0)
     stride = Stride(wave[:, 0], wave[:, 1])
     ahead = np.zeros((COUNT, len(gaits)))
@@ -314,13 +342,13 @@ def crank_angles(gaits: Floats, phase: Floats, off: Floats) -> Floats:
     c = np.cos(turned)
     s = np.sin(turned)
     x, y = stride.angle(x * c - y * s, x * s + y * c)
-    found: Floats = np.arctan2(y, x) % (2 * np.pi)
-    return found
+    angles: Floats = np.arctan2(y, x) % (2 * np.pi)
+    return angles
 
 
 def commands_of(gaits: Floats, theta: Floats, count: int) -> Floats:
-    """What legs that are in step are commanded at crank angles, shape (4, n), by gaits, shape (n, 16):
-    `count` gait parameters of an engine, shape (4, count, n)."""
+    """Return the commands of legs that are in step, shape (4, count, n), in gaits, shape (n, 16), at crank
+    angles [rad], shape (4, n); `count` is the number of gait parameters of the engine."""
     pairs = np.repeat(_pairs(gaits), 2, axis=0)
     stride = Stride(pairs[:, 0], pairs[:, 1])
     wave = stride.wave[0] * np.cos(theta) + stride.wave[1] * np.sin(theta)
@@ -331,17 +359,17 @@ def commands_of(gaits: Floats, theta: Floats, count: int) -> Floats:
 # In the kernels
 
 FOLLOWED = 0.1
-"""Part of the way from an offset to the action that a control step goes [-]: an offset is a mean of the last
-actions, and zero actions let it fade."""
+"""Part of the difference between action and offset that a control step adds to the offset [-]: an offset is a
+mean of the last actions, and decays under zero actions."""
 
 
 @inline_llvm
 def command_gait(task, actions, episode, first_leg, parameters, n, scratch):  # type: ignore[no-untyped-def]
-    """Command the gait of the episode, and what actions change of it; `scratch` is for `SCRATCH_SIZE`
-    numbers.
+    """Command the gait of the episode with the offsets that actions make; `scratch` has room for
+    `SCRATCH_SIZE` numbers. See `body.BodyKernels.command`.
 
     The first action of a leg scales its crank's speed, the others are added to the swing's first three
-    coefficients."""
+    coefficients. The first loop finds the phase of every leg, which the coupling in the second one needs."""
     gait = episode.gait
     together = vector(full_like(episode, 0.0), 0.0)
     for p in range(len(PAIRS)):
@@ -357,6 +385,7 @@ def command_gait(task, actions, episode, first_leg, parameters, n, scratch):  # 
             sign = 1.0 - 2.0 * side
             cosine, sine = cos_sin(block_at(first_leg, i).state.theta)
             crank = vector(cosine, sine)
+            # Phase of the stride that this leg alone would be in: the same for all legs that are in step.
             phase = sign * (conjugate(begin) * phase_of(wave, half, fold, crank))
             scratch[3 * i] = speed * (1.0 + dot(wave, crank))
             scratch[3 * i + 1] = phase.real
@@ -365,6 +394,7 @@ def command_gait(task, actions, episode, first_leg, parameters, n, scratch):  # 
     for i in range(COUNT):
         leg = block_at(first_leg, i)
         pair = block_at(gait.fore, i // 2)
+        # Kuramoto's coupling: the mean sine of the differences from all four phases.
         behind = cross(vector(scratch[3 * i + 1], scratch[3 * i + 2]), together)
         speed = scratch[3 * i] * (1.0 + (COUPLING / COUNT) * behind)
         for k in range(parameters):
@@ -384,18 +414,20 @@ def command_gait(task, actions, episode, first_leg, parameters, n, scratch):  # 
 
 @inline_llvm
 def phase_of(wave, half, fold, crank):  # type: ignore[no-untyped-def]
-    """e^(i phase) of a pair where e^(i theta) is `crank`; see `Stride`."""
+    """Return e^(i phase) of a pair for e^(i theta) = `crank`; see `Stride`."""
     return (1.0 / (1.0 + dot(wave, crank))) * (half * crank + fold * conjugate(crank) + wave)
 
 
 @inline_llvm
 def conjugate(z):  # type: ignore[no-untyped-def]
+    """Return the complex conjugate of a planar vector."""
     return vector(z.real, -z.imag)
 
 
 @inline_llvm
 def refer_to_target(task, episode, switched):  # type: ignore[no-untyped-def]
-    """Where another speed is commanded its reference gait is the episode's, see `reference_gaits`."""
+    """Change the episode's gait to the reference gait of the new commanded speed in the rows `switched`; the
+    kernel's form of `reference_gaits`."""
     if not (task.follows and any_lane(switched)):
         return
     speeds = task.speeds
@@ -405,6 +437,7 @@ def refer_to_target(task, episode, switched):  # type: ignore[no-untyped-def]
     within = minimum(maximum(speed, speeds[0]), speeds[last])
     for k in range(len(NAMES)):
         mixed = full_like(episode, gaits[0, k])
+        # A sum over all intervals, each clipped to its own: lanes have different speeds, so none can search.
         for j in range(last):
             part = (within - speeds[j]) * (1.0 / (speeds[j + 1] - speeds[j]))
             mixed = mixed + (gaits[j + 1, k] - gaits[j, k]) * minimum(maximum(part, 0.0), 1.0)

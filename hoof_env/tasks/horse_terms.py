@@ -1,5 +1,5 @@
-"""What a horse's policy sees, and what it is paid: the tables of `Horse-v0`, as `observation` and `reward`
-have them for one leg."""
+"""Entries of the observation and terms of the reward of `Horse-v0`; `observation` and `reward` have those of
+one leg."""
 
 from __future__ import annotations
 
@@ -18,19 +18,23 @@ from hoof_env.tasks.reward import Term
 # The observation
 
 IN_WEIGHTS = Scale("tanh(x / weight)", lambda x, scene: x / scene.episode.weight, True)
-"""Of the whole horse."""
+"""Scale of forces, in units of the horse's weight."""
 
 
 def _height(scene):  # type: ignore[no-untyped-def]
+    """Measure the height of the trunk over the ground below it [m]."""
     place = scene.trunk.report.place
     return place.imag - surface(place.real, scene.ground, scene.ground_origin, scene.ground_per_metre)[0]
 
 
 def _from_hips(x, scene):  # type: ignore[no-untyped-def]
+    """Scale a height, relative to that of the hips."""
+    # Relative to the hip height, so that horses of all sizes are seen alike.
     return (x - scene.task.height) / (0.2 * scene.task.height)
 
 
 def _in_bounds(k: int) -> Scale:
+    """Return the scale of the k-th gait parameter, linear between its widest limits."""
     low, high = list(WIDEST.values())[k]
     middle = (low + high) / 2
     per = 2 / (high - low)
@@ -38,6 +42,7 @@ def _in_bounds(k: int) -> Scale:
 
 
 def _of_leg(i: int, measure: Callable[[Any], Any]) -> Callable[[Any], Any]:
+    """Return a function of a scene that measures its i-th leg."""
     compiled = inline_llvm(measure)
     return lambda scene: compiled(block_at(scene.leg, i))
 
@@ -59,17 +64,21 @@ def _heel_contact(leg):  # type: ignore[no-untyped-def]
 
 
 def _filter(k: int) -> Callable[[Any], Any]:
+    """Return a function that measures the k-th gait parameter of a leg, after its filter."""
     return lambda leg: leg.state.gait[k]
 
 
 def _filter_rate(k: int) -> Callable[[Any], Any]:
+    """Return a function that measures the rate of the k-th gait parameter of a leg."""
     return lambda leg: leg.state.gait_rate[k]
 
 
 def _offset(k: int) -> Callable[[Any], Any]:
+    """Return a function that measures the k-th offset of the actions, of all legs."""
     return lambda scene: scene.episode.offset[k]
 
 
+# Name, group, unit, function of a leg's memory, scale. A table, one entry a line.
 _PER_LEG: tuple[tuple[str, str, str, Callable[[Any], Any], Scale], ...] = (
     ("sin(crank angle)", "crank", "-", _sine, PLAIN),
     ("cos(crank angle)", "crank", "-", _cosine, PLAIN),
@@ -87,13 +96,16 @@ _PER_LEG: tuple[tuple[str, str, str, Callable[[Any], Any], Scale], ...] = (
     ("toe load", "hoof", "N", lambda leg: leg.report.toe.normal, IN_WEIGHTS),
     ("heel load", "hoof", "N", lambda leg: leg.report.heel.normal, IN_WEIGHTS),
     ("running peak force", "hoof", "N", lambda leg: leg.strides.running_peak, IN_WEIGHTS),
-)  # fmt: skip
+)
 
 HORSE_ENTRIES = (
     Entry("forward speed", "trunk", "m/s", lambda s: s.trunk.report.velocity.real, tanh_of(5.0)),
     Entry("vertical speed", "trunk", "m/s", lambda s: s.trunk.report.velocity.imag, tanh_of(1.0)),
     Entry(
-        "height above the ground", "trunk", "m", _height,
+        "height above the ground",
+        "trunk",
+        "m",
+        _height,
         Scale("tanh((x - hip height) / (0.2 hip height))", _from_hips, True),
     ),
     Entry("pitch", "trunk", "rad", lambda s: s.trunk.state.moving.pitch, tanh_of(0.3)),
@@ -106,85 +118,100 @@ HORSE_ENTRIES = (
     ),
     *(
         Entry(
-            f"offset: {leg.replace('_', ' ')}, {name.replace('_', ' ')}", "offset", "-",
-            _offset(len(PARAMETERS) * i + k), PLAIN,
+            f"offset: {leg.replace('_', ' ')}, {name.replace('_', ' ')}",
+            "offset",
+            "-",
+            _offset(len(PARAMETERS) * i + k),
+            PLAIN,
         )
         for i, leg in enumerate(LEGS)
         for k, name in enumerate(PARAMETERS)
     ),
-)  # fmt: skip
-"""All that can be observed of a horse, by group; legs in the order of `LEGS`."""
+)
+"""Entries that can be observed of a horse; for each quantity, legs in the order of `LEGS`."""
 
 # The reward
 
 
 def alive(step, weight):  # type: ignore[no-untyped-def]
-    """For every second."""
+    """Return the reward for the time in which the horse has not fallen."""
     return weight * step.seconds
 
 
 def tracking(step, weight):  # type: ignore[no-untyped-def]
-    """1 at the commanded speed, less twice the relative error: else it pays to slide less and be late."""
+    """Return the reward for speed: 1 at the commanded speed, less twice the relative error, at least -1."""
+    # Twice the error: with less, a policy gains by sliding less and staying behind the command.
     asked = maximum(step.commanded_progress, 1e-9)
     error = absolute(step.progress - asked) / asked
     return where(step.seconds > 0.0, weight * step.seconds * maximum(1.0 - 2.0 * error, -1.0), 0.0)
 
 
 def peak(step, weight):  # type: ignore[no-untyped-def]
-    """In units of the weight."""
+    """Return the charge for the increase of the running peak GRF, in units of the horse's weight."""
     return -weight * step.sums.running_peak_increase / step.weight
 
 
 def slip(step, weight):  # type: ignore[no-untyped-def]
-    """Over the commanded distance, at most all of it, for every second."""
+    """Return the charge for sliding, over the commanded distance and at most 1, times the duration."""
     asked = maximum(step.commanded_progress, 1e-9)
     return -weight * step.seconds * minimum(step.sums.slip / asked, 1.0)
 
 
 def landing(step, weight):  # type: ignore[no-untyped-def]
-    """For each stance that begins."""
+    """Return the charge for each stance that begins."""
     return -weight * step.sums.stances
 
 
 def work(step, weight):  # type: ignore[no-untyped-def]
-    """Over the weight and the commanded distance, for every second."""
+    """Return the charge for positive work over weight times commanded distance, times the duration."""
     asked = maximum(step.commanded_progress, 1e-9)
     return -weight * step.seconds * step.sums.positive_work / (step.weight * asked)
 
 
 def pitch(step, weight):  # type: ignore[no-untyped-def]
-    """Square of the angle."""
+    """Return the charge for the square of the trunk's pitch, times the duration."""
     angle = step.trunk.state.moving.pitch
     return -weight * step.seconds * (angle * angle)
 
 
 def fall(step, weight):  # type: ignore[no-untyped-def]
-    """Charged once."""
+    """Return the charge for a failure, in the step that ends the episode."""
     return where(step.failed > 0.0, -weight, 0.0)
 
 
 HORSE_TERMS = (
     Term("alive", 45.0, "1/s", "for every second", alive),
     Term(
-        "tracking", 16.0, "1/s", "for every second, 1 less twice the speed's relative error, at least -1",
+        "tracking",
+        16.0,
+        "1/s",
+        "for every second, 1 less twice the speed's relative error, at least -1",
         tracking,
     ),
     Term(
-        "peak", 0.25, "-",
+        "peak",
+        0.25,
+        "-",
         "minus the increase of the legs' running peak GRF over the weight; each is the highest force of all"
-        " substeps but at most twice the present one, so that it adds up to every stance's peak", peak,
+        " substeps but at most twice the present one, so that it adds up to every stance's peak",
+        peak,
     ),
     Term(
-        "slip", 35.0, "1/s",
+        "slip",
+        35.0,
+        "1/s",
         "minus the way that all hooves slide in stance, to and fro, over the commanded distance; 1 at most",
         slip,
     ),
     Term("landing", 0.25, "-", "minus the stances that begin: who taps the ground pays twice", landing),
     Term(
-        "work", 0.4, "1/s",
-        "minus the positive work of all drives over the weight times the commanded distance", work,
+        "work",
+        0.4,
+        "1/s",
+        "minus the positive work of all drives over the weight times the commanded distance",
+        work,
     ),
     Term("pitch", 3.0, "1/(s rad^2)", "minus the square of the trunk's pitch", pitch),
     Term("fall", 15.0, "-", "once, minus this, when the episode fails", fall),
-)  # fmt: skip
-"""The terms of `Horse-v0`."""
+)
+"""Terms of the reward of `Horse-v0`, in the order in which they are added."""

@@ -1,4 +1,5 @@
-"""Keyword arguments of the environments, for type checkers: `settings.Settings` as callers may give them."""
+"""Keyword arguments of the environments, for type checkers: `settings.Settings` in the types that callers may
+pass."""
 
 from __future__ import annotations
 
@@ -10,12 +11,13 @@ from gymnasium.vector import AutoresetMode
 from hoof_env.leg.geometry import Preset
 
 Range = float | Sequence[float]
-"""Lowest and highest, or one number for both."""
+"""Lowest and highest value, or one number for both."""
 
 
 class Keywords(TypedDict, total=False):
-    """Keywords of `HorseLegEnv`, beside its own: `Settings` as callers may give them."""
+    """Keywords of `HorseLegEnv` that are settings, in the types that callers may pass."""
 
+    # A copy by hand, because type checkers do not run code; `tests/test_typing.py` compares the two.
     preset: Preset
     gait: str | None
     trunk: str
@@ -61,8 +63,9 @@ class Keywords(TypedDict, total=False):
 
 
 class VectorKeywords(Keywords, total=False):
-    """Of `Sb3VecEnv`, which hands them to `HorseLegVectorEnv`."""
+    """Keywords of `Sb3VecEnv`, which passes them to `HorseLegVectorEnv`."""
 
+    # `task` and `num_envs` are missing here: the id and an argument of its own have them.
     num_threads: int
     autoreset_mode: AutoresetMode | str
     max_episode_steps: int | None

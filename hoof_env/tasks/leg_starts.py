@@ -1,4 +1,4 @@
-"""Where an episode starts: drawn at random, or what the reset options say."""
+"""Starts of episodes of one leg: drawn at random, or set by the reset options."""
 
 from __future__ import annotations
 
@@ -22,27 +22,31 @@ Floats = NDArray[np.float64]
 
 LOWEST = 0.6
 HIGHEST = 2.0
-"""Heights of the trunk at which an episode fails, as parts of its nominal height."""
+"""Heights of the trunk at which an episode fails, over its nominal height [-]."""
 
 START_SPEED = 1.0
-"""Highest forward speed at reset [m/s]: a learner meets both a standing start and a rolling one."""
+"""Highest forward speed at reset [m/s]: learners meet both standing and moving starts."""
 
 OPTIONS = {
-    "crank_angle": (-1e6, 1e6), "speed": (-20.0, 20.0), "height": (0.0, np.inf), "x": (-1e5, 1e5),
+    "crank_angle": (-1e6, 1e6),
+    "speed": (-20.0, 20.0),
+    "height": (0.0, np.inf),
+    "x": (-1e5, 1e5),
     "target_speed": (-20.0, 20.0),
-}  # fmt: skip
+}
 """Numeric reset options and their ranges [rad, m/s, m, m, m/s]; "gait" and "parameters" are the others."""
 
+# Minari passes its own option on to the environment.
 FOREIGN_OPTIONS = ("minari_autoseed",)
-"""Options that others put there for themselves: Minari hands its own on to the environment."""
+"""Options of other libraries, which are ignored."""
 
 FLAT = Terrain.flat()
 MARGIN = 50.0
 REACH = 1.0
-"""Level ground; how far from its ends an episode on a terrain begins [m], for it goes somewhere; how far
-ahead and behind O a hoof may come down [m]."""
+"""Level ground; least distance of a start from the ends of a terrain [m], as an episode travels; largest
+distance from O, forward and back, at which a hoof can touch down [m]."""
 
-MOST_TRIES = 100  # draws of a crank angle at which the hoof is above the ground
+MOST_TRIES = 100  # draws of a crank angle until the hoof is above the ground
 
 
 @dataclass
@@ -50,9 +54,9 @@ class Start:
     """Starts of n episodes.
 
     Attributes:
-        values: what infos say of them, by name, shape (n,).
-        gaits: what they say of the gait, shape (n, numbers).
-        commands: of the engine, shape (legs, gait parameters, n).
+        values: numbers by which infos describe a start, by name, shape (n,).
+        gaits: numbers by which infos describe the gait, shape (n, numbers).
+        commands: commands of the engine, shape (legs, gait parameters, n).
         theta: crank angles [rad], shape (legs, n).
         trunk: arguments of `TrunkEngine.reset` by name, shape (n,).
     """
@@ -67,11 +71,18 @@ class Start:
 def hoof_points(
     profile: LegProfile, gaits: Floats, theta: Floats, turn: ArrayLike = 0.0
 ) -> tuple[Floats, Floats]:
-    """x and y of toe and heel relative to O [m], shape (2, n) each, at crank angles `theta`, shape (n,), of
-    steady gaits, shape (n, 2 + 2 harmonics), of a frame turned by so much more [rad]."""
+    """Return x and y of toe and heel relative to O [m], shape (2, n) each.
+
+    Args:
+        profile: functions of the crank angle of the leg.
+        gaits: parameters of steady gaits, shape (n, 2 + 2 harmonics).
+        theta: crank angles [rad], shape (n,).
+        turn: further angle of the leg's frame, such as the trunk's pitch [rad].
+    """
     phi: Floats = gaits[:, 1] + gaits[:, 2] * np.sin(theta) + gaits[:, 3] * np.cos(theta) + np.asarray(turn)
     for k in range(2, gaits.shape[1] // 2):
         phi = phi + gaits[:, 2 * k] * np.sin(k * theta) + gaits[:, 2 * k + 1] * np.cos(k * theta)
+    # A leg that travels towards -x is mirrored, see `Geometry.travel`.
     sine = profile.geometry.travel * np.sin(phi)
     cosine = np.cos(phi)
     f = by_name(profile(theta)[0])
@@ -83,7 +94,7 @@ def hoof_points(
 
 
 def hoof_height(profile: LegProfile, gaits: Floats, theta: Floats) -> Floats:
-    """Height of the lower hoof point relative to O [m], see `hoof_points`."""
+    """Return the height of the lower hoof point relative to O [m], shape (n,), see `hoof_points`."""
     return hoof_points(profile, gaits, theta)[1].min(0)
 
 
@@ -96,17 +107,23 @@ def draw_starts(
     terrain: Terrain,
     own_gait: GaitParameters | None = None,
 ) -> Start:
-    """Random starts, one for each generator, but for what the options fix (see `check_options`).
+    """Draw random starts, one for each generator. Options set values (see `check_options`).
 
-    No contact begins with a hoof inside the ground: a suspended trunk hangs higher where it would, on any
-    other the crank angle is drawn again.
+    No contact begins with a hoof inside the ground: a suspended trunk then starts higher, and under any other
+    trunk the crank angle is drawn again.
 
     Args:
-        terrain: an episode begins anywhere on it but near its ends; at 0 if it is level, short, or one slope,
-            which leaves the height at which a trunk can hang.
-        own_gait: instead of one between walk and run.
+        options: checked reset options.
+        generators: generators of the episodes.
+        profile: functions of the crank angle of the leg.
+        trunk: trunk of the engine.
+        gaits: gaits of the preset by name, walk and run among them.
+        terrain: the episode starts anywhere on it except near its ends; at 0 if it is level, short, or a
+            single slope, which would leave the height at which a trunk is suspended.
+        own_gait: gait of all starts; None for one between walk and run.
     """
     n = len(generators)
+    # Always three numbers, whatever the options are, so that an option does not change the others.
     drawn = np.array([generator.random(3) for generator in generators])
     ends = [end.to_array() for end in paper_gaits(gaits).values()]
     mixed = ends[0] + drawn[:, :1] * (ends[-1] - ends[0])
@@ -125,20 +142,22 @@ def draw_starts(
         if "height" not in options:
             height = np.maximum(height, ground - hoof_height(profile, chosen, theta))
     elif "crank_angle" not in options:
+        # Only rows with a hoof inside the ground draw again, so that neighbours do not change a row's bits.
         for _ in range(MOST_TRIES):
             below = np.flatnonzero(height + hoof_height(profile, chosen, theta) < ground)
             if not below.size:
                 break
             theta[below] = [2 * np.pi * generators[int(k)].random() for k in below]
-    begun = {"crank_angle": theta, "speed": speed, "height": height, "x": x}
+    values = {"crank_angle": theta, "speed": speed, "height": height, "x": x}
     trunk_at = {"x": x, "y": height, "vx": speed}
-    return Start(begun, chosen, chosen.T[None], theta[None], trunk_at)
+    return Start(values, chosen, chosen.T[None], theta[None], trunk_at)
 
 
 def start_anywhere(
     terrain: Terrain, x: Floats, options: Mapping[str, Any], generators: Sequence[np.random.Generator]
 ) -> Floats:
-    """Where episodes on a terrain begin: at `x` if it is short or one slope, or if the options say so."""
+    """Draw places on a terrain at which episodes start [m], shape (n,); return `x` if the terrain is short or
+    a single slope, or if the options set the place."""
     low = terrain.x[0] + MARGIN
     high = terrain.x[-1] - MARGIN
     if "x" not in options and low < high and len(terrain.height) > 2:
@@ -149,7 +168,11 @@ def start_anywhere(
 def check_options(
     options: Any, gaits: Mapping[str, GaitParameters], trunk: Trunk, settings: Settings
 ) -> dict[str, Any]:
-    """Reset options with their values checked and the gait as `GaitParameters`; ParameterError of others."""
+    """Check reset options of one leg; return them with numbers and the gait converted.
+
+    Raises:
+        ParameterError: an unknown option, a bad value, or one that the trunk cannot have.
+    """
     checked = checked_options(options, OPTIONS)
     _check_trunk(checked, trunk)
     if "target_speed" in checked and settings.target_speed is None:
@@ -163,7 +186,15 @@ def check_options(
 
 
 def checked_options(options: Any, numbers: Mapping[str, tuple[float, float]]) -> dict[str, Any]:
-    """Reset options with their `numbers`, of these ranges, checked; ParameterError of unknown ones."""
+    """Check the names of reset options and the values of the numeric ones.
+
+    Args:
+        options: options of `reset`; None for none.
+        numbers: ranges of the numeric options by name.
+
+    Raises:
+        ParameterError: an unknown option, or a number out of range.
+    """
     known = ("gait", "parameters", *numbers)
     if options is None:
         return {}
@@ -179,14 +210,19 @@ def checked_options(options: Any, numbers: Mapping[str, tuple[float, float]]) ->
 
 
 def with_parameters(options: dict[str, Any], settings: Settings) -> dict[str, Any]:
-    """Options with the parameters of the episode checked."""
+    """Check the option "parameters", in place; return the options.
+
+    Raises:
+        ParameterError: see `check_parameters`.
+    """
     if "parameters" in options:
         options["parameters"] = check_parameters("options['parameters']", options["parameters"], settings)
     return options
 
 
 def highest(terrain: Terrain, x: Floats, reach: float) -> Floats:
-    """Highest ground within a reach of `x`, shape (n,): it is at an end or at a knot."""
+    """Return the height of the highest ground within `reach` of `x` [m], shape (n,)."""
+    # The ground is piecewise linear: its maximum is at an end of the interval or at a knot.
     low = x[:, None] - reach
     high = x[:, None] + reach
     first = np.ceil((low - terrain.start) / terrain.spacing)
@@ -195,7 +231,11 @@ def highest(terrain: Terrain, x: Floats, reach: float) -> Floats:
 
 
 def _check_trunk(options: Mapping[str, float], trunk: Trunk) -> None:
-    """Raise where a trunk cannot be at a height or have a speed."""
+    """Check that the trunk can have the height and the speed of the options.
+
+    Raises:
+        ParameterError: it cannot.
+    """
     height = options.get("height", trunk.height)
     speed = options.get("speed", 0.0)
     if trunk.kind != "suspended" and height != trunk.height:
@@ -212,6 +252,11 @@ def _check_trunk(options: Mapping[str, float], trunk: Trunk) -> None:
 
 
 def _gait(value: Any, gaits: Mapping[str, GaitParameters]) -> GaitParameters:
+    """Convert the option "gait": a name, `GaitParameters`, or a mapping of their values.
+
+    Raises:
+        ParameterError: anything else.
+    """
     if isinstance(value, GaitParameters):
         gait_array(value, 1)  # refuses harmonics that no environment of one leg takes
         return value
@@ -227,11 +272,21 @@ def _gait(value: Any, gaits: Mapping[str, GaitParameters]) -> GaitParameters:
 
 
 def extreme_posture(profile: LegProfile, rests: Floats, lowest: bool) -> tuple[Floats, float]:
-    """Which of some gaits that let the crank stand, shape (n, 4), holds the lower hoof point highest, or
-    lowest, and at which crank angle [rad]."""
+    """Return the posture in which the lower hoof point is highest, or lowest.
+
+    Args:
+        profile: functions of the crank angle of the leg.
+        rests: gaits in which the crank stands, shape (n, 4).
+        lowest: True for the lowest posture.
+
+    Returns:
+        The gait, shape (4,), and the crank angle [rad].
+    """
+    # A grid of 5 degrees is fine enough for a policy.
     sign = -1.0 if lowest else 1.0
     theta = np.linspace(0, 2 * math.pi, 72, endpoint=False)
     heights = sign * np.array([hoof_height(profile, np.tile(rest, (len(theta), 1)), theta) for rest in rests])
     best = heights.max(1)
+    # The last of equal postures: an arbitrary choice that must not change between versions.
     k = int(np.flatnonzero(best == best.max())[-1])
     return rests[k], float(theta[int(np.argmax(heights[k]))])

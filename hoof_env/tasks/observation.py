@@ -1,5 +1,5 @@
-"""What a policy sees: one table of entries, numbers in [-1, 1], in groups that can be chosen. An entry is a
-row here, and nothing else has to be touched."""
+"""Observation of one leg: a table of entries, numbers in [-1, 1], in groups that can be chosen. A new entry
+is a row of the table and needs no other change."""
 
 from __future__ import annotations
 
@@ -22,17 +22,17 @@ MIDDLE = (LOW + HIGH) / 2
 HALF_RANGE = (HIGH - LOW) / 2
 """Limits, middle and half range of the gait parameters of the published leg, shape (4,)."""
 
-AHEAD = (0.25, 0.5, 0.75, 1.0)  # where the height of the ground is seen, from O forward [m]
+AHEAD = (0.25, 0.5, 0.75, 1.0)  # places at which the height of the ground is observed, forward of O [m]
 
 
 class ObservationInputs(NamedTuple):
-    """What can be observed.
+    """Arguments of the entries' functions.
 
     Attributes:
-        trunk, leg, episode: memory of engine and episode, fields as in `dynamics.layout.TrunkMemory` and
-            `LegMemory` and `episode.Episode`.
+        trunk, leg, episode: memory of engine and episode, with fields as in `dynamics.layout.TrunkMemory`,
+            `LegMemory` and `episode.Episode`; `block_at(leg, i)` is a horse's i-th leg.
         task: record of the task's constants, see `episode.task_type`.
-        ground, ground_origin, ground_per_metre: the terrain, the arguments of `surface` after x.
+        ground, ground_origin, ground_per_metre: terrain, the arguments of `surface` after x.
     """
 
     trunk: Any
@@ -46,15 +46,15 @@ class ObservationInputs(NamedTuple):
 
 @dataclass(frozen=True)
 class Scale:
-    """How a measured number comes into [-1, 1], where it is clipped.
+    """Scaling of a measured number to [-1, 1]; the result is clipped.
 
     Attributes:
-        text: of the formula, for the manual page.
-        apply: function of the number and the `ObservationInputs`; None leaves it.
-        saturates: the hyperbolic tangent of that is taken.
+        text: formula, for the manual page.
+        apply: function of the number and the `ObservationInputs`; None for the number itself.
+        saturates: True if the hyperbolic tangent of the result is taken.
 
     Raises:
-        ParameterError: no function of two arguments.
+        ParameterError: `apply` is not a function of two arguments.
     """
 
     text: str
@@ -68,18 +68,19 @@ class Scale:
 
 @dataclass(frozen=True)
 class Entry:
-    """An entry of the observation.
+    """Entry of the observation.
 
     Attributes:
-        name: what is observed.
-        group: by which it is chosen.
-        unit: of the number before it is scaled.
-        measure: function of a `ObservationInputs`: that number. Compiled as `reward.Term.compute` is.
-        scale: how it is scaled.
-        scalar: `measure` and the scale are functions of ordinary numbers, see `reward.Term`.
+        name: name of the quantity.
+        group: group by which the setting `observation` chooses it.
+        unit: unit of the number before it is scaled.
+        measure: function of `ObservationInputs` that returns the number; compiled like `reward.Term.compute`.
+        scale: scaling of the number.
+        scalar: True if `measure` and the scale are functions of ordinary numbers, see `reward.Term`.
 
     Raises:
-        ParameterError: no name or group, no function of one argument, or no `Scale`.
+        ParameterError: a name or group is missing, `measure` is not a function of one argument, or `scale` is
+            not a `Scale`.
     """
 
     name: str
@@ -90,21 +91,22 @@ class Entry:
     scalar: bool = False
 
     def __post_init__(self) -> None:
-        for what in (self.name, self.group):
-            if not isinstance(what, str) or not what:
-                raise ParameterError(f"name and group: expected a text, got {what!r}")
+        for text in (self.name, self.group):
+            if not isinstance(text, str) or not text:
+                raise ParameterError(f"name and group: expected a text, got {text!r}")
         check_function(f"{self.title}: measure", self.measure, 1)
         if not isinstance(self.scale, Scale):
             raise ParameterError(f"{self.title}: scale: expected a hoof_env.Scale, got {self.scale!r}")
 
     @property
     def title(self) -> str:
-        """For people."""
+        """Name of the entry in messages."""
         return f"entry {self.name!r}"
 
 
 def tanh_of(scale: float, text: str = "") -> Scale:
-    """tanh(x / scale)."""
+    """Return the scale tanh(x / scale); `text` replaces the formula on the manual page."""
+    # A factor: a multiplication is several times faster than a division.
     per = 1 / scale
     return Scale(text or f"tanh(x / {scale:g})", lambda x, scene: x * per, True)
 
@@ -116,10 +118,13 @@ RISE = Scale("tanh(x / (30 weights / s))", lambda x, scene: x / (30.0 * scene.ep
 
 
 def _height(x, scene):  # type: ignore[no-untyped-def]
+    """Scale a height: relative to the nominal one, in units of 0.3 m."""
     return (x - scene.task.height) * (1 / 0.3)
 
 
 def _in_range(k: int) -> Scale:
+    """Return the scale of the k-th gait parameter, linear between its limits."""
+
     def apply(x, scene):  # type: ignore[no-untyped-def]
         return (x - scene.task.middle[k]) / scene.task.half[k]
 
@@ -127,6 +132,8 @@ def _in_range(k: int) -> Scale:
 
 
 def _in_rate(k: int) -> Scale:
+    """Return the scale of the rate of the k-th gait parameter, over its bound."""
+
     def apply(x, scene):  # type: ignore[no-untyped-def]
         return x / scene.task.rate_bound[k]
 
@@ -134,20 +141,22 @@ def _in_rate(k: int) -> Scale:
 
 
 def range_text(low: float, high: float) -> str:
-    """The formula of a number between limits."""
+    """Return the formula of a scale between limits, for the manual page."""
     return f"linear, -1 at {low:.8g} and 1 at {high:.8g}"
 
 
 def rate_text(bound: float) -> str:
-    """The formula of a rate with a bound."""
+    """Return the formula of the scale of a rate with a bound, for the manual page."""
     return f"/ {bound:.6g}"
 
 
 def _gait(k: int) -> Callable[[Any], Any]:
+    """Return a function that measures the k-th gait parameter, after its filter."""
     return lambda scene: scene.leg.state.gait[k]
 
 
 def _gait_rate(k: int) -> Callable[[Any], Any]:
+    """Return a function that measures the rate of the k-th gait parameter."""
     return lambda scene: scene.leg.state.gait_rate[k]
 
 
@@ -161,16 +170,22 @@ def _cosine(scene):  # type: ignore[no-untyped-def]
 
 @inline_llvm
 def in_contact(memory):  # type: ignore[no-untyped-def]
+    """Return 1 if a hoof point is inside the ground, else 0."""
     return where(memory.penetration > 0.0, 1.0, 0.0)
 
 
 @inline_llvm
 def _approach_speed(memory):  # type: ignore[no-untyped-def]
+    """Return the approach speed of a hoof point in contact [m/s], else 0."""
     inverse = memory.inverse_approach_speed
+    # The inner choice avoids a division by 0 in lanes that take the other value.
     return where(inverse > 0.0, 1.0 / where(inverse > 0.0, inverse, 1.0), 0.0)
 
 
 def _ahead(distance: float) -> Callable[[Any], Any]:
+    """Return a function that measures the height of the ground at a distance ahead of O [m]."""
+
+    # Relative to the ground under O: heights in the world say nothing after hundreds of metres.
     def rise(scene):  # type: ignore[no-untyped-def]
         x = scene.trunk.report.place.real
         here = surface(x, scene.ground, scene.ground_origin, scene.ground_per_metre)[0]
@@ -180,14 +195,14 @@ def _ahead(distance: float) -> Callable[[Any], Any]:
 
 
 TRUE_RATE = "true rate of the crank"
-"""What a motor makes of the commanded one; observed where there is a motor."""
+"""End of the names of entries that are observed only with a motor: without one it is the commanded rate."""
 
 _PARAMETERS = ("crank speed", "swing offset", "swing sine coefficient", "swing cosine coefficient")
 _UNITS = ("rad/s", "rad", "rad", "rad")
 IN_RANGE = tuple(map(_in_range, range(4)))
 IN_RATE = tuple(map(_in_rate, range(4)))
-"""Scales of the gait parameters and their rates; limits and bounds are those of the leg, their texts those of
-the published one."""
+"""Scales of the gait parameters and their rates. They use the limits and bounds of the leg; their texts show
+those of the published one, see `envs.manual_bodies.LegPage.scaling`."""
 
 ENTRIES = (
     Entry("sin(crank angle)", "crank", "-", _sine, PLAIN),
@@ -201,7 +216,10 @@ ENTRIES = (
     Entry("forward speed", "trunk", "m/s", lambda s: s.trunk.report.velocity.real, tanh_of(5.0)),
     Entry("vertical speed", "trunk", "m/s", lambda s: s.trunk.report.velocity.imag, tanh_of(2.0)),
     Entry(
-        "height", "trunk", "m", lambda s: s.trunk.report.place.imag,
+        "height",
+        "trunk",
+        "m",
+        lambda s: s.trunk.report.place.imag,
         Scale("tanh((x - hip height) / 0.3)", _height, True),
     ),
     Entry("bearing allowance", "trunk", "s", lambda s: s.episode.allowance, PLAIN),
@@ -215,13 +233,13 @@ ENTRIES = (
     Entry("steepest rise of the force", "hoof", "N/s", lambda s: s.leg.strides.steepest_rise, RISE),
     Entry("commanded speed", "target", "m/s", lambda s: s.episode.target, tanh_of(5.0)),
     *(Entry(f"height of the ground {x:g} m ahead", "ground", "m", _ahead(x), tanh_of(0.5)) for x in AHEAD),
-)  # fmt: skip
-"""All that can be observed, by group, in the order of the observation; the height of the ground is that above
-the ground under O."""
+)
+"""Entries that can be observed of one leg, in the order of the observation within each group. Heights of the
+ground are relative to the ground under O."""
 
 
 def groups_of(entries: Iterable[Entry]) -> tuple[str, ...]:
-    """The groups of some entries, in order."""
+    """Return the groups of entries, in order."""
     return tuple(dict.fromkeys(entry.group for entry in entries))
 
 
@@ -229,15 +247,16 @@ ABSENT = {
     "fixed": ("forward speed", "vertical speed", "height", "bearing allowance"),
     "rail": ("vertical speed", "height", "bearing allowance"),
 }
-"""What is not observed on a kind of trunk: what cannot move, and what is never borne."""
+"""Names of entries that are constant on a kind of trunk, and are therefore not observed there."""
 
 
 def observed(
     groups: Iterable[str], trunk: str, drive: str = "prescribed", entries: tuple[Entry, ...] = ENTRIES
 ) -> list[Entry]:
-    """The entries of some groups on a kind of trunk, with a kind of drive."""
+    """Return the entries of some groups that are observed on a kind of trunk with a kind of drive."""
 
     def is_observed(entry: Entry) -> bool:
+        # A prescribed crank has the commanded rate, which is observed already.
         if entry.name.endswith(TRUE_RATE):
             return drive == "motor"
         return entry.name not in ABSENT.get(trunk, ())
@@ -246,9 +265,13 @@ def observed(
 
 
 def check_groups(groups: Any, known: Iterable[str]) -> tuple[str, ...]:
-    """The groups to observe, each once; `ParameterError` unless they are a row of known names."""
+    """Check the setting `observation`; return it as a tuple.
+
+    Raises:
+        ParameterError: not a list of known groups, or a group is named twice.
+    """
     names = tuple(known)
-    given = tuple(groups) if isinstance(groups, (list, tuple)) else ()
-    if not given or not all(group in names and given.count(group) == 1 for group in given):
+    chosen = tuple(groups) if isinstance(groups, (list, tuple)) else ()
+    if not chosen or not all(group in names and chosen.count(group) == 1 for group in chosen):
         raise ParameterError(f"observation: expected a list of some of {', '.join(names)}, got {groups!r}")
-    return given
+    return chosen

@@ -1,4 +1,4 @@
-"""The body of all ids but `Horse-v0`: a trunk that one leg carries, or pulls along. `horse` is the other."""
+"""Body of all ids except `Horse-v0`: a trunk that one leg carries or pulls. The other body is in `horse`."""
 
 from __future__ import annotations
 
@@ -39,21 +39,21 @@ Floats = NDArray[np.float64]
 
 
 CARRIED = 5 / 6
-"""Part of a change that a zero action carries on with: 0 would end a rate with its action, and rates would
-jump in every step; with 1 a change would go on."""
+"""Part of a change that continues under a zero action [-]. With 0 a rate would end with its action, and rates
+would jump in every step; with 1 a change would never end."""
 
 
 def lead_of(filters: FilterSettings, dt: float) -> float:
-    """Time by which a zero action commands what is ahead of a gait that changes [s]: a part of the lag of the
-    filters behind a command that moves at a steady rate, in control steps of `dt` [s]."""
+    """Return the time by which the command of a zero action is ahead of a changing gait [s]: a part of the
+    lag of the filters behind a command that moves at a steady rate, in control steps of `dt` [s]."""
     return CARRIED * (1 / filters.gain + dt / 2)
 
 
 def check_rates(s: Settings, speed_scale: float = 1.0) -> Floats:
-    """The rates at which an action of 1 changes the gait, shape (4,) [rad/s^2, rad/s, rad/s, rad/s].
+    """Return the rates at which an action of 1 changes the gait, shape (4,) [rad/s^2, rad/s, rad/s, rad/s].
 
     Args:
-        s: settings, which are of the published leg.
+        s: settings; their rates are those of the published leg.
         speed_scale: see `gait.speed_scale_of`.
 
     Raises:
@@ -62,13 +62,14 @@ def check_rates(s: Settings, speed_scale: float = 1.0) -> Floats:
     filters = FilterSettings()
     crank = check_number("crank_rate", s.crank_rate, low=0, high=filters.crank_rate, exclusive_low=True)
     swing = check_number("swing_rate", s.swing_rate, low=0, high=filters.swing_rate, exclusive_low=True)
+    # By similarity, with lengths as the square of `speed_scale`: times are proportional to `speed_scale`.
     swing = swing / speed_scale
     return np.array([crank / speed_scale**2, swing, swing, swing])
 
 
 def reach_per_rate(filters: FilterSettings, dt: float, substep: float) -> float:
-    """How far a command must be from where the gait is heading, over the rate at which the gait then changes
-    if this is repeated in every control step [s].
+    """Return the distance of a command from `heading_now` over the rate at which the gait changes if every
+    control step gives such a command [s].
 
     While a command stands, its distance d from the gait and the gait's rate v change in a substep h by
 
@@ -80,18 +81,20 @@ def reach_per_rate(filters: FilterSettings, dt: float, substep: float) -> float:
         d_1 (1 - l_1^n) = r dt m_2 / (m_2 - m_1),    d_2 (1 - l_2^n) = r dt m_1 / (m_1 - m_2).
 
     Args:
-        filters: bounds of the commands.
+        filters: filters of the commands.
         dt: control step [s].
-        substep: of the filters [s].
+        substep: substep of the filters [s].
     """
     gain = filters.gain
     follow = INNER * gain
     h = substep
     n = round(dt / substep)
+    # The matrix of a substep for (d, v), by the equations above.
     keeps_distance = 1 - 0.5 * h * h * follow * gain
     from_speed = -h + 0.5 * h * h * follow
     from_distance = h * follow * gain
     keeps_speed = 1 - h * follow
+    # Its eigenvalues l, from trace and determinant, and the slopes m of its eigenvectors.
     middle = 0.5 * (keeps_distance + keeps_speed)
     product = keeps_distance * keeps_speed
     apart = math.sqrt(middle**2 - product + from_speed * from_distance)
@@ -101,21 +104,22 @@ def reach_per_rate(filters: FilterSettings, dt: float, substep: float) -> float:
     lead = lead_of(filters, dt)
     for factor, slope, other in zip(factors, slopes, reversed(slopes), strict=True):
         distance = dt * other / (other - slope) / (1 - factor**n)
+        # From the gait to where it is heading: less the lead times the rate of this mode.
         reach += distance * (1 - lead * slope)
     return reach
 
 
 AT_REST = 1e-6
-"""Differences from a gait that are as good as none [rad/s, rad]: observations are rounded to float32."""
+"""Differences from a gait that count as 0 [rad/s, rad]: observations are rounded to float32."""
 
 
 def action_towards(gaits: Floats, heading: Floats, reach: Floats) -> NDArray[np.float32]:
-    """Actions that go towards gaits, shape (..., 4), as fast as is allowed, and stop there.
+    """Return actions that move towards gaits as fast as is allowed, and stop there; shape (..., 4).
 
     Args:
-        gaits: gait parameters [rad/s, rad, rad, rad].
-        heading: see `heading_now`.
-        reach: how far from there an action of 1 puts the command, shape (4,).
+        gaits: gait parameters [rad/s, rad, rad, rad], shape (..., 4).
+        heading: parameters towards which the gait is heading, see `heading_now`.
+        reach: distance of the command of an action of 1 from there, shape (4,), see `OneLeg.reach`.
     """
     gap = gaits - heading
     gap = np.where(np.abs(gap) < AT_REST, 0.0, gap)
@@ -123,9 +127,10 @@ def action_towards(gaits: Floats, heading: Floats, reach: Floats) -> NDArray[np.
 
 
 def heading_now(engine: TrunkEngine, dt: float) -> Floats:
-    """Where the gait of the first leg is heading, shape (num_envs, 4): what a zero action commands.
+    """Return the parameters towards which the gait of the first leg is heading, which a zero action commands;
+    shape (num_envs, 4).
 
-    `step` has the same in a kernel, and `policies.heading_seen` of what is observed."""
+    `command_rates` computes them in the kernels, and `policies.heading_seen` from an observation."""
     state = engine.state
     gait, rate = (
         np.stack([state[name + suffix][0] for name in PARAMETERS], axis=-1) for suffix in ("", "_rate")
@@ -136,7 +141,8 @@ def heading_now(engine: TrunkEngine, dt: float) -> Floats:
 
 @inline_llvm
 def command_rates(task, actions, episode, leg, parameters, n, scratch):  # type: ignore[no-untyped-def]
-    """Command the rates that an action asks for, from where the gait is heading and within the limits."""
+    """Command the rates that an action asks for, relative to where the gait is heading and within the limits;
+    see `body.BodyKernels.command`."""
     for k in range(ACTIONS):
         action = clip(read(leg, actions, n * ACTIONS + k, ACTIONS), 1.0)
         heading = leg.state.gait[k] + task.lead * leg.state.gait_rate[k]
@@ -146,7 +152,7 @@ def command_rates(task, actions, episode, leg, parameters, n, scratch):  # type:
 
 @inline_llvm
 def keep_gait(task, episode, switched):  # type: ignore[no-untyped-def]
-    """Change nothing: the gait of one leg does not depend on the commanded speed."""
+    """Do nothing: the gait of one leg does not depend on the commanded speed."""
 
 
 LEG_KERNELS = BodyKernels(
@@ -163,13 +169,18 @@ POLICIES = ("idle", "random", "bang-bang", "drag", "airborne")
 
 
 class OneLeg:
-    """A leg under a trunk; attributes and methods are as of `horse.Horse`, and others are
+    """One leg under a trunk, see `body.Body`.
 
     Attributes:
-        speed_scale: see `gait.speed_scale_of`.
+        speed_scale: speed over that of the published leg, see `gait.speed_scale_of` [-].
         low, high, middle, half: limits of the gait parameters, their middle and half range, shape (4,)
             [rad/s, rad, rad, rad].
-        rates: at which an action of 1 changes them, shape (4,) [rad/s^2, rad/s, rad/s, rad/s].
+        rates: rates of the parameters at an action of 1, shape (4,) [rad/s^2, rad/s, rad/s, rad/s].
+        gait: gait of all starts; None for one between walk and run.
+
+    Raises:
+        ParameterError: a setting is out of range.
+        Exception: the preset's own type of error, if one of its gaits cannot be commanded.
     """
 
     kernels = LEG_KERNELS
@@ -189,8 +200,9 @@ class OneLeg:
         s = settings
         check_choice("trunk", s.trunk, ONE_LEG)
         self.geometry = load_geometry(s.preset)
-        load_ground(s.preset)  # what is wrong with it is said, also where the settings replace it
+        load_ground(s.preset)  # a broken preset raises here, even if the settings replace its ground
         self.speed_scale = speed_scale_of(self.geometry)
+        # Similar legs: times are proportional to the speed scale, so that filters slow down with it.
         self.filters = FilterSettings().sped_up(1 / self.speed_scale)
         self.low, self.high = np.array([*limits_of(self.geometry).values()]).T
         self.middle = (self.low + self.high) / 2
@@ -213,31 +225,45 @@ class OneLeg:
         self.height = check_number("hip_height", height, low=LOWEST * nominal, high=HIGHEST * nominal)
 
     def parts(self, s: Settings) -> tuple[Trunk, Ground, tuple[Limb, ...]]:
-        """Trunk, ground and legs of some settings."""
+        """Make trunk, ground and legs from settings, see `Body.parts`."""
         trunk = Trunk(
-            s.trunk, s.trunk_mass, s.trunk_share, s.trunk_stiffness, s.trunk_damping, s.trunk_drag,
-            self.height,
-        )  # fmt: skip
+            kind=s.trunk,
+            mass=s.trunk_mass,
+            share=s.trunk_share,
+            stiffness=s.trunk_stiffness,
+            damping=s.trunk_damping,
+            drag=s.trunk_drag,
+            height=self.height,
+        )
         limb = Limb(self.geometry, drive=drive_of(s), spring=self._spring)
         return trunk, ground_of(s, s.trunk_mass), (limb,)
 
     def commanded_speeds(self, s: Settings) -> tuple[float, float] | None:
-        """Lowest and highest commanded speed [m/s], None for no command."""
+        """Return the lowest and highest commanded speed [m/s], None for no command."""
         return None if s.target_speed is None else check_range("target_speed", s.target_speed, -20.0)
 
     def reach(self, engine: TrunkEngine, dt: float) -> Floats:
-        """How far an action of 1 puts the command from where the gait is heading, shape (4,) [rad/s, and rad
-        thrice]."""
+        """Return the distance of the command of an action of 1 from where the gait is heading, shape (4,)
+        [rad/s, rad, rad, rad]."""
         return self.rates * reach_per_rate(self.filters, dt, engine.substep)
 
     def check_reachable(self, name: str, gaits: Floats, error: type[Exception] = ParameterError) -> None:
-        """Raise an `error` where gait parameters, shape (..., 4), are beyond what can be commanded: commands
-        are clipped there, and another gait would be played without a word."""
+        """Check that gait parameters can be commanded: commands are clipped to the limits, and another gait
+        would result silently.
+
+        Args:
+            name: name of the gait in messages.
+            gaits: gait parameters, shape (..., 4).
+            error: type of the error.
+
+        Raises:
+            error: a parameter is beyond the limits of the leg.
+        """
         for k, parameter in enumerate(PARAMETERS):
             values = gaits[..., k]
             low = self.low[k]
             high = self.high[k]
-            slack = 1e-9 * self.half[k]  # of sums like middle + half
+            slack = 1e-9 * self.half[k]  # for the rounding of sums like middle + half
             if ((values < low - slack) | (values > high + slack)).any():
                 beyond = float(values.flat[np.argmax(np.abs(values - self.middle[k]))])
                 whose = f" of a leg of {self.geometry.hip_height:.4g} m" if parameter == "crank_speed" else ""
@@ -247,15 +273,21 @@ class OneLeg:
                 )
 
     def constants(self, engine: TrunkEngine, dt: float) -> dict[str, Any]:
-        """Of the task's record, with a control step of `dt` [s]."""
+        """Return the body's part of the task's record, for a control step of `dt` [s]."""
         return {
-            "reach": self.reach(engine, dt), "lead": lead_of(self.filters, dt),
-            "middle": self.middle, "half": self.half, "low": self.low, "high": self.high,
-            "height": self.height, "lowest": LOWEST * self.height, "highest": HIGHEST * self.height,
-        }  # fmt: skip
+            "reach": self.reach(engine, dt),
+            "lead": lead_of(self.filters, dt),
+            "middle": self.middle,
+            "half": self.half,
+            "low": self.low,
+            "high": self.high,
+            "height": self.height,
+            "lowest": LOWEST * self.height,
+            "highest": HIGHEST * self.height,
+        }
 
     def check_options(self, options: Any, trunk: Trunk, settings: Settings) -> dict[str, Any]:
-        """See `leg_starts.check_options`."""
+        """Check reset options, see `leg_starts.check_options`; a gait must be one that can be commanded."""
         checked = check_options(options, self.gaits, trunk, settings)
         if checked.get("gait") is not None:
             self.check_reachable("options['gait']", checked["gait"].to_array())
@@ -264,7 +296,7 @@ class OneLeg:
     def draw(
         self, options: Mapping[str, Any], generators: Sequence[np.random.Generator], engine: TrunkEngine
     ) -> Start:
-        """Starts of episodes; see `leg_starts.draw_starts`."""
+        """Draw starts of episodes, see `leg_starts.draw_starts`."""
         return draw_starts(
             options, generators, engine.profiles[0], engine.trunk, self.gaits, engine.terrain, self.gait
         )
@@ -277,13 +309,17 @@ class OneLeg:
 
     @property
     def policy_names(self) -> list[str]:
-        """Names of the scripted policies: the gaits of the preset, and `POLICIES`."""
+        """Names of the scripted policies: the gaits of the preset, then `POLICIES`."""
         return sorted(self.gaits) + list(POLICIES)
 
     def action_for(
         self, gaits: str | GaitParameters | Floats, engine: TrunkEngine, dt: float
     ) -> NDArray[np.float32]:
-        """See `LegBase.action_for`; shape (num_envs, 4)."""
+        """Return the actions that move towards gaits, shape (num_envs, 4), see `LegBase.action_for`.
+
+        Raises:
+            ParameterError: an unknown name, another shape, or a gait that cannot be commanded.
+        """
         if isinstance(gaits, str):
             gaits = self.gaits[check_choice("gait", gaits, self.gaits)]
         try:

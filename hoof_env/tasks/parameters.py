@@ -1,5 +1,5 @@
-"""From settings to mechanics: trunk, ground, terrain and motors, the same for all episodes or drawn for
-each."""
+"""Conversion of settings to parts of the engine: ground, terrain, drives and springs, and the physical
+parameters that are drawn for each episode."""
 
 from __future__ import annotations
 
@@ -17,11 +17,16 @@ from hoof_env.leg.geometry import preset_error_type, preset_label, read_preset
 from hoof_env.tasks.effects import check_effect
 from hoof_env.tasks.settings import PER_EPISODE, SOLVERS, Settings
 
-MOST_SUBSTEPS = 100_000  # of a control step
+MOST_SUBSTEPS = 100_000  # largest number of substeps of a control step
 
 
 def resolved(settings: Settings) -> Settings:
-    """The settings with values for None: the ground of the preset, the solver's own scheme and step."""
+    """Return the settings with values for None: the ground of the preset, the solver's own scheme and step.
+
+    Raises:
+        ParameterError: an unknown solver.
+        Exception: the preset's own type of error, if it has no ground and the settings lack one.
+    """
     is_paper = check_choice("solver", settings.solver, SOLVERS) == "paper"
     s: Any = settings
     if s.stiffness is None or s.exponent is None:
@@ -37,14 +42,24 @@ def resolved(settings: Settings) -> Settings:
         s = replace(s, integrator="euler" if is_paper else "midpoint")
     if s.sim_dt is None:
         s = replace(s, sim_dt=1e-3 if is_paper else 1e-4)
-    done: Settings = s
-    return done
+    complete: Settings = s
+    return complete
 
 
 def check_range(
     name: str, value: Any, low: float, high: float = 1e6, *, or_one: bool = True
 ) -> tuple[float, float]:
-    """A range from `low` to `high`, with `or_one` also one number as one; ParameterError of anything else."""
+    """Check a range of numbers.
+
+    Args:
+        name: name of the argument in messages.
+        value: two numbers in ascending order, or one number for both if `or_one`.
+        low, high: bounds of both numbers.
+        or_one: True if one number is accepted.
+
+    Raises:
+        ParameterError: anything else.
+    """
     if or_one and not isinstance(value, (list, tuple)):
         value = value, value
     try:
@@ -56,9 +71,14 @@ def check_range(
 
 
 def substeps_of(dt: float, sim_dt: float) -> int:
-    """How many substeps [s] make a control step [s]; ParameterError if no whole number does, or too many."""
+    """Return the number of substeps of `sim_dt` [s] in a control step of `dt` [s].
+
+    Raises:
+        ParameterError: the ratio is not a whole number, or above `MOST_SUBSTEPS`.
+    """
     check_number("sim_dt", sim_dt, low=0, exclusive_low=True)
     check_number("dt", dt, low=0, exclusive_low=True)
+    # With a tolerance: 0.02 / 0.001 is not a whole number in binary.
     ratio = dt / sim_dt
     if not 0.5 < ratio <= MOST_SUBSTEPS or abs(ratio - round(ratio)) > 1e-6:
         raise ParameterError(
@@ -69,24 +89,38 @@ def substeps_of(dt: float, sim_dt: float) -> int:
 
 
 def ground_of(s: Any, mass: float) -> Ground:
-    """The ground of some `resolved` settings, under a trunk of so much mass [kg]."""
+    """Make the ground from `resolved` settings, under a trunk of a mass [kg]."""
     return Ground(
-        s.stiffness, s.exponent, s.normal_law, s.restitution, s.approach_floor,
+        s.stiffness,
+        s.exponent,
+        s.normal_law,
+        s.restitution,
+        s.approach_floor,
+        # The paper takes the approach speed at the first step inside the ground.
         "sampled" if s.solver == "paper" else "interpolated",
-        s.friction_law, s.friction, s.friction_slow, s.friction_fast, mass,
-    )  # fmt: skip
+        s.friction_law,
+        s.friction,
+        s.friction_slow,
+        s.friction_fast,
+        mass,
+    )
 
 
 def drive_of(s: Settings) -> Drive:
-    """What turns the cranks."""
+    """Make the drive of the cranks from settings."""
     if s.drive == "prescribed":
         return Prescribed()
+    # The settings are those of the motor at the crank: a gear ratio of 1.
     return Motor(s.motor_gain, s.motor_torque, s.motor_inertia, 1.0)
 
 
 def hoof_spring(settings: Settings) -> HoofSpring | None:
-    """The spring at toe and heel each; without a damping, with a tenth of the critical one under the trunk of
-    the settings, whatever a reset draws."""
+    """Make the spring at toe and heel, None for a rigid hoof. The default damping is a tenth of the critical
+    one under the trunk mass of the settings, even if a reset draws another mass.
+
+    Raises:
+        ParameterError: a value is out of range, or there is a damping without a stiffness.
+    """
     stiffness = settings.hoof_stiffness
     damping = settings.hoof_damping
     if stiffness is None:
@@ -101,8 +135,17 @@ def hoof_spring(settings: Settings) -> HoofSpring | None:
 
 
 def check_parameters(name: str, given: Any, settings: Settings) -> dict[str, float | tuple[float, float]]:
-    """Physical parameters of an episode, a number each or two to draw between; `ParameterError` where one
-    cannot change, has no effect beside the settings, or is none."""
+    """Check physical parameters of an episode, each a number or a range to draw from.
+
+    Args:
+        name: name of the argument in messages.
+        given: parameters by name.
+        settings: settings of the environment.
+
+    Raises:
+        ParameterError: a parameter is unknown, cannot change, has no effect with the settings, or is neither
+            a finite number nor a range in ascending order.
+    """
     if not isinstance(given, Mapping) or not set(given) <= set(PER_EPISODE):
         raise ParameterError(
             f"{name}: expected a mapping with some of {', '.join(PER_EPISODE)}, got {given!r}"
@@ -124,15 +167,19 @@ def check_parameters(name: str, given: Any, settings: Settings) -> dict[str, flo
 
 
 def extremes(given: Mapping[str, float | tuple[float, float]]) -> list[dict[str, float]]:
-    """Corners of what can be drawn: all lowest, all highest, closest friction thresholds, and what asks for
-    the shortest steps under a light and a heavy trunk."""
+    """Return the corners of the ranges that can be invalid or ask for short steps: all lowest, all highest,
+    closest friction thresholds, and the stiffest contact under a light and a heavy trunk."""
+    # Not all 2^n corners: these few bound the limits of the step.
     pairs = {name: value if isinstance(value, tuple) else (value, value) for name, value in given.items()}
     low, high = ({name: ends[k] for name, ends in pairs.items()} for k in (0, 1))
 
     def mixed(base: dict[str, float], other: dict[str, float], *names: str) -> dict[str, float]:
+        """Return a corner with some parameters of another one."""
         return base | {name: other[name] for name in names if name in other}
 
+    # The lower threshold at its highest, the upper one at its lowest: they may cross.
     close = mixed(low, high, "friction_slow")
+    # A low restitution and a low approach floor give the strongest damping.
     hard = mixed(high, low, "restitution", "approach_floor", "trunk_mass")
     corners = (low, high, close, hard, mixed(hard, high, "trunk_mass"))
     return [corner for k, corner in enumerate(corners) if corner not in corners[:k]]
@@ -141,7 +188,7 @@ def extremes(given: Mapping[str, float | tuple[float, float]]) -> list[dict[str,
 def draw_parameters(
     given: Mapping[str, float | tuple[float, float]], generator: np.random.Generator
 ) -> dict[str, float]:
-    """A value for each parameter."""
+    """Draw a value for each parameter that is a range; return all values by name."""
     return {
         name: float(generator.uniform(*value)) if isinstance(value, tuple) else value
         for name, value in given.items()
@@ -151,16 +198,27 @@ def draw_parameters(
 STRETCH = 10.0
 DRIFT = 0.03
 HIGHEST_HILLS = 0.2
-"""Over so long a stretch of ground [m] its mean height must stay within so large a part of the hip height of
-y = 0 where the trunk does not follow the ground. The springs of `HorseLeg-v0` take 1.1 times the weight off
-the leg, or put it on, at that height. Hills rise and fall about y = 0, so they may be so much higher."""
+"""Limits of ground under a trunk that does not follow it: the mean height over `STRETCH` [m] stays within
+`DRIFT` times the hip height of y = 0. At that height the suspension of `HorseLeg-v0` loads or unloads the leg
+by 1.1 times the weight. Hills rise and fall about y = 0, so that they may be as high as `HIGHEST_HILLS` times
+the hip height."""
 
 HELD = ("suspended", "rail")
-"""Trunks that move along and keep their height in the world."""
+"""Kinds of trunks that travel and keep their height in the world."""
 
 
 def check_drift(terrain: Terrain, description: Any, trunk: str, hip_height: float) -> None:
-    """Raise `ParameterError` where a trunk that keeps its height would leave the ground, or press on it."""
+    """Check that a trunk that keeps its height stays near the ground.
+
+    Args:
+        terrain: terrain.
+        description: setting `terrain` that it was made from.
+        trunk: kind of trunk.
+        hip_height: nominal height of the trunk [m].
+
+    Raises:
+        ParameterError: the ground drifts too far from y = 0.
+    """
     if trunk not in HELD or terrain == Terrain.flat():
         return
     remedy = (
@@ -182,14 +240,20 @@ def check_drift(terrain: Terrain, description: Any, trunk: str, hip_height: floa
 
 
 def farthest_mean(terrain: Terrain, stretch: float) -> tuple[float, float]:
-    """The mean height over a stretch [m] of the ground that is farthest from 0 [m], of those that begin, end
-    or have their middle at a knot or between two, and where the middle is [m]."""
+    """Return the mean height over a stretch of ground that is farthest from 0 [m], and x of its middle [m].
+
+    Args:
+        terrain: terrain.
+        stretch: length of the stretches [m], which begin, end or have their middle at a knot or halfway
+            between two knots.
+    """
     x = terrain.x
     height = np.array(terrain.height)
     areas = np.concatenate([[0.0], np.cumsum((height[1:] + height[:-1]) / 2 * terrain.spacing)])
 
     def area_to(to: Any) -> Any:
-        """Integral of the height from the first knot on."""
+        """Return the integral of the height from the first knot to an x [m^2]."""
+        # Beyond its ends the terrain is level.
         inside = np.clip(to, x[0], x[-1])
         k = np.minimum(((inside - x[0]) / terrain.spacing).astype(int), len(x) - 1)
         level = np.minimum(to - x[0], 0.0) * height[0] + np.maximum(to - x[-1], 0.0) * height[-1]
@@ -206,20 +270,31 @@ KINDS = ("hills", "slope")
 SPACING = 0.1  # between knots of hills [m]
 
 HILLS: dict[str, Any] = {
-    "seed": 0, "length": 400.0, "rise": 0.15, "slope": 0.15, "patch": 2.0,
-    "stiffness": (0.25, 4.0), "friction": (0.5, 1.5),
-}  # fmt: skip
-"""What `hills` takes: seed; length [m]; heights are within +-rise [m]; steepest slope [-]; mean length of a
+    "seed": 0,
+    "length": 400.0,
+    "rise": 0.15,
+    "slope": 0.15,
+    "patch": 2.0,
+    "stiffness": (0.25, 4.0),
+    "friction": (0.5, 1.5),
+}
+"""Defaults of `hills`: seed; length [m]; largest absolute height [m]; steepest slope [-]; mean length of a
 patch [m]; ranges of the factors of stiffness and friction."""
 
 
 def make_terrain(description: Any) -> Terrain:
-    """A terrain from None (level), {"kind": "hills", ...}, {"kind": "slope", "angle": rad} or what
-    `Terrain.to_dict` gives; `ParameterError` from anything else.
+    """Make a terrain from the setting `terrain`.
 
-    Hills go straight from one random height to the next, each at a slope of its own, over patches of random
-    stiffness and friction; the same for the same seed. They begin at x = 0. The rest of the animal, which a
-    suspended trunk hangs from, does not follow them: they are low.
+    Hills are straight from one random height to the next, each with its own slope, over patches of random
+    stiffness and friction. The same seed gives the same hills. They begin at x = 0. Under a suspended trunk
+    they must be low, because the rest of the animal does not follow them (`check_drift`).
+
+    Args:
+        description: None for level ground, {"kind": "hills", ...} with keys of `HILLS`, {"kind": "slope",
+            "angle": rad}, or the mapping that `Terrain.to_dict` returns.
+
+    Raises:
+        ParameterError: anything else.
     """
     if description is None:
         return Terrain.flat()
@@ -239,33 +314,36 @@ def make_terrain(description: Any) -> Terrain:
     return _hills({**HILLS, **rest})
 
 
-def _hills(given: dict[str, Any]) -> Terrain:
-    seed = int(check_number("terrain['seed']", given["seed"], low=0, high=2**32))
-    length = check_number("terrain['length']", given["length"], low=10.0, high=1e5)
-    rise = check_number("terrain['rise']", given["rise"], low=0.0, high=10.0)
-    steepest = check_number("terrain['slope']", given["slope"], low=1e-3, high=1.0)
-    patch = check_number("terrain['patch']", given["patch"], low=0.2, high=1e3)
+def _hills(values: dict[str, Any]) -> Terrain:
+    """Make hills from values for all keys of `HILLS`."""
+    seed = int(check_number("terrain['seed']", values["seed"], low=0, high=2**32))
+    length = check_number("terrain['length']", values["length"], low=10.0, high=1e5)
+    rise = check_number("terrain['rise']", values["rise"], low=0.0, high=10.0)
+    steepest = check_number("terrain['slope']", values["slope"], low=1e-3, high=1.0)
+    patch = check_number("terrain['patch']", values["patch"], low=0.2, high=1e3)
     generator = np.random.default_rng(seed)
     knots = round(length / SPACING) + 1
 
     height = 0.0
     row = np.zeros(knots)
     k = 1
+    # The order of the draws is part of what a seed means.
     while k < knots:
-        there = generator.uniform(-rise, rise)
+        target = generator.uniform(-rise, rise)
         slope = generator.uniform(0.2, 1.0) * steepest
-        many = max(round(abs(there - height) / slope / SPACING), 1)
-        row[k : k + many] = np.linspace(height, there, many + 1)[1:][: knots - k]
-        height = there
-        k = k + many
+        count = max(round(abs(target - height) / slope / SPACING), 1)
+        row[k : k + count] = np.linspace(height, target, count + 1)[1:][: knots - k]
+        height = target
+        k = k + count
     factors = {}
     for name in ("stiffness", "friction"):
-        low, high = np.log(check_range(f"terrain[{name!r}]", given[name], 1e-3, 1e3, or_one=False))
+        # Uniform in the logarithm: half as stiff is as likely as twice as stiff.
+        low, high = np.log(check_range(f"terrain[{name!r}]", values[name], 1e-3, 1e3, or_one=False))
         factor = np.empty(knots)
         k = 0
         while k < knots:
-            many = max(round(generator.exponential(patch) / SPACING), 5)
-            factor[k : k + many] = np.exp(generator.uniform(low, high))
-            k += many
+            count = max(round(generator.exponential(patch) / SPACING), 5)
+            factor[k : k + count] = np.exp(generator.uniform(low, high))
+            k += count
         factors[name] = tuple(factor.tolist())
     return Terrain(tuple(row.tolist()), factors["stiffness"], factors["friction"], 0.0, SPACING)

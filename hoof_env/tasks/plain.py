@@ -1,4 +1,4 @@
-"""Values as Python and JSON know them."""
+"""Conversion of settings and arguments to plain values of Python and JSON."""
 
 from __future__ import annotations
 
@@ -15,17 +15,22 @@ from hoof_env.tasks.settings import Settings
 
 
 def to_json(settings: Settings) -> dict[str, Any]:
-    """The settings as values that JSON can hold."""
+    """Return the settings as values that JSON can hold, by name."""
     return {key: json_value(value) for key, value in asdict(settings).items()}
 
 
 def as_plain(name: str, value: Any) -> Any:
-    """A value as Python and JSON know it: numbers of NumPy and pandas as numbers, arrays as lists, paths as
-    text, enumerations by their value.
+    """Convert a value to plain Python: numbers of NumPy and pandas to numbers, arrays to lists, paths to
+    text, enumerations to their value. Other objects are returned as they are.
+
+    Args:
+        name: name of the value in messages.
+        value: any object.
 
     Raises:
         ParameterError: another kind of number, such as a tensor.
     """
+    # Most values are plain already; by type, because a bool is an int and subclasses are converted below.
     if value is None or type(value) in (bool, int, float, str):
         return value
     if isinstance(value, (np.generic, np.ndarray)) and value.dtype != object:
@@ -39,17 +44,18 @@ def as_plain(name: str, value: Any) -> Any:
     if isinstance(value, (list, tuple)):
         plain = (as_plain(f"{name}[{k}]", inner) for k, inner in enumerate(value))
         return tuple(plain) if isinstance(value, tuple) else list(plain)
+    # Subclasses of other libraries, which JSON and pickles of this package should not depend on.
     if isinstance(value, (int, float, str)):
         return next(kind(value) for kind in (int, float, str) if isinstance(value, kind))
     if hasattr(type(value), "__float__"):
         raise ParameterError(
             f"{name}: expected a number of Python or NumPy, which JSON can hold, got {value!r}"
         )
-    return value  # what takes it says what is wrong
+    return value  # the check of the setting says what is wrong
 
 
 def json_value(value: Any) -> Any:
-    """Lists for tuples, however deep, as JSON gives them back."""
+    """Convert tuples to lists at every depth, which is the form in which JSON returns them."""
     if isinstance(value, (list, tuple)):
         return [json_value(inner) for inner in value]
     if isinstance(value, Mapping):

@@ -1,7 +1,6 @@
-"""The family of tasks, as data: what each id asks of the leg, in `settings` and otherwise.
+"""Tasks of all ids, as data: settings, starts, terms of the reward, entries of the observation and body.
 
-One environment class serves all (`horse_leg`), alone or many at once (`vector`): a task differs in its
-settings, its starts and what is observed, and in nothing else.
+One class of environments runs all tasks (`envs.horse_leg`), and one runs many at once (`envs.vector`).
 """
 
 from __future__ import annotations
@@ -35,22 +34,22 @@ from hoof_env.tasks.settings import SETTINGS, Settings
 
 @dataclass(frozen=True)
 class Task:
-    """A task: `defaults` are its settings where they differ from those of `Settings`.
+    """Task of an id.
 
     Attributes:
-        name: of the id, without namespace and version; or a whole id.
-        summary: one line.
-        about: what is asked, for the manual page.
-        defaults: settings.
-        start: reset options, unless others are given.
-        reference: the scripted gait that simple policies must stay below.
-        terms: of the reward.
-        entries: all that can be observed.
-        body: makes the `body.Body` of some settings.
-        speeds: of a horse of size 1, between which a `target_speed` of None commands; they go with the root
-            of the size [m/s].
-        contact_law: instead of `normal_law`, see `dynamics.hoof.law_of`.
-        module: that registers it, which other processes import.
+        name: name of the id, without namespace and version; or a whole id.
+        summary: one line for the manual page.
+        about: description for the manual page.
+        defaults: settings that differ from the defaults of `Settings`.
+        start: reset options that are used unless others are given.
+        reference: name of the scripted gait with a score that simple policies must not reach.
+        terms: terms of the reward.
+        entries: entries that can be observed.
+        body: function that makes the `body.Body` of settings.
+        speeds: range of commanded speeds for a `target_speed` of None, of a horse of size 1; proportional to
+            the root of the size [m/s].
+        contact_law: user's law instead of `normal_law`, see `dynamics.hoof.law_of`.
+        module: module that registers the task, which other processes import.
     """
 
     name: str
@@ -68,34 +67,35 @@ class Task:
 
     @property
     def id(self) -> str:
-        """The registered id."""
+        """Registered id."""
         return self.name if "/" in self.name else f"hoof_env/{self.name}-v0"
 
     @property
     def key(self) -> str:
-        """What `task_of` takes."""
+        """Name by which `task_of` finds the task, in another process, too."""
         if "/" in self.name:
             return f"{self.module}:{self.name}" if self.module else self.name
         return next(key for key, task in TASKS.items() if task.name == self.name)
 
     def names(self) -> tuple[list[str], ...]:
-        """Of what it is made of."""
+        """Return the names of the task's terms, entries and contact law."""
         law = [function_name(self.contact_law)] if self.contact_law else []
         return [term.name for term in self.terms], [entry.name for entry in self.entries], law
 
     def __reduce__(self) -> Any:
-        """Pickles have its name: functions of terms and entries need not have one."""
+        """Pickle the task by its name: its functions may be lambdas, which cannot be pickled."""
         return _task_like, (self.key, self.names())
 
     def __deepcopy__(self, memo: Any) -> Task:
+        """Return the task itself, which never changes."""
         return self
 
     def settings(self, changes: Mapping[str, Any]) -> Settings:
-        """Its settings with some changed; reward weights that are not named keep the task's values.
+        """Return the task's settings with changes. Reward weights that are not named keep the task's values.
 
         Raises:
             UnknownArgumentError: an unknown setting.
-            ParameterError: one is not the task's own and has no effect beside the others.
+            ParameterError: a change has no effect with the other settings.
         """
         settings = self.chosen(changes)
         if self.speeds is None or settings.target_speed is not None:
@@ -104,26 +104,29 @@ class Task:
         return replace(settings, target_speed=(speed_scale * self.speeds[0], speed_scale * self.speeds[1]))
 
     def chosen(self, changes: Mapping[str, Any]) -> Settings:
-        """The same where a target speed that nobody names is None still."""
+        """Return the settings as `settings` does, but with a `target_speed` of None where it was not set."""
         for name in changes:
             if name not in SETTINGS:
                 near = difflib.get_close_matches(name, SETTINGS, 1)
                 hint = f"; did you mean {near[0]}?" if near else f" (known: {', '.join(SETTINGS)})"
                 raise UnknownArgumentError(f"{self.id}: unexpected keyword argument {name!r}{hint}")
         weights = changes.get("reward_weights")
-        own = self.defaults.get("reward_weights", {})
-        if own and (weights is None or isinstance(weights, Mapping)):
-            changes = {**changes, "reward_weights": {**own, **(weights or {})}}
-        changes = {name: as_plain(name, value) for name, value in changes.items()}  # a copy, too
+        default_weights = self.defaults.get("reward_weights", {})
+        if default_weights and (weights is None or isinstance(weights, Mapping)):
+            changes = {**changes, "reward_weights": {**default_weights, **(weights or {})}}
+        # Also a copy: callers may change their lists and mappings later.
+        changes = {name: as_plain(name, value) for name, value in changes.items()}
         if unknown := sorted(set(self.defaults) - set(SETTINGS)):
             raise UnknownArgumentError(f"{self.id}: unknown settings {', '.join(unknown)}")
         plain = replace(Settings(), **self.defaults)
         settings = replace(plain, **changes)
+        # `target_seconds` has an effect with the range that None stands for.
         is_ranged = self.speeds is not None and settings.target_speed is None
         in_effect = replace(settings, target_speed=self.speeds) if is_ranged else settings
         for name, value in changes.items():
             usual = json_value(getattr(plain, name))
-            if not np.array_equal(json_value(value), usual):  # else it asks for nothing
+            # A default that is passed explicitly asks for nothing, with or without an effect.
+            if not np.array_equal(json_value(value), usual):
                 check_effect(name, in_effect)
         if self.contact_law and settings.solver == "paper":
             raise ParameterError(
@@ -145,7 +148,7 @@ RACING: Mapping[str, Any] = MappingProxyType(
         },
     }
 )
-"""Settings of a task that pays for every metre, however fast, and not for bearing weight."""
+"""Settings of a task that rewards every metre at any speed, and no bearing of weight."""
 
 _SUSPENDED = (
     "The trunk moves along x and y. The leg must bear `trunk_share` of the weight of trunk and leg; a"
@@ -244,27 +247,36 @@ TASKS: Mapping[str, Task] = MappingProxyType(
 Part = TypeVar("Part", Term, Entry)
 
 _OWN: dict[str, Task] = {}
+"""Tasks of `register`, by id."""
 
 
 def task_of(name: Any) -> Task:
-    """A task of `TASKS` by its name, or one of `register` by its id; "module:id" imports the module first
-    where the id is not registered yet, as in a process that was spawned.
+    """Find a task.
+
+    Args:
+        name: name in `TASKS`, id of a registered task, or "module:id", which imports the module first if the
+            id is not registered yet.
 
     Raises:
-        ParameterError: there is none.
+        ParameterError: there is no such task.
     """
-    module, _, own = name.rpartition(":") if isinstance(name, str) else ("", "", name)
-    if module and own not in _OWN:
+    module, _, env_id = name.rpartition(":") if isinstance(name, str) else ("", "", name)
+    # A spawned process has registered nothing: the module does so when it is imported.
+    if module and env_id not in _OWN:
         try:
             import_module(module)
         except ModuleNotFoundError as error:
             raise ParameterError(f"task: {name!r} is not registered here, and {error}") from None
     tasks = {**TASKS, **_OWN}
-    return tasks[check_choice("task", own if module else name, tasks)]
+    return tasks[check_choice("task", env_id if module else name, tasks)]
 
 
 def _task_like(name: str, names: tuple[list[str], ...]) -> Task:
-    """The task of a pickle: that of this process, if it is the same one."""
+    """Return the task of a pickle: this process's task of that name.
+
+    Raises:
+        ParameterError: there is none, or it has other terms, entries or another law than the pickled one.
+    """
     task = task_of(name)
     if task.names() != names:
         raise ParameterError(
@@ -274,6 +286,7 @@ def _task_like(name: str, names: tuple[list[str], ...]) -> Task:
 
 
 def _several(name: str, values: Any, kind: type[Part]) -> tuple[Part, ...]:
+    """Check that `values` is an iterable of terms or of entries; return it as a tuple."""
     parts = tuple(values) if isinstance(values, Iterable) else (values,)
     for part in parts:
         if not isinstance(values, Iterable) or not isinstance(part, kind):
@@ -282,7 +295,11 @@ def _several(name: str, values: Any, kind: type[Part]) -> tuple[Part, ...]:
 
 
 def _check_twice(env_id: str, names: list[str]) -> None:
-    """Raise `ParameterError` if a name is there twice."""
+    """Check that no name occurs twice.
+
+    Raises:
+        ParameterError: one does.
+    """
     twice = sorted({name for name in names if names.count(name) > 1})
     if twice:
         raise ParameterError(f"{env_id}: expected names that differ, got {', '.join(twice)} twice")
@@ -297,50 +314,50 @@ def register(
     contact_law: Callable[..., Any] | None = None,
     **defaults: Any,
 ) -> None:
-    """Register an id of one's own: a task of this package with more terms of the reward, more entries of the
-    observation, another law of contact and other settings. It serves `gymnasium.make` and `make_vec`.
+    """Register an id of one's own, for `gymnasium.make` and `make_vec`: a task of this package with more
+    terms of the reward, more entries of the observation, another law of contact and other settings.
 
     An id that is registered already is replaced, with Gymnasium's warning. Other processes import the module
-    that calls this, so it stands at the top level of one; see docs/own_task.md.
+    that calls this function, so the call belongs at the top level of a module; see docs/own_task.md.
 
     Args:
         env_id: "namespace/Name-v0".
-        base: a name in `TASKS` or an id of one's own, whose settings, terms and entries it begins with.
-        terms: of the reward, behind those of the base; one with a name that the base has takes its place.
-        entries: that can be observed, behind those of the base; their groups are observed by default.
+        base: name in `TASKS`, or an id of one's own, from which settings, terms and entries are taken.
+        terms: terms of the reward, behind those of the base; one with the same name replaces its term.
+        entries: entries of the observation, behind those of the base; their groups are observed by default.
         contact_law: function of penetration [m], its rate [m/s], inverse approach speed [s/m] and the
             ground's constants, which returns the normal force [N]; see `dynamics.hoof.law_of`.
         defaults: settings, see the manual pages.
 
     Raises:
-        ParameterError: an unknown base, a name twice, an id that does not read so, a term, entry or law of
-            another type, or a setting without effect. Nothing is registered then.
+        ParameterError: an unknown base, a name that occurs twice, an id of another form, a term, entry or law
+            of another type, or a setting without effect. Nothing is registered then.
         UnknownArgumentError: an unknown setting.
     """
-    own = _several(f"{env_id}: terms", terms, Term)
-    more = _several(f"{env_id}: entries", entries, Entry)
+    new_terms = _several(f"{env_id}: terms", terms, Term)
+    new_entries = _several(f"{env_id}: entries", entries, Entry)
     if not isinstance(env_id, str) or not re.fullmatch(r"(?!hoof_env/)[\w-]+/[\w-]+-v\d+", env_id):
         raise ParameterError(f"env_id: expected 'namespace/Name-v0' of a namespace of yours, got {env_id!r}")
     old = task_of(base)
     if contact_law is not None:
         check_function(f"{env_id}: contact_law", contact_law, 4)
-    _check_twice(env_id, [term.name for term in own])
-    _check_twice(env_id, [entry.name for entry in (*old.entries, *more)])
-    mine = {term.name: term for term in own}
-    kept = [mine.pop(term.name, term) for term in old.terms]
+    _check_twice(env_id, [term.name for term in new_terms])
+    _check_twice(env_id, [entry.name for entry in (*old.entries, *new_entries)])
+    added = {term.name: term for term in new_terms}
+    kept = [added.pop(term.name, term) for term in old.terms]
     of_law = f" The normal force is that of `{function_name(contact_law)}`." if contact_law else ""
     caller = str(sys._getframe(1).f_globals.get("__name__", ""))
     task = replace(
         old,
         name=env_id,
-        module="" if caller in ("__main__", "__mp_main__") else caller,
+        module="" if caller in ("__main__", "__mp_main__") else caller,  # other processes import it
         summary=f"{old.summary} With terms, entries or laws from outside this package.",
         about=old.about + of_law,
-        terms=(*kept, *mine.values()),
-        entries=(*old.entries, *more),
+        terms=(*kept, *added.values()),
+        entries=(*old.entries, *new_entries),
         contact_law=contact_law or old.contact_law,
     )
-    groups = dict.fromkeys((*old.chosen({}).observation, *groups_of(more)))
+    groups = dict.fromkeys((*old.chosen({}).observation, *groups_of(new_entries)))
     settings = task.chosen({"observation": tuple(groups), **defaults})
     check_groups(settings.observation, groups_of(task.entries))
     check_weights(settings.reward_weights, task.terms)
@@ -357,5 +374,6 @@ def _add_to_gymnasium(task: Task) -> None:
         entry_point="hoof_env.envs.horse_leg:HorseLegEnv",
         vector_entry_point="hoof_env.envs.vector:HorseLegVectorEnv",
         kwargs={"task": task.key},
-        disable_env_checker=True,  # as for the package's own ids
+        # As for the package's own ids, see `hoof_env/__init__.py`.
+        disable_env_checker=True,
     )

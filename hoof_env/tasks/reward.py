@@ -1,8 +1,8 @@
-"""The reward: one table of terms. A term is a row here, its objective in `HorseLegMO-v0` included, and
-nothing else has to be touched.
+"""Reward of one leg: a table of terms. A new term is a row of the table, with its objective in
+`HorseLegMO-v0`, and needs no other change.
 
-The sum of all terms is the reward, `info["reward_<name>"]` has each. `docs/task.md` gives the reasons
-for the weights and what they lead to."""
+The reward is the sum of all terms; `info["reward_<name>"]` holds each. `docs/task.md` gives the reasons for
+the weights and their consequences."""
 
 from __future__ import annotations
 
@@ -18,22 +18,22 @@ from hoof_env.simd.user_functions import check_function
 
 
 class Outcome(NamedTuple):
-    """What a control step brought, for the terms; where the engine failed nothing but `failed`. Of a horse,
-    forces, work, times and slip are those of all legs together.
+    """Outcome of a control step, the argument of the terms. Where the engine failed, `failed` is 1 and what
+    the step added is 0.
 
     Attributes:
-        seconds: simulated [s].
-        progress: forward [m].
-        commanded_progress: at the commanded speed; infinite without one [m].
-        sums: `dynamics.layout.StrideSums` of the step, `sums.slip` and so on; all legs together, peaks the
-            highest.
-        borne: impulse over the weight that bearing is paid for [s], see `BEARING`.
+        seconds: simulated time [s].
+        progress: forward travel [m].
+        commanded_progress: forward travel at the commanded speed; infinite without one [m].
+        sums: `dynamics.layout.StrideSums` of the step, `sums.slip` and so on; sums over all legs, of peaks
+            the highest.
+        borne: impulse over the weight for which bearing is rewarded [s], see `BEARING`.
         failed: 1 where the episode ends by failure, else 0.
-        episode_seconds: of a whole episode [s].
-        weight: of trunk and legs [N].
-        trunk, leg, episode: all that the engine and the episode have in memory after the step, fields as in
-            `dynamics.layout.TrunkMemory` and `LegMemory` and `episode.Episode`; `block_at(leg, i)` is a
-            horse's i-th.
+        episode_seconds: duration of a whole episode [s].
+        weight: weight of trunk and legs [N].
+        trunk, leg, episode: memory of the engine and the episode after the step, with fields as in
+            `dynamics.layout.TrunkMemory`, `LegMemory` and `episode.Episode`; `block_at(leg, i)` is a horse's
+            i-th leg.
     """
 
     seconds: Any
@@ -50,89 +50,95 @@ class Outcome(NamedTuple):
 
 
 BEARING = 0.9
-"""Part of the weight [-] that is paid for at most, in the mean: between what the leg must bear, by default
-0.8, and the whole weight, beyond which the suspension would have to pull the animal down."""
+"""Largest part of the weight for which bearing is rewarded, in the mean [-]: between the part that the leg
+must bear, by default 0.8, and the whole weight, beyond which the suspension would pull the animal down."""
 
 LONGEST_STRIDE = 1.0
-"""Time [s] over which that mean is taken: what was not borne for longer cannot be made up for."""
+"""Time over which that mean is taken [s]: what was not borne for longer cannot be made up for."""
 
 STEPPING = 0.5
-"""Rate of the crank from which a leg counts as stepping, a twelfth of that of the paper's gaits [rad/s]:
-agents slow the crank down in a stance, and a leg whose crank stands still can only tremble."""
+"""Rate of the crank from which a leg counts as stepping [rad/s], a twelfth of that of the paper's gaits:
+agents slow the crank down in a stance, and a leg can only oscillate its swing while its crank stands."""
+
+
+# Arguments of all terms: an `Outcome`, and the weight of the term in the unit that `TERMS` says.
 
 
 def progress(step, weight):  # type: ignore[no-untyped-def]
-    """Paid up to the commanded speed."""
+    """Return the reward for forward travel, up to the commanded speed; weight in 1/m."""
     return weight * minimum(step.progress, step.commanded_progress)
 
 
 def overspeed(step, weight):  # type: ignore[no-untyped-def]
-    """What goes beyond the commanded speed."""
+    """Return the charge for travel beyond the commanded speed; weight in 1/m."""
     return -weight * maximum(step.progress - step.commanded_progress, 0.0)
 
 
 def peak(step, weight):  # type: ignore[no-untyped-def]
-    """Weight in 1/kN."""
+    """Return the charge for the increase of the running peak GRF; weight in 1/kN."""
     return -0.001 * weight * step.sums.running_peak_increase
 
 
 def loading(step, weight):  # type: ignore[no-untyped-def]
-    """Weight in s/MN."""
+    """Return the charge for the increase of the stance's loading rate; weight in s/MN."""
     return -1e-6 * weight * step.sums.loading_rate_increase
 
 
 def energy(step, weight):  # type: ignore[no-untyped-def]
-    """Weight in 1/kJ."""
+    """Return the charge for positive work of the drives; weight in 1/kJ."""
     return -0.001 * weight * step.sums.positive_work
 
 
 def slip(step, weight):  # type: ignore[no-untyped-def]
-    """Way that the hoof slides in stance, to and fro."""
+    """Return the charge for the distance that the hoof slides in stance; weight in 1/m."""
     return -weight * step.sums.slip
 
 
 def failure(step, weight):  # type: ignore[no-untyped-def]
-    """Charged once, for the rest of the episode."""
+    """Return the charge for a failure, once, in proportion to the rest of the episode; weight in 1/s."""
+    # For the rest, so that an early failure cannot be cheaper than the charges of continuing.
     return where(step.failed > 0.0, -weight * (step.episode_seconds - step.episode.time), 0.0)
 
 
 def support(step, weight):  # type: ignore[no-untyped-def]
-    """What was borne, in proportion to the speed, up to the commanded one, and to the crank's rate, up to
-    `STEPPING`: standing and pressing, or trembling with the swing, is not paid, and rubbing to and fro earns
-    nothing."""
+    """Return the reward for bearing weight, in proportion to the speed, up to the commanded one, and to the
+    crank's rate, up to `STEPPING`; weight in 1/s. There is no reward for standing still under load, for
+    oscillating the swing, or for moving back and forth."""
     commanded = maximum(step.commanded_progress, 1e-9)
     pace = minimum(maximum(step.progress / commanded, -1.0), 1.0)
+    # Without a commanded speed the ratio above is 0: then only the crank counts.
     pace = minimum(where(commanded < np.inf, pace, 1.0), step.leg.state.theta_rate * (1.0 / STEPPING))
-    # What was borne too much is charged backward, too, where both factors are negative
+    # The minimum, because two negative factors would reward too much bearing in backward motion.
     return weight * minimum(pace * step.borne, absolute(pace) * step.borne)
 
 
 OBJECTIVES = ("progress", "peak force", "energy")
-"""Objectives of `HorseLegMO-v0`, in the order of its vector reward; more is better in each."""
+"""Objectives of `HorseLegMO-v0`, in the order of its vector reward; larger is better in each."""
 
 PROGRESS, PEAK_FORCE, ENERGY = OBJECTIVES
 
 
 @dataclass(frozen=True)
 class Term:
-    """A term of the reward.
+    """Term of the reward.
 
     Attributes:
-        name: of its weight; the info's key is "reward_" and this.
-        weight: by default.
-        unit: of the weight.
-        meaning: what is weighed, for the manual page.
+        name: name of the term and of its weight; the key in infos is "reward_" followed by it.
+        weight: default weight.
+        unit: unit of the weight.
+        meaning: quantity that is weighted, for the manual page.
         compute: function of an `Outcome` and the weight, compiled for one environment and for eight side by
-            side: + - * /, comparisons, and the functions of `hoof_env.simd`; `where` in the place of `if`.
-        scalar: `compute` is a function of ordinary numbers, which may use `if` and `math`; it is called for
-            one environment after the other, which takes longer.
-        objective: one of `OBJECTIVES`, to which `HorseLegMO-v0` adds the term; None shares it among all in
+            side: + - * /, comparisons, and the functions of `hoof_env.simd`; `where` instead of `if`.
+        scalar: True if `compute` is a function of ordinary numbers, which may use `if` and `math`; it is
+            called for one environment after the other, which takes longer.
+        objective: one of `OBJECTIVES`, to which `HorseLegMO-v0` adds the term; None divides it among all in
             equal parts.
 
-    Where the engine fails, a term that is not in `TERMS` by its name counts 0.
+    Where the engine fails, a term from outside the package counts 0.
 
     Raises:
-        ParameterError: no name, a weight out of range, no function of two arguments, or an unknown objective.
+        ParameterError: the name is missing, the weight is out of range, `compute` is not a function of two
+            arguments, or the objective is unknown.
     """
 
     name: str
@@ -147,65 +153,90 @@ class Term:
         if not isinstance(self.name, str) or not self.name:
             raise ParameterError(f"name: expected a text, got {self.name!r}")
         check_number(f"{self.title}: weight", self.weight, low=0, high=1e6)
+        # Without one the term is divided among all objectives.
         if self.objective is not None:
             check_choice(f"{self.title}: objective", self.objective, OBJECTIVES)
         check_function(f"{self.title}: compute", self.compute, 2)
 
     @property
     def title(self) -> str:
-        """For people."""
+        """Name of the term in messages."""
         return f"term {self.name!r}"
 
     @property
     def key(self) -> str:
-        """Of the info."""
+        """Key of the term in infos."""
         return f"reward_{self.name}"
 
 
 TERMS = (
     Term(
-        "progress", 2.5, "1/m", "forward travel of the trunk, up to the commanded speed", progress,
+        "progress",
+        2.5,
+        "1/m",
+        "forward travel of the trunk, up to the commanded speed",
+        progress,
         objective=PROGRESS,
     ),
     Term(
-        "peak", 0.5, "1/kN",
+        "peak",
+        0.5,
+        "1/kN",
         "minus the increase of the running peak GRF, the highest of all substeps but at most twice the"
-        " present one; it adds up to a stance's peak, and to each further one behind a fall by half", peak,
+        " present one; it adds up to a stance's peak, and to each further one behind a fall by half",
+        peak,
         objective=PEAK_FORCE,
     ),
     Term(
-        "energy", 1.0, "1/kJ",
-        "minus the positive work of crank and swing drive; braking is not recovered", energy,
+        "energy",
+        1.0,
+        "1/kJ",
+        "minus the positive work of crank and swing drive; braking is not recovered",
+        energy,
         objective=ENERGY,
     ),
     Term(
-        "slip", 1.0, "1/m", "minus the way that the hoof slides in stance, to and fro", slip,
+        "slip",
+        1.0,
+        "1/m",
+        "minus the way that the hoof slides in stance, to and fro",
+        slip,
         objective=ENERGY,
     ),
     Term("failure", 25.0, "1/s", "once, minus the rest of `episode_seconds`, if the episode fails", failure),
     Term(
-        "support", 17.0, "1/s",
+        "support",
+        17.0,
+        "1/s",
         "impulse of the normal force over the weight of trunk and leg, less twice what goes beyond a mean of"
         f" {BEARING:g}; times the speed over the commanded one, within +-1, and no more than the crank's rate"
-        f" over {STEPPING:g} rad/s", support,
+        f" over {STEPPING:g} rad/s",
+        support,
         objective=PROGRESS,
     ),
     Term(
-        "overspeed", 0.0, "1/m", "minus the forward travel beyond the commanded speed", overspeed,
+        "overspeed",
+        0.0,
+        "1/m",
+        "minus the forward travel beyond the commanded speed",
+        overspeed,
         objective=PROGRESS,
     ),
     Term(
-        "loading", 75.0, "s/MN",
+        "loading",
+        75.0,
+        "s/MN",
         "minus the increase of the stance's running loading rate, the steepest rise of the normal force from"
-        " one substep to the next while the peak grows", loading,
+        " one substep to the next while the peak grows",
+        loading,
         objective=PEAK_FORCE,
     ),
-)  # fmt: skip
-"""The terms of all ids, in the order in which they are added up."""
+)
+"""Terms of all ids of one leg, in the order in which they are added."""
 
 
 def check_weights(changes: Mapping[str, float] | None, terms: tuple[Term, ...] = TERMS) -> dict[str, float]:
-    """The weights of the terms by name, some changed.
+    """Return the weights of all terms by name, with the defaults of those that `changes` does not name.
 
     Raises:
         ParameterError: an unknown term, or a weight out of range.

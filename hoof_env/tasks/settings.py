@@ -1,4 +1,4 @@
-"""Every setting with its default, what callers may give for it, and beside which others it has an effect."""
+"""Settings of environments: default, type, meaning, and the other settings with which each has an effect."""
 
 from __future__ import annotations
 
@@ -18,14 +18,14 @@ SOLVERS = ("exact", "paper")  # the closed form, and Eq. 8 as the paper solves i
 
 
 class About(NamedTuple):
-    """What is said of a setting where it is declared.
+    """Description of a setting.
 
     Attributes:
-        unit: of its value, "" for none.
+        unit: unit of the value, "" for none.
         text: meaning, for the manual; $names stand for numbers and choices, see `envs.manual_words`.
-        of_horse: meaning for a horse, if it is another.
-        per_episode: True if `reset(options={"parameters": ...})` and `randomize` can change it.
-        needs: another setting, and the values of that with which this one has an effect; () for any range.
+        of_horse: meaning for a horse, if it differs.
+        per_episode: True if `reset(options={"parameters": ...})` and `randomize` can change the setting.
+        needs: another setting, and the values of it with which this one has an effect; () for any range.
     """
 
     unit: str
@@ -37,8 +37,9 @@ class About(NamedTuple):
 
 @dataclass(frozen=True)
 class Settings:
-    """Settings of an environment, plain values that JSON can hold, each with its default and `About` it."""
+    """Settings of an environment, plain values that JSON can hold, each with its default and its `About`."""
 
+    # Leg and gait, trunk
     preset: Annotated[
         Preset,
         About(
@@ -120,6 +121,7 @@ class Settings:
             needs=("trunk", ("suspended", "rail")),
         ),
     ] = 20.0
+    # Ground and hoof
     stiffness: Annotated[
         float | None,
         About(
@@ -220,6 +222,7 @@ class Settings:
             ),
         ),
     ] = None
+    # Actions and drive
     crank_rate: Annotated[
         float,
         About(
@@ -278,6 +281,7 @@ class Settings:
             needs=("drive", ("motor",)),
         ),
     ] = 0.5
+    # Solver and time steps
     solver: Annotated[
         str,
         About(
@@ -325,6 +329,7 @@ class Settings:
     ] = 1e-3
     dt: Annotated[float, About("s", "control step, a whole multiple of `sim_dt`")] = 0.02
     episode_seconds: Annotated[float, About("s", "time limit of an episode")] = 10.0
+    # Command
     target_speed: Annotated[
         tuple[float, float] | None,
         About(
@@ -347,6 +352,7 @@ class Settings:
             needs=("target_speed", ()),
         ),
     ] = (2.0, 4.0)
+    # A horse only
     size: Annotated[
         float | None,
         About(
@@ -385,6 +391,7 @@ class Settings:
             needs=("trunk", ("free",)),
         ),
     ] = None
+    # Observation, reward, and variation
     observation: Annotated[tuple[str, ...], About("", "groups to observe, in this order")] = (
         "crank",
         "gait",
@@ -402,7 +409,7 @@ class Settings:
     ] = None
 
     def __deepcopy__(self, memo: Any) -> Settings:
-        """Itself, for nothing in it changes."""
+        """Return the settings themselves, which never change."""
         return self
 
 
@@ -411,7 +418,7 @@ SETTINGS = tuple(item.name for item in fields(Settings))
 ABOUT: Mapping[str, About] = MappingProxyType(
     {name: hint.__metadata__[0] for name, hint in get_type_hints(Settings, include_extras=True).items()}
 )
-"""What is said of each setting, by name."""
+"""Descriptions of the settings, by name."""
 
 PER_EPISODE = tuple(name for name, about in ABOUT.items() if about.per_episode)
 """Settings that `reset(options={"parameters": ...})` and `randomize` can change for an episode."""

@@ -366,6 +366,8 @@ def test_states_of_a_horse_that_cannot_be(row, value):
     with pytest.raises(ParameterError, match=r"state\['episode'\]: expected numbers"):
         env.set_state(state)
     same(env.get_state(), before)
+    with pytest.raises(ParameterError, match=r"state\['episode'\]: expected numbers"):
+        gym.make(HORSE).unwrapped.set_state(state)  # one that has had no episode yet
 
 
 @pytest.mark.parametrize(
