@@ -366,7 +366,7 @@ class ConstrainedLeg:
         return self._corners * np.exp(1j * self.state.q[_TURN])
 
     def _ground_load(self) -> Vector:
-        """What the present contact forces add to h: force and moment on the sole link."""
+        """Return the part of h from the present contact forces: force and moment on the sole link."""
         load = np.zeros(SIZE)
         for contact, arm in zip(self.state.contacts, self._corner_arms(), strict=True):
             force = mirror(complex(contact["friction"], contact["normal"]), self._travel)

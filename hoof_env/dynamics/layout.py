@@ -212,7 +212,7 @@ class Strides(Layout):
 
 
 class Quantity(NamedTuple):
-    """What is said of a measured quantity where it is declared.
+    """Description of a measured quantity, written where it is declared.
 
     Attributes:
         unit: of the number.

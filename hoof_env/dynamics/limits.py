@@ -1,4 +1,4 @@
-"""Whether a motion goes on where it should end: pitch and height of the trunk, joints near the ground.
+"""Limits at which a motion ends: pitch and height of the trunk, joints near the ground.
 
 What is checked after every `CHECK_EVERY` whole steps, and after the last, is kept until the call of the
 engine ends, so that a joint that dips between two calls is not missed. Beyond a limit the motion goes
@@ -22,13 +22,13 @@ PITCH, HEIGHT, LOW_JOINT = float(Result.PITCH), float(Result.HEIGHT), float(Resu
 
 @inline_llvm
 def has_moved(result):  # type: ignore[no-untyped-def]
-    """Whether what a call of the engine asked for happened, be it beyond a limit."""
+    """Return where the motion that a call asked for happened, within the limits or beyond one."""
     return (result == 0.0) | (result >= PITCH)
 
 
 @inline_llvm
 def clear_limits(trunk):  # type: ignore[no-untyped-def]
-    """Before a call: nothing was passed."""
+    """Forget the limits that an earlier call passed."""
     trunk.violated_limit[0] = 0.0
 
 
@@ -41,7 +41,7 @@ def record_violation(trunk, is_beyond, result):  # type: ignore[no-untyped-def]
 
 @inline_llvm
 def ground_height(place, model):  # type: ignore[no-untyped-def]
-    """Of the ground below a point [m]."""
+    """Return the height of the ground below a point [m]."""
     height = 0.0 * place.real
     if model.is_terrain:
         height, _, _, _, _ = surface(
@@ -52,7 +52,7 @@ def ground_height(place, model):  # type: ignore[no-untyped-def]
 
 @inline_llvm
 def check_trunk(trunk, model):  # type: ignore[no-untyped-def]
-    """Pitch, and height above the ground."""
+    """Check the trunk's pitch, and its height above the ground."""
     limits, pitch = trunk.settings.limits, trunk.stage.pitch
     height = trunk.place.imag - ground_height(trunk.place, model)
     record_violation(trunk, (pitch < limits[0]) | (pitch > limits[1]), PITCH)
@@ -61,7 +61,7 @@ def check_trunk(trunk, model):  # type: ignore[no-untyped-def]
 
 @inline_llvm
 def check_joints(trunk, leg, shape, model):  # type: ignore[no-untyped-def]
-    """Whether a joint other than the hoof's corners is too near the ground; `shape` are `LegConstants`."""
+    """Check that no joint but the hoof's corners is too near the ground; `shape` are `LegConstants`."""
     if not (model.is_terrain or any_lane(may_be_low(trunk, leg, shape))):
         return
     crank = shape.crank * vector(shape.travel * leg.cosine, -leg.sine)
@@ -81,8 +81,10 @@ def check_joints(trunk, leg, shape, model):  # type: ignore[no-untyped-def]
 
 @inline_llvm
 def may_be_low(trunk, leg, shape):  # type: ignore[no-untyped-def]
-    """Whether level ground is too near G, which the hoof's corners tell, or another joint, were it as far
-    from O as any comes: where not, the joints need not be found."""
+    """Return where a joint may be too near level ground; elsewhere the joints need not be found.
+
+    G's place follows from the hoof's corners; of the others only the largest distance from O is used.
+    """
     toe, heel = leg.functions.toe, leg.functions.heel
     origin, low = trunk.place.imag + leg.hip.imag, trunk.settings.limits[4] + ROUNDING
     fetlock = origin + (leg.turn * (toe + shape.fetlock * (heel - toe))).imag
@@ -91,7 +93,7 @@ def may_be_low(trunk, leg, shape):  # type: ignore[no-untyped-def]
 
 @inline_llvm
 def meeting(dyad, first, second):  # type: ignore[no-untyped-def]
-    """Where two links meet whose far ends are `first` and `second`; see `reactions.hinge_point`."""
+    """Return the hinge of two links with far ends at `first` and `second`; see `reactions.hinge_point`."""
     span = second - first
     d2 = span.real * span.real + span.imag * span.imag
     k = 0.5 * d2 + dyad.half
@@ -100,6 +102,6 @@ def meeting(dyad, first, second):  # type: ignore[no-untyped-def]
 
 @inline_llvm
 def clearance(trunk, leg, joint, model):  # type: ignore[no-untyped-def]
-    """Of a joint of the leg's frame above the ground [m]."""
+    """Return the height above the ground of a joint given in the leg's frame [m]."""
     place = trunk.place + leg.hip + leg.settings.length_scale[0] * (leg.turn * joint)
     return place.imag - ground_height(place, model)

@@ -28,7 +28,7 @@ from hoof_env.simd.layout import Block, Layout, Row, Vector
 
 
 class Reactions(Layout):
-    """What is kept of a leg."""
+    """Joint forces and moments of a leg."""
 
     joints: Annotated[Block, 2 * len(JOINTS)]  # force of each joint, as in `linkage.JOINTS`: x and y [N]
     lock: Row  # moment on body 10 by body 7 [N m]
@@ -59,7 +59,7 @@ class Link(Layout):
 
 
 class LegConstants(Layout):
-    """What reactions need to know of a leg; points and links have the linkage's names."""
+    """Constants of a leg from which reactions follow; points and links have the linkage's names."""
 
     crank: Row  # length [m]
     pivot: Vector  # C from O [m]

@@ -27,7 +27,7 @@ from numpy.typing import NDArray
 from hoof_env.errors import DataFileError, ParameterError, check_choice, check_number
 from hoof_env.lab.forces import THRESHOLD
 from hoof_env.lab.read import ForceRecord
-from hoof_env.lab.stances import SHORTEST, Pair, Side, best_shift, pairs_of, whole_stances
+from hoof_env.lab.stances import SHORTEST, Pair, Side, Spans, best_shift, pairs_of, whole_stances
 
 Floats = NDArray[np.float64]
 
@@ -145,30 +145,17 @@ def compare(
     levels = _levels(a, b, threshold, unit)
     rate = max(a.rate, b.rate)
     _check_length(a, b, rate)
-    start = float(b.time[0])
-    if align == "none":
-        # B is resampled at the instants of A's samples, from the first of them within B on.
-        start = float(a.time[0]) + math.ceil((start - float(a.time[0])) * rate - 1e-6) / rate
-    if align == "none" and not max(a.time[0], b.time[0]) < min(a.time[-1], b.time[-1]):
-        raise ParameterError(
-            f"align: expected records that overlap, got {_span(a)} of {a.name} and {_span(b)} of {b.name}"
-        )
+    start = _start_of_b(a, b, rate, align)
     time_a, forces_a = _resampled(a, [of_a for of_a, _ in names], by_a, rate, float(a.time[0]))
     time_b, forces_b = _resampled(b, [of_b for _, of_b in names], by_b, rate, start)
     stances = [
-        [whole_stances(force[:, 1], level, rate) for force in forces]
-        for forces, level in zip((forces_a, forces_b), levels, strict=True)
+        _stances(a, time_a, forces_a, levels[0], unit, rate),
+        _stances(b, time_b, forces_b, levels[1], unit, rate),
     ]
-    for record, by_limb, forces, times, level in zip(
-        (a, b), stances, (forces_a, forces_b), (time_a, time_b), levels, strict=True
-    ):
-        if not any(by_limb):
-            why = why_none([force[:, 1] for force in forces], times, level, unit)
-            raise DataFileError(f"record {record.name!r}: expected a whole stance {why}")
-    # Touchdowns are known to a sampling interval of the slower record; two of them are searched.
-    near = math.ceil(2 * rate / min(a.rate, b.rate))
     shift = 0.0
     if align != "none":
+        # Touchdowns are known to a sampling interval of the slower record; two of them are searched.
+        near = math.ceil(2 * rate / min(a.rate, b.rate))
         shift = float(time_a[0] - time_b[0]) + best_shift(forces_a, forces_b, stances, rate, near)
     limbs = {}
     curves = {}
@@ -187,11 +174,41 @@ def compare(
         else:
             missing[name] = _why_missing(sides, levels, unit)
     if not limbs:
-        raise ParameterError(
-            f"align: expected stances of a limb in {a.name} ({_span(a)}) and {b.name} ({_span(b)}) at the "
-            f"same times, found none with align={align!r}"
-        )
+        raise _no_pairs(a, b, align)
     return Comparison(a, b, unit, rate, levels, shift, limbs, curves, missing, warnings)
+
+
+def _no_pairs(a: ForceRecord, b: ForceRecord, align: str) -> ParameterError:
+    """Return the error of records without a pair of stances."""
+    return ParameterError(
+        f"align: expected stances of a limb in {a.name} ({_span(a)}) and {b.name} ({_span(b)}) at the "
+        f"same times, found none with align={align!r}"
+    )
+
+
+def _start_of_b(a: ForceRecord, b: ForceRecord, rate: float, align: str) -> float:
+    """Return the time [s] of the first sample that B is resampled at; raise if the records do not overlap
+    though their times are compared."""
+    if align != "none":
+        return float(b.time[0])
+    if not max(a.time[0], b.time[0]) < min(a.time[-1], b.time[-1]):
+        raise ParameterError(
+            f"align: expected records that overlap, got {_span(a)} of {a.name} and {_span(b)} of {b.name}"
+        )
+    # B is resampled at the instants of A's samples, from the first of them within B on.
+    first = float(a.time[0])
+    return first + math.ceil((float(b.time[0]) - first) * rate - 1e-6) / rate
+
+
+def _stances(
+    record: ForceRecord, times: Floats, forces: list[Floats], level: float, unit: str, rate: float
+) -> list[Spans]:
+    """Find the whole stances of each limb of a resampled record; raise if none has one."""
+    stances = [whole_stances(force[:, 1], level, rate) for force in forces]
+    if not any(stances):
+        why = why_none([force[:, 1] for force in forces], times, level, unit)
+        raise DataFileError(f"record {record.name!r}: expected a whole stance {why}")
+    return stances
 
 
 def _levels(a: ForceRecord, b: ForceRecord, threshold: float | None, unit: str) -> tuple[float, float]:

@@ -142,22 +142,10 @@ def read_record(
         MissingExtraError: its format needs a package that is not installed.
         ParameterError: an argument does not fit the file.
     """
-    check_choice("reverse", reverse, REVERSED)
-    check_choice("units", unit, ("auto", *FORCE_UNITS))
-    for name, number in (("rate", rate), ("mass", mass)):
-        if number is not None:
-            check_number(name, number, low=0.0, exclusive_low=True)
-    check_choice("up", up, AXES)
-    check_choice("forward", forward, AXES)
+    _check_arguments(unit, reverse, rate, mass, up, forward)
     path = Path(path)
     table = _load(path)
-    upward = table.up if up == "auto" else up
-    ahead = ("y" if upward[-1] == "x" else "x") if forward == "auto" else forward
-    if upward[-1] == ahead[-1]:
-        raise ParameterError(
-            f"forward: expected another axis than upward ({upward}) of {path.name}, got {ahead}; name both "
-            "(--up-a, --forward-a, --up-b, --forward-b)"
-        )
+    upward, ahead = _axes(path.name, table, up, forward)
     sources, time, notes = sources_of(path, table, dict(mapping or {}), ahead, upward)
     # Columns that a mapping names have no axes of the file; their directions are those of the mapping.
     has_axes = any(part.axes for parts in sources.values() for part in parts)
@@ -166,26 +154,13 @@ def read_record(
             f"up, forward: expected none beside columns of {path.name} that --map names; name those of the "
             "axes there, with a minus for its other end"
         )
-    columns: dict[str, list[Floats]] = {}
-    for limb, parts in sources.items():
-        columns[limb] = [
-            np.column_stack([_sum(path, table, part.forward), _sum(path, table, part.upward)])
-            for part in parts
-        ]
+    columns = _components(path, table, sources)
     unit = _unit(path, table, unit, sources)
     rows = len(next(iter(columns.values()))[0])
     times, doubts = times_of(path, table, time, rate, rows, few(table.names))
-    chosen = REVERSED[reverse]
-    down: dict[str, list[bool]] = _downward(columns) if chosen is None else {}
-    if chosen is None:
+    if REVERSED[reverse] is None:
         _check_sums(path, table, sources)
-    signs: dict[str, tuple[int, int]] = {}
-    forces: dict[str, Floats] = {}
-    for limb, measured in columns.items():
-        # Plates that are added may lie different ways round, so each part is turned for itself.
-        each = [chosen or ((-1, -1) if down[limb][k] else (1, 1)) for k in range(len(measured))]
-        signs[limb] = each[0]
-        forces[limb] = sum((np.array(sign) * part for sign, part in zip(each, measured, strict=True)), ZERO)
+    forces, signs, down = _turned(columns, reverse)
     turned = tuple(limb for limb, which in down.items() if any(which))
     notes += table.notes + doubts
     notes += sideways(forces, _others(table, sources), ahead, upward, (up, forward))
@@ -193,6 +168,63 @@ def read_record(
     # A mass that is given goes before the weight in the file.
     weight = table.weight if mass is None else mass * GRAVITY
     return ForceRecord(path.name, times, forces, unit, weight, signs, turned, tuple(notes))
+
+
+def _check_arguments(
+    unit: str, reverse: str, rate: float | None, mass: float | None, up: str, forward: str
+) -> None:
+    """Raise an error if an argument of `read_record` is wrong, whatever the file."""
+    check_choice("reverse", reverse, REVERSED)
+    check_choice("units", unit, ("auto", *FORCE_UNITS))
+    for name, number in (("rate", rate), ("mass", mass)):
+        if number is not None:
+            check_number(name, number, low=0.0, exclusive_low=True)
+    check_choice("up", up, AXES)
+    check_choice("forward", forward, AXES)
+
+
+def _axes(name: str, table: Table, up: str, forward: str) -> tuple[str, str]:
+    """Return the axes of a file that point upward and forward; raise if they are one."""
+    upward = table.up if up == "auto" else up
+    ahead = ("y" if upward[-1] == "x" else "x") if forward == "auto" else forward
+    if upward[-1] == ahead[-1]:
+        raise ParameterError(
+            f"forward: expected another axis than upward ({upward}) of {name}, got {ahead}; name both "
+            "(--up-a, --forward-a, --up-b, --forward-b)"
+        )
+    return upward, ahead
+
+
+def _components(path: Path, table: Table, sources: dict[str, list[Source]]) -> dict[str, list[Floats]]:
+    """Return the forward and upward component of each part of each limb's force, shape (n, 2)."""
+    columns: dict[str, list[Floats]] = {}
+    for limb, parts in sources.items():
+        columns[limb] = [
+            np.column_stack([_sum(path, table, part.forward), _sum(path, table, part.upward)])
+            for part in parts
+        ]
+    return columns
+
+
+def _turned(
+    columns: dict[str, list[Floats]], reverse: str
+) -> tuple[dict[str, Floats], dict[str, tuple[int, int]], dict[str, list[bool]]]:
+    """Turn the parts of each limb's force as `reverse` says and add them.
+
+    Returns:
+        Force of each limb, signs of its first part, and for each part true if it pointed into the ground;
+        the latter is empty unless `reverse` is "auto".
+    """
+    chosen = REVERSED[reverse]
+    down: dict[str, list[bool]] = _downward(columns) if chosen is None else {}
+    signs: dict[str, tuple[int, int]] = {}
+    forces: dict[str, Floats] = {}
+    for limb, measured in columns.items():
+        # Plates that are added may lie different ways round, so each part is turned for itself.
+        each = [chosen or ((-1, -1) if down[limb][k] else (1, 1)) for k in range(len(measured))]
+        signs[limb] = each[0]
+        forces[limb] = sum((np.array(sign) * part for sign, part in zip(each, measured, strict=True)), ZERO)
+    return forces, signs, down
 
 
 def _unit(path: Path, table: Table, unit: str, sources: dict[str, list[Source]]) -> str:

@@ -1,4 +1,4 @@
-"""What a leg is: its lengths, pivot, assembly, masses and how it stands in the world.
+"""Geometry of a leg: its lengths, pivot, assembly, masses and how it stands in the world.
 
 A `Geometry` is a frozen value; building one checks it. Presets are JSON files with a provenance line. The one
 in `hoof_env/data`, `identified`, is *identified* from the paper's results, for the paper prints no lengths.
@@ -26,10 +26,10 @@ DEFAULT_PRESET = "identified"
 """The leg of the paper's reproduction."""
 
 Preset = str | Path | Mapping[str, Any]
-"""What names a leg: a preset by name, a file of that form by path, or the content of such a file."""
+"""Preset of a leg: its name, the path of a file, or the content of such a file."""
 
 PARTS = ("provenance", "units", "geometry", "ground", "gaits", "gait_provenance")
-"""What a preset holds; docs/own_task.md says what stands in each."""
+"""Parts of a preset; docs/own_task.md describes each."""
 
 LINEAR_DENSITY = 1.0
 """Default mass per length of a link [kg/m]. The paper prints no masses. One kilogram a metre gives the
@@ -332,12 +332,12 @@ def preset_names() -> list[str]:
 
 
 def preset_label(preset: Preset) -> str:
-    """How an error calls a preset."""
+    """Return the name of a preset in an error."""
     return "preset" if isinstance(preset, Mapping) else f"preset {preset}"
 
 
 def preset_error_type(preset: Preset) -> type[ParameterError] | type[DataFileError]:
-    """Of which kind an error in a preset is: an argument's, or a file's."""
+    """Return the type of an error in a preset: of an argument, or of a file."""
     return ParameterError if isinstance(preset, Mapping) else DataFileError
 
 

@@ -122,7 +122,7 @@ class FrameMotion:
 
 @dataclass(frozen=True)
 class Pose:
-    """Where everything is and how it moves, in the world (x forward, y up, angles counter-clockwise).
+    """Places, angles and their derivatives in the world (x forward, y up, angles counter-clockwise).
 
     Attributes:
         points, point_velocities, point_accelerations: shape (11, 2), rows in the order of `linkage.POINTS`

@@ -57,7 +57,7 @@ def segment_masses(limb: str, body_mass: float = BODY_MASS) -> dict[str, float]:
 
 
 def trunk_mass(body_mass: float = BODY_MASS) -> float:
-    """What a trunk on two fore and two hind limbs weighs, with head and neck [kg]: all but the limbs.
+    """Return the mass of a trunk with head and neck, without its two fore and two hind limbs [kg].
 
     Raises:
         ParameterError: a mass that is not finite or not above 0.
@@ -67,8 +67,9 @@ def trunk_mass(body_mass: float = BODY_MASS) -> float:
 
 
 def with_limb_masses(geometry: Geometry, limb: str, body_mass: float = BODY_MASS) -> Geometry:
-    """The leg with the masses of a horse's limb in the place of its own; each segment's lies evenly along
-    the links that carry it (`CARRIERS`).
+    """Return the leg with the masses of a horse's limb instead of its own.
+
+    The mass of each segment lies evenly along the links that carry it (`CARRIERS`).
 
     Args:
         geometry: of any size; lengths stay.

@@ -18,7 +18,7 @@ POINTS = ("O", "C", "P", "B", "D", "F", "E", "G", "A", "J", "I")
 """Every named point, in the order in which the closed form finds them."""
 
 NUMBER = {name: number for number, name in enumerate(POINTS)}
-"""Of each point, its place in `POINTS`."""
+"""Position of each point in `POINTS`."""
 
 FRAME = -1
 """Stands for 'the leg's frame' where a joint needs a body index."""

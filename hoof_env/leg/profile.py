@@ -1,4 +1,4 @@
-"""What a leg's motion depends on, as functions of its crank angle, in polynomials for the fast engine.
+"""Functions of the crank angle that determine a leg's motion, as polynomials for the fast engine.
 
 Nothing about the linkage enters the equations of motion but a few functions of the crank angle: where toe and
 heel are, the first moment of the links about O, and three inertias. `LegProfile` computes them from the
@@ -59,14 +59,14 @@ class Slopes(Layout):
 
 
 FUNCTIONS, SLOPED = Functions.size, Slopes.size
-"""How many functions there are, and how many of them have derivatives."""
+"""Number of functions, and of those that have derivatives."""
 
 TURN = 2 * np.pi
 WHOLE = 2.0**52  # added to a whole number it leaves it in the last bits
 
 
 def by_name(values: NDArray[np.float64]) -> dict[str, NDArray[np.float64]]:
-    """What `functions` gives, or its derivatives: `Functions` by name, shape (len(theta),) each."""
+    """Name the columns of `functions`, or of its derivatives: `Functions`, shape (len(theta),) each."""
     return dict(zip(Functions.names, values.T, strict=False))
 
 
@@ -88,8 +88,10 @@ def _solve_all(theta, crank, pivot, steps, values, z, dz, ddz):  # type: ignore[
 
 
 def places(geometry: Geometry, theta: NDArray[np.float64]) -> tuple[NDArray[np.complex128], ...]:
-    """Of the points from O in the leg's frame, and their first and second derivative by the crank angle, each
-    of shape (len(theta), 11), points as in `linkage.POINTS`; not numbers where there is none."""
+    """Return the points from O in the leg's frame, and their first and second derivative by the crank angle.
+
+    Each has shape (len(theta), 11), points as in `linkage.POINTS`; NaN where the linkage cannot be closed.
+    """
     theta = np.asarray(theta, dtype=np.float64)
     z, dz, ddz = (np.empty((theta.size, len(POINTS)), np.complex128) for _ in range(3))
     crank, pivot = geometry.lengths["OP"], complex(*geometry.pivot)
@@ -236,8 +238,10 @@ def _fit(geometry: Geometry, cells: int) -> NDArray[np.float64]:
 
 
 def _polynomials(builder: Any, rows: list[Any], angles: list[Any], first: int, last: int) -> tuple[Any, Any]:
-    """Values and derivatives of functions `first` to `last` in each lane, whose row of the table holds their
-    coefficients together; a vector a lane."""
+    """Return values and derivatives of functions `first` to `last` in each lane, a vector a lane.
+
+    A lane's row of the table holds their coefficients together.
+    """
     count = last - first
     vector = ir.VectorType(DOUBLE, count)
 

@@ -1,4 +1,4 @@
-"""What everything in the picture is painted with: colours, lettering, smooth shapes."""
+"""Brush of the picture: colours, lettering, smooth shapes."""
 
 from __future__ import annotations
 

@@ -89,7 +89,7 @@ class GroundPainter:
         self._draw_labels(canvas, corner)
 
     def _places(self, feet: Sequence[Instant], left: float) -> NDArray[np.float64]:
-        """Where the surface is drawn [m]: at places fixed to the ground, so that it does not shimmer."""
+        """Return the x of the drawn surface [m]: fixed to the ground, so that it does not shimmer."""
         right = left + self._size[0] / self._scale
         grid = self._grid
         x = [np.arange(np.floor(left / grid), np.ceil(right / grid) + 1) * grid]
@@ -140,7 +140,7 @@ class GroundPainter:
 
 
 def footprint(now: Instant, x: NDArray[np.float64]) -> NDArray[np.float64]:
-    """How far the ground at `x` is pressed down [m]: as deep as the sole, running out on both sides.
+    """Return how far the ground at `x` is pressed down [m]: as deep as the sole, running out on both sides.
 
     The contact knows two points without width; the flanks are there for the eye alone.
     """

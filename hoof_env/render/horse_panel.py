@@ -20,7 +20,7 @@ NUMBERS = (
     ("highest force", "kN", FORCE),
 )
 COLOURS: tuple[Colour, ...] = (TOE, (86, 180, 233), HEEL, (230, 159, 0))
-"""Of the legs: blue and sky blue for fore, reddish purple and orange for hind."""
+"""Colours of the legs: blue and sky blue for fore, reddish purple and orange for hind."""
 ROW = 13  # height of a row of the footfall diagram [pixels of the usual picture]
 
 
@@ -62,7 +62,7 @@ class HorsePanel:
 
     @property
     def stances(self) -> Stances:
-        """Of the leg with the highest force of an open stance."""
+        """Stances of the leg with the highest force of an open stance."""
         return max(self.each, key=lambda one: one.running_peak)
 
     def add(self, instants: Sequence[HorseInstant]) -> None:

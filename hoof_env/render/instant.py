@@ -1,4 +1,4 @@
-"""What a picture, or a record of forces, needs of one instant; nothing behind it refers to an engine."""
+"""Instants: all that a picture, or a record of forces, shows of one time; none refers to an engine."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ Newton = Annotated[float, "N"]
 
 
 class Surroundings(NamedTuple):
-    """What pictures and files say of an environment beside its motion.
+    """Surroundings of the motion that pictures and files show.
 
     Attributes:
         geometry, terrain: the leg and what it stands on.

@@ -31,7 +31,7 @@ NUMBERS = (
 
 
 class Unit(NamedTuple):
-    """Of forces: name, size [N] and how many digits are written behind the point."""
+    """Unit of forces: name, size [N] and number of decimals."""
 
     name: str
     newtons: float
@@ -210,7 +210,7 @@ class Panel:
         return whole.subsurface(self._box)
 
     def _draw_gait(self, canvas: Any, now: Instant) -> None:
-        """Where each gait parameter is within its limits, and where it was commanded to be."""
+        """Draw each gait parameter between its limits, with its command."""
         left, right = self._track
         for k, (_, name, unit_name) in enumerate(GAIT):
             _, y = self._line(len(NUMBERS) + 1.4 + k, 0)
@@ -265,7 +265,7 @@ class Panel:
 
 
 def interval_of(time: float) -> int:
-    """Which interval of `RESOLUTION` a time [s] is in."""
+    """Return the interval of `RESOLUTION` in which a time [s] lies."""
     return math.floor(time / RESOLUTION + 1e-6)
 
 

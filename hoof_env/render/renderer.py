@@ -41,7 +41,7 @@ class Renderer:
         fps: frames per second that a window is held to [Hz].
         size: width and height of the picture [pixels].
         trunk: its kind: "suspended" is drawn on a spring, "rail" with wheels under a rail, "fixed" bolted.
-        weight_n: weight of trunk and leg [N], a line beside the force if the trunk is suspended; or None.
+        weight_n: weight of trunk and leg [N], a line next to the force if the trunk is suspended; or None.
         lift_off_n: normal force that tells stance from swing [N].
         terrain: what it stands on; level if None.
         hips: of a horse, see `instant.Setting`; its instants are `HorseInstant`s.

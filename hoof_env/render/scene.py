@@ -45,8 +45,7 @@ PATH_STEP = 0.01  # time between two places of a path [s]
 ARROW_M = 1.3  # length in the scene of an arrow for the panel's full scale [m]
 LEAST_FORCE = 0.004  # part of the full scale below which a force is not drawn [-]
 USUAL_HIP_M = 1.5
-"""What is drawn around a leg suits hips so high or higher; around lower ones it is smaller in proportion
-[m]."""
+"""Least height of a hip around which all is drawn in full size [m]; below, in proportion to the height."""
 
 AROUND_M = np.linspace(-1.5, 1.5, 31)  # where, from O, the ground is looked at for the camera's level [m]
 
@@ -92,7 +91,7 @@ class Scene:
 
     @property
     def _metre(self) -> float:
-        """Of what is drawn around the leg [pixels]."""
+        """Pixels of a metre of what is drawn around the leg."""
         return self._scale * self.small
 
     def reset(self) -> None:
@@ -135,7 +134,7 @@ class Scene:
         return self.points_of(now)
 
     def points_of(self, now: Instant) -> dict[str, complex]:
-        """Where each named point of a leg lies [pixels]."""
+        """Return the place of each named point of a leg [pixels]."""
         hip = complex(now.trunk_x, now.trunk_y)
         z, dz, ddz = np.empty((3, len(POINTS)), np.complex128)
         crank, pivot = self._geometry.lengths["OP"], complex(*self._geometry.pivot)
@@ -319,7 +318,7 @@ class Scene:
 
 
 def _reach(geometry: Geometry) -> tuple[float, float]:
-    """How far from O, and how far above it, the leg gets at any crank and swing angle allowed [m]."""
+    """Return how far from O, and how far above it, the leg reaches within its limits [m]."""
     out, up = 0.0, 0.0
     bounds = [LIMITS[name] for name in ("swing_offset", "swing_sin", "swing_cos")]
     for theta in np.linspace(0, 2 * np.pi, 72, endpoint=False):
