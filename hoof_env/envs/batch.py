@@ -27,6 +27,7 @@ from hoof_env.envs.conditions import (
     keep_others,
     under_each,
 )
+from hoof_env.envs.outcome import MOVED
 from hoof_env.envs.paper_solver import PaperSolver, check_paper
 from hoof_env.envs.step import NOT_A_NUMBER, SOME_ENDED, SOME_SWITCHED
 from hoof_env.errors import ParameterError, check_number
@@ -130,7 +131,7 @@ class EpisodeBatch(BatchKernels):
         try:
             self._compile()
         except NumbaError as error:
-            raise ParameterError(f"{task.id}: {what_cannot_be_compiled(error)}") from error
+            raise ParameterError(f"{task.id}: {what_cannot_be_compiled(error, MOVED)}") from error
 
     def _check_settings(self) -> None:
         """Check the settings, and set the attributes that follow from them."""

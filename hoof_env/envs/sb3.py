@@ -86,7 +86,7 @@ class Sb3VecEnv(VecEnv):
         # Options, and the environments that have them: each group is one call of the vector environment.
         groups: list[tuple[Any, list[int]]] = []
         for env, options in enumerate(self._options):
-            rows = next((rows for known, rows in groups if known == (options or None)), None)
+            rows = next((rows for known, rows in groups if _are_equal(known, options or None)), None)
             if rows is None:
                 groups.append((options or None, [env]))
             else:
@@ -175,3 +175,13 @@ class Sb3VecEnv(VecEnv):
         """
         if len(list(self._get_indices(indices))) != self.num_envs:
             raise ParameterError(f"{name}: expected all environments, which are one, got {indices!r}")
+
+
+def _are_equal(one: Any, other: Any) -> bool:
+    """Return True if options are known to be equal; those with arrays are only if they are one object."""
+    if one is other:
+        return True
+    try:
+        return bool(one == other)
+    except ValueError:  # the comparison of arrays is an array
+        return False

@@ -7,9 +7,9 @@ import ast
 import linecache
 import os
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from pathlib import Path
-from types import FunctionType
+from types import FunctionType, MappingProxyType
 from typing import Any
 
 from numba.core import types
@@ -47,27 +47,33 @@ def check_function(name: str, function: Any, arguments: int) -> None:
         raise ParameterError(f"{name}: expected a function of {arguments} arguments, got one of ({given})")
 
 
-def what_cannot_be_compiled(error: Exception) -> str:
+def what_cannot_be_compiled(error: Exception, moved: Mapping[str, str] = MappingProxyType({})) -> str:
     """Return what numba does not compile in a function from outside: the operation, the function and the
-    line."""
+    line.
+
+    Args:
+        error: numba's.
+        moved: present names of attributes that had other ones, or were elsewhere.
+    """
     text = str(error)
     # the message of `number_of`, which numba has put among its own
     if refused := re.search(r"\{([^{}]* returns [^{}]*; expected a number)\}", text):
         return refused[1]
     where = next((place for place in map(_place, re.findall(r'File "(.*?)", line (\d+)', text)) if place), "")
     return (
-        f"cannot compile {_operation(text)}{where}; expected + - * /, comparisons and the functions of "
-        "hoof_env.simd (`where` in the place of `if`), or of a term or entry scalar=True"
+        f"cannot compile {_operation(text, moved)}{where}; expected + - * /, comparisons and the functions "
+        "of hoof_env.simd (`where` in the place of `if`), or of a term or entry scalar=True"
     )
 
 
-def _operation(text: str) -> str:
+def _operation(text: str, moved: Mapping[str, str]) -> str:
     """Return the innermost cause in a message of numba's."""
     if found := re.search(r"No implementation of function Function\(<(.+?)(?: at 0x\w+)?>\)", text):
         name = re.findall(r"[\w.]+", found[1])[-1]
         return "`if`, `and`, `or` or `not` of numbers" if name == "bool" else f"{name}()"
     if found := re.search(r"Unknown attribute '(\w+)' of type (\w+)", text):
-        return f".{found[1]}, which {found[2]} has not,"
+        now = f" (it is .{moved[found[1]]} now)" if found[1] in moved else ""
+        return f".{found[1]}, which {found[2]} has not{now},"
     if found := re.search(r"Untyped global name '(\w+)'", text):
         return f"{found[1]}, a function without @hoof_env.simd.compile.inline_llvm, or no number"
     causes = re.findall(r"Failed in nopython mode pipeline.*\n\s*(\S.*)", text) or [text.strip()]

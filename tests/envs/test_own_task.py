@@ -260,6 +260,17 @@ def test_what_cannot_be_compiled_is_refused_with_operation_and_place(message):
         gym.make("own/Bad-v0")
 
 
+def test_a_sum_of_the_step_is_found_where_it_is_now():
+    def outdated(step, weight):
+        return weight * step.highest
+
+    register("own/Bad-v0", terms=[term(outdated)])
+    with pytest.raises(
+        ParameterError, match=r"\.highest, which Outcome has not \(it is \.sums\.highest_grf now\)"
+    ):
+        gym.make("own/Bad-v0")
+
+
 NO_FUNCTION = "No implementation of function Function"
 OF_NUMBA = {
     f"{NO_FUNCTION}(<built-in function sin>) found for signature": "sin()",

@@ -82,6 +82,10 @@ def test_what_single_environments_are_asked_is_as_of_a_dummy_vec_env():
     with pytest.raises(ParameterError, match=r"gait.*got 'trot'"):
         ours.reset()
     same(ours.envs.get_state(), before)
+    # arrays, whose comparison is an array
+    ours.set_options([{"gait": np.array([1.0, 2.0])}] + [{"gait": np.array([3.0, 4.0])} for _ in range(2)])
+    with pytest.raises(ParameterError, match=r"gait.*got array\(\[1"):
+        ours.reset()
 
 
 def test_methods_of_a_vec_env():
