@@ -106,7 +106,7 @@ lint: setup
 	@echo 'ruff check' && $(PY) -m ruff check -q --output-format concise
 	@echo 'ruff format' && $(PY) -m ruff format --check --quiet --output-format concise
 	@if $(PY) -c 'import torch' 2>/dev/null; then echo 'mypy' && $(PY) -m mypy; else \
-	  echo 'mypy, without agents: there is no PyTorch' && $(PY) -m mypy $(UNTYPED) hoof_env research; fi
+	  echo 'mypy, without agents: there is no PyTorch' && $(PY) -m mypy $(UNTYPED) hoof_env; fi
 
 clean:
 	@rm -rf .venv .ecosystem .oldest .lab dist build .pytest_cache .mypy_cache .ruff_cache .hypothesis

@@ -118,7 +118,7 @@ def same_id(one: Any, other: Any) -> bool:
 
 
 def registered_task(task: str) -> str:
-    """Return the name under which `tasks.task_of` finds a registered task without importing its module."""
+    """Return the name under which `registry.task_of` finds a registered task without importing its module."""
     return str(gym.registry[own_id(task)].kwargs.get("task", own_id(task)))
 
 

@@ -129,6 +129,7 @@ def test_pages_and_repository_stay_small():
     assert words <= 60_000
     listed = subprocess.run(["git", "ls-files", "-z"], cwd=ROOT, capture_output=True, text=True, check=False)
     files = [ROOT / name for name in listed.stdout.split("\0") if name]
+    assert files or not (ROOT / ".git").exists(), "git lists no file"
     assert sum(file.stat().st_size for file in files if file.is_file()) <= 14e6
 
 

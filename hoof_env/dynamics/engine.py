@@ -379,7 +379,7 @@ class TrunkEngine(EngineMemory):
         kept = self._copy((*engine_states.STATE, "stride_sums", "result"))
         first = np.zeros(self.num_envs)
         sums = np.zeros_like(m.stride_sums)
-        highest = layout.stride_sums(self.features).index("highest_grf")
+        are_peaks = np.array(layout.stride_peaks(self.features))
         while left and not broken(first).all():
             # the short part first: limits are checked at steps counted from the end
             length = left % part or part
@@ -387,9 +387,9 @@ class TrunkEngine(EngineMemory):
             left -= length
             # a failure stays, and so does a limit unless a failure follows
             first = np.where(broken(first) | ((first != 0) & ~broken(m.result)), first, m.result)
-            peak = np.maximum(sums[:, highest], m.stride_sums[:, highest])
+            peaks = np.maximum(sums[:, are_peaks], m.stride_sums[:, are_peaks])
             sums += m.stride_sums
-            sums[:, highest] = peak
+            sums[:, are_peaks] = peaks
         lost = broken(first)
         m.stride_sums[:] = sums
         # an environment that fails has its state from before the call, not from before the part

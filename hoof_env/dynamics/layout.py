@@ -228,28 +228,38 @@ class Quantity(NamedTuple):
 class StrideSums(Layout):
     """Quantities of one call of the engine, which a control step is: the table of all that is measured of it.
 
-    A row here, with its line in `observables.count_stride`, is all that a new quantity takes: it is then in
-    `step.sums` of the reward's terms, in `episode.sums`, in infos and in the manual.
+    A new quantity takes a row here, the line that computes it in `observables.count_stride`, and one in
+    `PaperSolver._sum`. It is then in `step.sums` of the reward's terms, in `episode.sums`, in infos and in
+    the manual. Each field has one row or, in engines without it, none; a sum or a peak begins at 0.
     """
 
-    peak_grf_increase: Annotated[Row, Quantity("N", "increase of the stances' peaks in it")]
+    peak_grf_increase: Annotated[Row, Quantity("N", "increase of the stances' peaks in the control step")]
     running_peak_increase: Annotated[
-        Row, Quantity("N", "increase of the running peak in it; the reward's peak term charges it")
+        Row,
+        Quantity("N", "increase of the running peak in the control step; the reward's peak term charges it"),
     ]
-    loading_rate_increase: Annotated[Row, Quantity("N/s", "increase of the stances' steepest rises in it")]
+    loading_rate_increase: Annotated[
+        Row, Quantity("N/s", "increase of the stances' steepest rises in the control step")
+    ]
     highest_grf: Annotated[
         Row, Quantity("N", "highest resultant force of any substep of the control step", is_peak=True)
     ]
-    positive_work: Annotated[Row, Quantity("J", "of both drives in it; braking is not recovered")]
+    positive_work: Annotated[
+        Row, Quantity("J", "of both drives in the control step; braking is not recovered")
+    ]
     normal_impulse: Annotated[
         Row, Quantity("N s", "normal force integrated over the control step; over `dt` its mean [N]")
     ]
     loaded_time: Annotated[Row, Quantity("s", "part of the control step with load on the hoof")]
-    stances: Annotated[Row, Quantity("-", "stances that began in it")]
-    travel: Annotated[Row, Quantity("m", "load-weighted backward travel of the hoof along the ground in it")]
-    slip: Annotated[Row, Quantity("m", "way that the hoof slid in stance in it, to and fro")]
-    braking: Annotated[Block, LIMITED, Quantity("N s", "impulse of the ground backward in it")]
-    propulsion: Annotated[Block, LIMITED, Quantity("N s", "impulse of the ground forward in it")]
+    stances: Annotated[Row, Quantity("-", "stances that began in the control step")]
+    travel: Annotated[
+        Row, Quantity("m", "load-weighted backward travel of the hoof along the ground in the control step")
+    ]
+    slip: Annotated[Row, Quantity("m", "way that the hoof slid in stance in the control step, to and fro")]
+    braking: Annotated[Block, LIMITED, Quantity("N s", "impulse of the ground backward in the control step")]
+    propulsion: Annotated[
+        Block, LIMITED, Quantity("N s", "impulse of the ground forward in the control step")
+    ]
 
 
 class LegSettings(Layout):
@@ -404,8 +414,9 @@ def stride_sums(features: Features = PLAIN) -> tuple[str, ...]:
     return tuple(name for name, field in features.of(StrideSums).fields.items() if field.size)
 
 
-PEAKS = sum(StrideSums.notes[name].is_peak << k for k, name in enumerate(StrideSums.fields))
-"""Rows of `StrideSums` that are peaks, as bits."""
+def stride_peaks(features: Features = PLAIN) -> tuple[bool, ...]:
+    """Return for each row of `StrideSums` True if it is a peak."""
+    return tuple(StrideSums.notes[name].is_peak for name in stride_sums(features))
 
 
 def account(features: Features = PLAIN) -> tuple[str, ...]:

@@ -63,7 +63,7 @@ class Memory(NamedTuple):
     trunk_settings: Floats  # (17, n)
     limb_settings: Floats  # (legs, 12, n)
     strides: Floats  # (legs, 6, n)
-    stride_sums: Floats  # (legs, 9, n)
+    stride_sums: Floats  # (legs, rows of `StrideSums`, n)
     command: Floats  # (legs, 4, n)
     account: Floats  # (9, n), added up over calls
     trunk_report: Floats  # at the end of the last call, (8, n)

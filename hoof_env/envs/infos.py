@@ -90,9 +90,22 @@ RENAMED = MappingProxyType(
         "heel_rate": "heel_penetration_rate",
         "toe_slowness": "toe_inverse_approach_speed",
         "heel_slowness": "heel_inverse_approach_speed",
+        "toe_give_normal": "toe_deflection_normal",
+        "toe_give_tangential": "toe_deflection_tangential",
+        "heel_give_normal": "heel_deflection_normal",
+        "heel_give_tangential": "heel_deflection_tangential",
     }
 )
 """New names of measurements, by the old ones, for the message of a look-up."""
+
+
+def _present_name(key: str, names: tuple[str, ...]) -> str | None:
+    """Return the new name of a measurement, also behind the name of a leg; None if it is no old one."""
+    for old, new in RENAMED.items():
+        name = key.removesuffix(old) + new
+        if (key == old or key.endswith(f"_{old}")) and name in names:
+            return name
+    return None
 
 
 class NamedArray(np.ndarray[Any, np.dtype[np.float64]]):
@@ -109,8 +122,8 @@ class NamedArray(np.ndarray[Any, np.dtype[np.float64]]):
     def __getitem__(self, key: Any) -> Any:
         if isinstance(key, str):
             if key not in self.names:
-                new = RENAMED.get(key)
-                raise KeyError(f"{key!r} is called {new!r} now" if new in self.names else key)
+                new = _present_name(key, self.names)
+                raise KeyError(f"{key!r} is called {new!r} now" if new else key)
             key = (..., self.names.index(key))
         return np.asarray(self)[key][()]
 

@@ -14,16 +14,13 @@ from hoof_env.simd import columns, where
 from hoof_env.simd.compile import inline_llvm
 from hoof_env.simd.user_functions import number_of
 from hoof_env.tasks.episode import Memories
-from hoof_env.tasks.horse_terms import HORSE_TERMS
-from hoof_env.tasks.reward import TERMS, Term
-
-BUILT_IN_TERMS = tuple(term.name for term in TERMS)
-"""Names of the terms of one leg."""
+from hoof_env.tasks.reward import Term
 
 
 def is_user_term(term: Term) -> bool:
-    """True for a user's term, which may not handle the NaN of a failed simulation."""
-    return term.name not in BUILT_IN_TERMS and term not in HORSE_TERMS
+    """True for a user's term, which may not handle the NaN of a failed simulation. It may have the name of a
+    term of this package, which it replaces."""
+    return bool(from_outside([term.compute]))
 
 
 def sum_of_terms(terms: tuple[Term, ...], layouts: Memories, k: int = 0) -> Callable[..., Any]:

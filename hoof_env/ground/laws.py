@@ -50,7 +50,10 @@ NORMAL_LAWS = (*FACTORS, "kelvin-voigt")
 """Names of the normal laws."""
 
 SMALLEST_RESTITUTION = 0.01
-"""Smallest restitution [-] of all laws but the first two: their damping grows without bound towards 0."""
+"""Smallest restitution [-] of laws with a damping that grows without bound towards 0."""
+
+REGULAR_LAWS = ("lankarani-nikravesh", "hunt-crossley")
+"""Laws with a finite damping at a restitution of 0."""
 
 
 def damping(law: str, restitution: float, stiffness: float, reference_mass: float) -> tuple[float, float]:
@@ -68,7 +71,7 @@ def damping(law: str, restitution: float, stiffness: float, reference_mass: floa
     """
     check_choice("normal_law", law, NORMAL_LAWS)
     cr = check_number("restitution", restitution, low=0, high=1)
-    if law not in ("lankarani-nikravesh", "hunt-crossley") and cr < SMALLEST_RESTITUTION:
+    if law not in REGULAR_LAWS and cr < SMALLEST_RESTITUTION:
         raise ParameterError(
             f"restitution: expected a number in [{SMALLEST_RESTITUTION}, 1] for {law!r}, whose damping grows "
             f"without bound towards 0, got {restitution!r}"

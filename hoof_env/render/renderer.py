@@ -44,7 +44,7 @@ class Renderer:
         weight_n: weight of trunk and leg [N], a line next to the force if the trunk is suspended; or None.
         lift_off_n: normal force that tells stance from swing [N].
         terrain: what it stands on; level if None.
-        hips: of a horse, see `instant.Setting`; its instants are `HorseInstant`s.
+        hips: of a horse, see `instant.Surroundings`; its instants are `HorseInstant`s.
 
     Raises:
         ParameterError: an unknown mode, or a value out of range.

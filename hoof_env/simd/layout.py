@@ -226,7 +226,9 @@ class _FieldsOfMemory(AttributeTemplate):
             return row_type(memory)
         if field.kind is Vector:
             return _vector_type(memory)
-        return type(memory)(memory.count, field.kind if isinstance(field.kind, _Named) else None)
+        if isinstance(field.kind, _Named):
+            return type(memory)(memory.count, field.kind)
+        return type(memory)(memory.count, None, is_empty=field.size == 0)
 
 
 def _get_field(context: Any, builder: Any, memory: Any, value: Any, name: str) -> Any:

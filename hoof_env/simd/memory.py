@@ -14,6 +14,7 @@ from collections import namedtuple
 from typing import Any
 
 import numpy as np
+from llvmlite import ir
 from numba import carray, from_dtype  # type: ignore[attr-defined]
 from numba.core import cgutils, types
 from numba.core.extending import lower_builtin, lower_cast
@@ -33,6 +34,7 @@ from hoof_env.simd.types import (
     instruction,
     is_real,
     pick,
+    spread,
     wide,
 )
 
@@ -340,12 +342,18 @@ class _SetRow(AbstractTemplate):
 
 
 def _get_row(context: Any, builder: Any, signature: Any, values: Any) -> Any:
+    memory = signature.args[0]
+    if memory.is_empty:
+        # not a number, instead of what lies behind
+        return spread(builder, ir.Constant(DOUBLE, math.nan), max(memory.count, 1))
     row = context.cast(builder, values[1], signature.args[1], types.intp)
     return read_row(Code(context, builder), signature.args[0], values[0], row)
 
 
 def _set_row(context: Any, builder: Any, signature: Any, values: Any) -> Any:
     (memory, place, given) = signature.args
+    if memory.is_empty:
+        return context.get_dummy_value()
     code = Code(context, builder)
     row = context.cast(builder, values[1], place, types.intp)
     x = code.number(given, values[2], max(memory.count, 1))

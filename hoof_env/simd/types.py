@@ -38,11 +38,15 @@ class Plane(_Counted):
 
 
 class _Memory(_Counted):
-    """Memory with named rows, those of `layout`, or with numbered rows if that is None."""
+    """Memory with named rows, those of `layout`, or with numbered rows if that is None; without any row if it
+    is empty, as a block that an engine does not have."""
 
-    def __init__(self, count: int, layout: Any = None) -> None:
+    def __init__(self, count: int, layout: Any = None, is_empty: bool = False) -> None:
         self.layout = layout
+        self.is_empty = is_empty
         super().__init__(count)
+        if is_empty:
+            self.name = f"{self.name[:-1]}, empty)"
         if layout is not None:
             self.name = f"{self.name[:-1]}, {layout.__module__}.{layout.__qualname__})"
 

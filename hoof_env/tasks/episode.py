@@ -9,7 +9,7 @@ from typing import Annotated, Any, NamedTuple
 import numpy as np
 
 from hoof_env.dynamics.form import engine_layout
-from hoof_env.dynamics.layout import PEAKS, PLAIN, Features, StrideSums
+from hoof_env.dynamics.layout import PLAIN, Features, StrideSums, stride_peaks
 from hoof_env.gait import PARAMETERS
 from hoof_env.simd.layout import Block, Constants, Layout, Row, Size
 from hoof_env.tasks.reward import TERMS
@@ -100,7 +100,7 @@ def memories_of(layout: Any, terms: int, features: Features, legs: int = 1) -> M
         has_limits=form.has_limits,
         stride_sums=features.of(StrideSums),
         sums=form.sums,
-        peaks=PEAKS,
+        peaks=sum(is_peak << k for k, is_peak in enumerate(stride_peaks(features))),
     )
 
 

@@ -1,10 +1,15 @@
 """Calls of the engine that are cut into parts, of which nothing is seen outside; columns from there."""
 
+from typing import Annotated
+
 import numpy as np
 import pytest
 
 from hoof_env import Limb, ParameterError, Trunk, TrunkEngine, load_gait, load_geometry
 from hoof_env.dynamics import engine as engine_module
+from hoof_env.dynamics import layout
+from hoof_env.dynamics.layout import PLAIN, Quantity, StrideSums, stride_peaks, stride_sums
+from hoof_env.simd.layout import Row
 
 
 def run(steps, part=None, monkeypatch=None, mass=100.0, **options):
@@ -66,3 +71,19 @@ def test_no_number_of_a_column_is_taken_for_an_address(value):
         engine.set_column(0, good)
     assert bool(refused) == (value == 1e300)  # places and angles beyond `MAX_STATE`
     assert np.array_equal(engine.column(0), good)
+
+
+class MoreSums(StrideSums):
+    """Sums with a peak behind the last field, which one leg does not have."""
+
+    later: Annotated[Row, Quantity("N", "of x", is_peak=True)]
+
+
+@pytest.mark.parametrize("features", [PLAIN, PLAIN._replace(has_limits=True)])
+def test_each_row_of_the_sums_says_whether_it_is_a_peak(features, monkeypatch):
+    assert len(stride_peaks(features)) == len(stride_sums(features)) == features.of(StrideSums).size
+    found = dict(zip(stride_sums(features), stride_peaks(features), strict=True))
+    assert [name for name in found if found[name]] == ["highest_grf"]
+    monkeypatch.setattr(layout, "StrideSums", MoreSums)
+    assert stride_sums(features)[-1] == "later"
+    assert stride_peaks(features)[-1]

@@ -162,6 +162,10 @@ def test_named_rows():
         assert not np.shares_memory(twin, row)
     with pytest.raises(KeyError, match="fast"):
         row["fast"]
+    horse = name_columns(np.arange(2.0), ("left_fore_highest_grf", "left_fore_toe_deflection_normal"))
+    for old, new in (("highest", "highest_grf"), ("toe_give_normal", "toe_deflection_normal")):
+        with pytest.raises(KeyError, match=f"'left_fore_{old}' is called 'left_fore_{new}' now"):
+            horse[f"left_fore_{old}"]
     with pytest.raises(KeyError, match=r"'highest' is called 'highest_grf' now"):
         gym.make(LEG).reset(seed=0)[1]["measured"]["highest"]
     gait = name_columns([5.0, 0.5, -0.1, 0.1], PARAMETERS)

@@ -364,6 +364,33 @@ def test_a_step_that_could_not_be_simulated_pays_for_nothing_but_the_failure(own
     assert np.isfinite(observation).all()
 
 
+def test_a_term_with_the_name_of_a_built_in_one_is_the_users():
+    """It may not handle what a failed step leaves, so it counts 0 there."""
+    register(
+        "own/Slip-v0", terms=[Term("slip", 1.0, "-", "of x", lambda step, weight: weight * step.trunk.result)]
+    )
+    env = gym.make("own/Slip-v0").unwrapped
+    env.reset(seed=0)
+    state = env.get_state()
+    state["engine"]["trunk"][TRUNK_STATE.index("momentum_x")] = 1e308
+    env.set_state(state)
+    _, reward, terminated, _, info = env.step(np.zeros(4, np.float32))
+    assert terminated
+    assert info["measured"]["result"] != 0.0
+    assert info["reward_slip"] == 0.0
+    assert reward == info["reward_failure"]
+
+
+def test_a_sum_that_a_leg_does_not_have_is_not_a_number():
+    def braking(step, weight):
+        return weight * step.sums.braking[0]
+
+    register("own/Braking-v0", terms=[Term("braking", 1.0, "-", "of x", braking)])
+    env = gym.make("own/Braking-v0")
+    env.reset(seed=0)
+    assert np.isnan(env.step(np.zeros(4, np.float32))[4]["reward_braking"])
+
+
 # What is compiled, and when
 
 
