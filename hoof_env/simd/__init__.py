@@ -4,6 +4,8 @@ README.md has the reason, the types, the rules and an example. Lanes exist insid
 from `rows` and written to them.
 """
 
+from typing import TYPE_CHECKING
+
 import hoof_env.simd.layout
 import hoof_env.simd.operators  # noqa: F401  both teach numba: fields and operators
 from hoof_env.simd.functions import (
@@ -34,6 +36,25 @@ from hoof_env.simd.memory import (
     store_vectors,
     write,
 )
+from hoof_env.simd.renamed import refuse_old_names
+
+if not TYPE_CHECKING:
+    __getattr__ = refuse_old_names(
+        __name__,
+        {
+            "across": "perpendicular",
+            "anywhere": "any_lane",
+            "choose": "where",
+            "fill": "load_rows",
+            "larger": "maximum",
+            "level": "full_like",
+            "nth": "block_at",
+            "plane": "vector",
+            "root": "sqrt",
+            "size": "absolute",
+            "smaller": "minimum",
+        },
+    )
 
 __all__ = [
     "absolute",

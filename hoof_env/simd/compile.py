@@ -9,15 +9,19 @@ import sys
 import time
 from collections.abc import Callable
 from contextlib import suppress
-from typing import Any, TypeVar, cast
+from typing import TYPE_CHECKING, Any, TypeVar, cast
 
 import numba
 from numba.core import event
 
 from hoof_env.errors import HoofEnvError
 from hoof_env.simd.cache import keep
+from hoof_env.simd.renamed import refuse_old_names
 
 F = TypeVar("F", bound=Callable[..., Any])
+
+if not TYPE_CHECKING:
+    __getattr__ = refuse_old_names(__name__, {"inlined": "inline_llvm", "pasted": "inline_source"})
 
 QUIET = "HOOF_ENV_QUIET"
 """Environment variable; 1 silences the messages about compiling kernels."""

@@ -1,0 +1,20 @@
+"""Names that modules had once are refused with the present ones."""
+
+import pytest
+
+from hoof_env import simd
+from hoof_env.simd import compile as compile_module
+
+
+def test_an_old_name_is_refused_with_the_new_one():
+    with pytest.raises(ImportError, match=r"hoof_env\.simd\.choose is called where now"):
+        from hoof_env.simd import choose  # noqa: F401
+    with pytest.raises(ImportError, match=r"hoof_env\.simd\.compile\.inlined is called inline_llvm now"):
+        from hoof_env.simd.compile import inlined  # noqa: F401
+
+
+def test_other_names_are_unknown_as_in_any_module():
+    assert not hasattr(simd, "nothing")
+    assert not hasattr(compile_module, "nothing")
+    with pytest.raises(ImportError, match="cannot import name 'nothing'"):
+        from hoof_env.simd import nothing  # noqa: F401
