@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import inspect
 import re
 import subprocess
 import sys
@@ -12,10 +13,11 @@ from pathlib import Path
 import pytest
 
 import hoof_env
-from hoof_env.tasks.keywords import Keywords, VectorKeywords
+from hoof_env import HorseLegEnv, HorseLegVectorEnv, Sb3VecEnv
+from hoof_env.envs.arguments import EnvArguments, Sb3Arguments, VectorArguments
 from hoof_env.tasks.plain import to_json
 from hoof_env.tasks.registry import TASKS
-from hoof_env.tasks.settings import Settings
+from hoof_env.tasks.settings import SETTINGS
 
 SCRIPT = """\
 from typing import assert_type
@@ -78,9 +80,21 @@ def test_every_default_is_of_its_type(tmp_path, cache):
     assert complaints(tmp_path, "\n".join(lines) + "\n", cache) == {}
 
 
-def test_keywords_are_the_settings():
-    assert list(Keywords.__annotations__) == [item.name for item in fields(Settings)]
-    assert not Keywords.__required_keys__ | VectorKeywords.__required_keys__
+@pytest.mark.parametrize(
+    ("env", "arguments"),
+    [(HorseLegEnv, EnvArguments), (HorseLegVectorEnv, VectorArguments), (Sb3VecEnv, Sb3Arguments)],
+)
+def test_what_is_typed_is_what_a_constructor_takes(env, arguments):
+    """A constructor names its own arguments a second time, behind the decorator that types them."""
+    taken = {
+        name: parameter.default
+        for name, parameter in inspect.signature(env).parameters.items()
+        if parameter.kind is not inspect.Parameter.VAR_KEYWORD
+    }
+    typed = {item.name: item.default for item in fields(arguments)}
+    assert taken.items() <= typed.items()
+    passed_on = set(typed) - set(taken) - set(SETTINGS)
+    assert passed_on <= (set(inspect.signature(HorseLegVectorEnv).parameters) if env is Sb3VecEnv else set())
 
 
 def test_what_is_typed_is_what_is_public():

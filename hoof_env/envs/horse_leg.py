@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import copy
 from collections.abc import Mapping
-from typing import Any, ClassVar, NoReturn, Unpack
+from typing import Any, ClassVar, NoReturn
 
 import gymnasium as gym
 import numpy as np
@@ -14,6 +14,7 @@ from gymnasium.utils import RecordConstructorArgs
 from numpy.typing import NDArray
 
 from hoof_env.dynamics.parts import broken
+from hoof_env.envs.arguments import EnvArguments, takes
 from hoof_env.envs.base import LegBase, array_of, generator_of
 from hoof_env.envs.batch_reports import failure_of, summary_of
 from hoof_env.envs.batch_starts import check_options
@@ -24,7 +25,6 @@ from hoof_env.envs.step import SOME_SWITCHED
 from hoof_env.errors import ParameterError, count, flag
 from hoof_env.render.renderer import USUAL_SIZE
 from hoof_env.tasks.episode import FAILED
-from hoof_env.tasks.keywords import Keywords
 from hoof_env.tasks.reward import OBJECTIVES, TERMS, Term, failure
 
 
@@ -50,6 +50,7 @@ class HorseLegEnv(LegBase, gym.Env[NDArray[np.float32], NDArray[np.float32]]):
 
     metadata: ClassVar[dict[str, Any]] = {"render_modes": ["human", "rgb_array"], "render_fps": 50}  # type: ignore[misc]
 
+    @takes(EnvArguments)
     def __init__(
         self,
         *,
@@ -57,7 +58,7 @@ class HorseLegEnv(LegBase, gym.Env[NDArray[np.float32], NDArray[np.float32]]):
         render_mode: str | None = None,
         width: int = USUAL_SIZE[0],
         height: int = USUAL_SIZE[1],
-        **settings: Unpack[Keywords],
+        **settings: Any,
     ) -> None:
         spaces_of = self._make(task, settings, 1, render_mode, (width, height))
         self.observation_space, self.action_space = spaces_of
@@ -168,8 +169,7 @@ class HorseLegEnv(LegBase, gym.Env[NDArray[np.float32], NDArray[np.float32]]):
         happened = kernel(addresses)  # not through the batch: a call costs as much as a substep
         ended = happened != 0 and self._follow(happened)
         info = self._begun[0]()  # has all keys already, in the order of the reset's info
-        gait = self._begun[1]()
-        info["gait"] = gait
+        info["gait"] = self._begun[1]()
         info["measured"] = measure()
         if draws:
             info["parameters"] = info["parameters"].copy()  # callers may change their info
@@ -357,16 +357,9 @@ class HorseLegMOEnv(HorseLegEnv):
         reward_space, reward_dim: space of the reward vector and its length.
     """
 
-    def __init__(
-        self,
-        *,
-        task: str = "leg",
-        render_mode: str | None = None,
-        width: int = USUAL_SIZE[0],
-        height: int = USUAL_SIZE[1],
-        **settings: Unpack[Keywords],
-    ) -> None:
-        super().__init__(task=task, render_mode=render_mode, width=width, height=height, **settings)
+    @takes(EnvArguments)
+    def __init__(self, **arguments: Any) -> None:
+        super().__init__(**arguments)
         # Forces and energy are only charged: their rewards are never positive.
         self.reward_space = spaces.Box(
             np.full(3, -np.inf, np.float32), np.array([np.inf, 0.0, 0.0], np.float32), (3,), np.float32

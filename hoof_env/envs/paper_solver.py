@@ -23,7 +23,7 @@ from hoof_env.dynamics.observables import StanceCounter
 from hoof_env.dynamics.parts import Result
 from hoof_env.errors import ParameterError
 from hoof_env.gait import GaitParameters
-from hoof_env.tasks.settings import Settings
+from hoof_env.tasks.settings import ResolvedSettings, Settings
 
 Floats = NDArray[np.float64]
 Records = NDArray[np.void]
@@ -84,7 +84,7 @@ class PaperSolver:
         substeps: substeps of a control step.
     """
 
-    def __init__(self, settings: Settings, engine: TrunkEngine, substeps: int) -> None:
+    def __init__(self, settings: ResolvedSettings, engine: TrunkEngine, substeps: int) -> None:
         s = settings
         self.engine = engine
         self.substeps = substeps

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any, Unpack
+from typing import Any
 
 import gymnasium as gym
 import numpy as np
@@ -11,13 +11,13 @@ from gymnasium.vector import AutoresetMode
 from numpy.typing import NDArray
 from stable_baselines3.common.vec_env import VecEnv
 
+from hoof_env.envs.arguments import Sb3Arguments, takes
 from hoof_env.envs.base import fixed_setting
 from hoof_env.envs.batch_starts import check_options
 from hoof_env.envs.infos import row_of
 from hoof_env.envs.rows import PER_ENV
 from hoof_env.envs.vector import HorseLegVectorEnv
 from hoof_env.errors import ParameterError
-from hoof_env.tasks.keywords import VectorKeywords
 from hoof_env.tasks.settings import SETTINGS
 
 
@@ -45,9 +45,8 @@ class Sb3VecEnv(VecEnv):
             bad argument.
     """
 
-    def __init__(
-        self, env_id: str = "hoof_env/HorseLeg-v0", num_envs: int = 64, **settings: Unpack[VectorKeywords]
-    ) -> None:
+    @takes(Sb3Arguments)
+    def __init__(self, env_id: str = "hoof_env/HorseLeg-v0", num_envs: int = 64, **settings: Any) -> None:
         if "vectorization_mode" in settings:
             raise ParameterError("vectorization_mode: expected none, for all are stepped in one call")
         settings.setdefault("autoreset_mode", AutoresetMode.SAME_STEP)

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import copy
 from collections.abc import Mapping, Sequence
-from typing import Any, ClassVar, Unpack
+from typing import Any, ClassVar
 
 import gymnasium as gym
 import numpy as np
@@ -18,6 +18,7 @@ from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
 from numpy.typing import NDArray
 
+from hoof_env.envs.arguments import VectorArguments, takes
 from hoof_env.envs.base import LegBase, array_of, generator_of
 from hoof_env.envs.batch_reports import endings_of, infos_of
 from hoof_env.envs.batch_starts import check_options
@@ -29,7 +30,6 @@ from hoof_env.envs.vector_checks import check_actions, check_drawn, check_mask
 from hoof_env.errors import ParameterError, count
 from hoof_env.render.renderer import USUAL_SIZE
 from hoof_env.tasks.episode import FAILED, TRUNCATED
-from hoof_env.tasks.keywords import Keywords
 
 Floats = NDArray[np.float64]
 
@@ -84,6 +84,7 @@ class HorseLegVectorEnv(  # type: ignore[misc]  # generators are of all
         "autoreset_mode": AutoresetMode.NEXT_STEP,
     }
 
+    @takes(VectorArguments)
     def __init__(
         self,
         num_envs: int = 1,
@@ -96,7 +97,7 @@ class HorseLegVectorEnv(  # type: ignore[misc]  # generators are of all
         rendered: int | None = None,
         width: int = USUAL_SIZE[0],
         height: int = USUAL_SIZE[1],
-        **settings: Unpack[Keywords],
+        **settings: Any,
     ) -> None:
         self.num_envs = count("num_envs", num_envs, most=MOST_ENVS)
         self.autoreset_mode = mode_of(autoreset_mode)

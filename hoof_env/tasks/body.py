@@ -18,7 +18,7 @@ from hoof_env.gait import FilterSettings
 from hoof_env.ground.contact import Ground
 from hoof_env.leg.geometry import Geometry
 from hoof_env.tasks.leg_starts import Start
-from hoof_env.tasks.settings import Settings
+from hoof_env.tasks.settings import ResolvedSettings, Settings
 
 Floats = NDArray[np.float64]
 
@@ -85,7 +85,7 @@ class Body(Protocol):
     def policy_names(self) -> list[str]:
         """Names of the scripted policies."""
 
-    def parts(self, s: Settings) -> tuple[Trunk, Ground, tuple[Limb, ...]]:
+    def parts(self, s: ResolvedSettings) -> tuple[Trunk, Ground, tuple[Limb, ...]]:
         """Make trunk, ground and legs from settings of `parameters.resolved`."""
 
     def commanded_speeds(self, s: Settings) -> tuple[float, float] | None:

@@ -63,7 +63,7 @@ from hoof_env.tasks.leg_starts import (
     with_parameters,
 )
 from hoof_env.tasks.parameters import check_range, drive_of, ground_of
-from hoof_env.tasks.settings import Settings
+from hoof_env.tasks.settings import ResolvedSettings, Settings
 
 Floats = NDArray[np.float64]
 
@@ -194,7 +194,7 @@ class Horse:
             (-PITCH, PITCH), (self.lowest, self.highest), CLEARANCE * self.size
         )
 
-    def parts(self, s: Settings) -> tuple[Trunk, Ground, tuple[Limb, ...]]:
+    def parts(self, s: ResolvedSettings) -> tuple[Trunk, Ground, tuple[Limb, ...]]:
         """Make trunk, ground and legs from settings, see `Body.parts`."""
         size = self.size
         mass = check_number("trunk_mass", s.trunk_mass, low=0, exclusive_low=True) * size**3
@@ -222,7 +222,7 @@ class Horse:
             rotor_inertia=drive.rotor_inertia * size**5,
         )
 
-    def _ground(self, s: Settings, mass: float) -> Ground:
+    def _ground(self, s: ResolvedSettings, mass: float) -> Ground:
         """Make the ground: only the threshold speeds of its laws scale with the animal."""
         ground = ground_of(s, mass)
         names = "approach_floor", "friction_slow", "friction_fast"

@@ -33,7 +33,7 @@ from hoof_env.tasks.body import BodyKernels
 from hoof_env.tasks.episode import ACTIONS, Episode
 from hoof_env.tasks.leg_starts import HIGHEST, LOWEST, Start, check_options, draw_starts
 from hoof_env.tasks.parameters import check_range, drive_of, ground_of, hoof_spring
-from hoof_env.tasks.settings import Settings
+from hoof_env.tasks.settings import ResolvedSettings, Settings
 
 Floats = NDArray[np.float64]
 
@@ -224,7 +224,7 @@ class OneLeg:
         height = nominal if s.hip_height is None else s.hip_height
         self.height = check_number("hip_height", height, low=LOWEST * nominal, high=HIGHEST * nominal)
 
-    def parts(self, s: Settings) -> tuple[Trunk, Ground, tuple[Limb, ...]]:
+    def parts(self, s: ResolvedSettings) -> tuple[Trunk, Ground, tuple[Limb, ...]]:
         """Make trunk, ground and legs from settings, see `Body.parts`."""
         trunk = Trunk(
             kind=s.trunk,

@@ -4,7 +4,6 @@ parameters that are drawn for each episode."""
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -15,12 +14,12 @@ from hoof_env.ground.contact import Ground, load_ground
 from hoof_env.ground.terrain import Terrain
 from hoof_env.leg.geometry import preset_error_type, preset_label, read_preset
 from hoof_env.tasks.effects import check_effect
-from hoof_env.tasks.settings import PER_EPISODE, SOLVERS, Settings
+from hoof_env.tasks.settings import PER_EPISODE, SOLVERS, ResolvedSettings, Settings
 
 MOST_SUBSTEPS = 100_000  # largest number of substeps of a control step
 
 
-def resolved(settings: Settings) -> Settings:
+def resolved(settings: Settings) -> ResolvedSettings:
     """Return the settings with values for None: the ground of the preset, the solver's own scheme and step.
 
     Raises:
@@ -28,22 +27,21 @@ def resolved(settings: Settings) -> Settings:
         Exception: the preset's own type of error, if it has no ground and the settings lack one.
     """
     is_paper = check_choice("solver", settings.solver, SOLVERS) == "paper"
-    s: Any = settings
-    if s.stiffness is None or s.exponent is None:
-        if "ground" not in read_preset(s.preset):
-            raise preset_error_type(s.preset)(
-                f"{preset_label(s.preset)}: expected an entry 'ground' with the stiffness and the exponent"
-                " that its gaits are for, {} for those of hoof_env.Ground, or both as arguments; got"
-                f" stiffness={s.stiffness!r}, exponent={s.exponent!r}"
+    values = dict(vars(settings))
+    if settings.stiffness is None or settings.exponent is None:
+        if "ground" not in read_preset(settings.preset):
+            raise preset_error_type(settings.preset)(
+                f"{preset_label(settings.preset)}: expected an entry 'ground' with the stiffness and the"
+                " exponent that its gaits are for, {} for those of hoof_env.Ground, or both as arguments; got"
+                f" stiffness={settings.stiffness!r}, exponent={settings.exponent!r}"
             )
-        ground = load_ground(s.preset, stiffness=s.stiffness, exponent=s.exponent)
-        s = replace(s, stiffness=ground.stiffness, exponent=ground.exponent)
-    if s.integrator is None:
-        s = replace(s, integrator="euler" if is_paper else "midpoint")
-    if s.sim_dt is None:
-        s = replace(s, sim_dt=1e-3 if is_paper else 1e-4)
-    complete: Settings = s
-    return complete
+        ground = load_ground(settings.preset, stiffness=settings.stiffness, exponent=settings.exponent)
+        values |= {"stiffness": ground.stiffness, "exponent": ground.exponent}
+    if settings.integrator is None:
+        values["integrator"] = "euler" if is_paper else "midpoint"
+    if settings.sim_dt is None:
+        values["sim_dt"] = 1e-3 if is_paper else 1e-4
+    return ResolvedSettings(**values)
 
 
 def check_range(
@@ -88,7 +86,7 @@ def substeps_of(dt: float, sim_dt: float) -> int:
     return round(ratio)
 
 
-def ground_of(s: Any, mass: float) -> Ground:
+def ground_of(s: ResolvedSettings, mass: float) -> Ground:
     """Make the ground from `resolved` settings, under a trunk of a mass [kg]."""
     return Ground(
         s.stiffness,

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields
 from types import MappingProxyType
 from typing import Annotated, Any, NamedTuple, get_type_hints
@@ -13,6 +13,9 @@ from hoof_env.leg.geometry import DEFAULT_PRESET, Preset
 PRINTED_BETA = math.sqrt(2 * 15.0)
 """Baumgarte's beta as the paper's Table 1 prints it, sqrt(2 alpha) [1/s]; sqrt(2) alpha = 21.2 is probably
 meant."""
+
+Range = float | Sequence[float]
+"""Lowest and highest value, or one number for both."""
 
 SOLVERS = ("exact", "paper")  # the closed form, and Eq. 8 as the paper solves it
 
@@ -35,9 +38,13 @@ class About(NamedTuple):
     needs: tuple[str, tuple[str, ...]] | None = None
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Settings:
-    """Settings of an environment, plain values that JSON can hold, each with its default and its `About`."""
+    """Settings of an environment, plain values that JSON can hold, each with its default and its `About`.
+
+    The types are those that callers may pass: the fields are keyword arguments of the environments, too, see
+    `envs.arguments`.
+    """
 
     # Leg and gait, trunk
     preset: Annotated[
@@ -309,7 +316,7 @@ class Settings:
         ),
     ] = PRINTED_BETA
     integrator: Annotated[
-        str,
+        str | None,
         About(
             "",
             "$schemes; of the paper's solver $paper_schemes; None for midpoint, and for the paper's Euler",
@@ -317,7 +324,7 @@ class Settings:
         ),
     ] = "midpoint"
     sim_dt: Annotated[
-        float,
+        float | None,
         About(
             "s",
             (
@@ -331,7 +338,7 @@ class Settings:
     episode_seconds: Annotated[float, About("s", "time limit of an episode")] = 10.0
     # Command
     target_speed: Annotated[
-        tuple[float, float] | None,
+        Range | None,
         About(
             "m/s",
             (
@@ -345,7 +352,7 @@ class Settings:
         ),
     ] = (2.5, 2.5)
     target_seconds: Annotated[
-        tuple[float, float],
+        Range,
         About(
             "s",
             "shortest and longest time for which a command holds",
@@ -392,7 +399,7 @@ class Settings:
         ),
     ] = None
     # Observation, reward, and variation
-    observation: Annotated[tuple[str, ...], About("", "groups to observe, in this order")] = (
+    observation: Annotated[Sequence[str], About("", "groups to observe, in this order")] = (
         "crank",
         "gait",
         "trunk",
@@ -402,7 +409,7 @@ class Settings:
         Mapping[str, float] | None, About("", "mapping of the weights that are to differ from those above")
     ] = None
     randomize: Annotated[
-        Mapping[str, Any] | None,
+        Mapping[str, Range] | None,
         About(
             "", "physical parameters to draw at each reset, as the reset option `parameters`; None for none"
         ),
@@ -411,6 +418,16 @@ class Settings:
     def __deepcopy__(self, memo: Any) -> Settings:
         """Return the settings themselves, which never change."""
         return self
+
+
+@dataclass(frozen=True, kw_only=True)
+class ResolvedSettings(Settings):
+    """Settings after `parameters.resolved`, which replaces None in these."""
+
+    stiffness: float
+    exponent: float
+    integrator: str
+    sim_dt: float
 
 
 SETTINGS = tuple(item.name for item in fields(Settings))
