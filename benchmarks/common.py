@@ -18,7 +18,11 @@ from numpy.typing import NDArray
 from hoof_env.dynamics.parts import Limb
 from hoof_env.ground.contact import Ground, new_contacts, touch
 from hoof_env.leg.kinematics import FrameMotion, Pose, pose
-from hoof_env.leg.linkage import BODIES, FRAME, JOINTS
+from hoof_env.leg.mechanism import FRAME
+from hoof_env.leg.mechanism_list import PAPER
+
+BODIES = PAPER.bodies
+JOINTS = PAPER.joints
 
 Pins = dict[tuple[str, str, str], list[tuple[int, int]]]
 
@@ -225,4 +229,4 @@ class GroundForces:
 
 def corners(limb: Limb) -> tuple[str, str]:
     """Return the names of toe and heel."""
-    return limb.geometry.toe, limb.geometry.heel
+    return limb.geometry.corners

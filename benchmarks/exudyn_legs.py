@@ -20,7 +20,12 @@ from numpy.typing import NDArray
 
 from benchmarks.common import ALL, Assembly, Outside, Record, Start
 from hoof_env.dynamics.parts import GRAVITY, TRUNKS, Limb, Motor, Trunk
-from hoof_env.leg.linkage import BODIES, FRAME, JOINTS, LOCK
+from hoof_env.leg.mechanism import FRAME
+from hoof_env.leg.mechanism_list import PAPER
+
+BODIES = PAPER.bodies
+JOINTS = PAPER.joints
+(LOCK,) = PAPER.welds
 
 eii: Any = exudyn.itemInterface  # its types ask for protocols that closures do not meet by name
 
@@ -184,7 +189,8 @@ class ExudynLegs:
         def local(k: int, point: str) -> tuple[float, float]:
             # The frame has its axes in the pose of the hip, bodies theirs at their centres of mass
             if k == FRAME:
-                return (sigma * geometry.pivot[0], geometry.pivot[1]) if point == "C" else (0.0, 0.0)
+                place = geometry.fixed[point]
+                return (sigma * place.real, place.imag)
             out = complex(*(pose.point(point) - pose.centres[k])) * np.exp(-1j * pose.angles[k])
             return out.real, out.imag
 

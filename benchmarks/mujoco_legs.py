@@ -27,7 +27,8 @@ from numpy.typing import NDArray
 
 from benchmarks.common import ALL, LOCKED, RIGID, Assembly, Outside, Record, Start, corners
 from hoof_env.dynamics.parts import GRAVITY, Limb, Motor, Trunk
-from hoof_env.leg.kinematics import Pose, cross
+from hoof_env.leg.kinematics import Pose
+from hoof_env.leg.profile import cross
 
 FLYWHEEL = 1e9
 """Inertia that keeps a prescribed crank at its speed [kg m^2]: it is 1e10 times the leg's."""
@@ -335,8 +336,10 @@ class MujocoLegs:
         pitch = self.data.qacc[self._slides[2]] if self.trunk.kind == "free" else 0.0
         for i, limb in enumerate(self.limbs):
             sigma = limb.geometry.travel
-            (x, y) = limb.geometry.pivot
-            c = complex(sigma * x, y) * np.exp(1j * (self.body[2] + sigma * self.start.swing[i]))
+            pivot = limb.geometry.fixed["C"]
+            c = complex(sigma * pivot.real, pivot.imag) * np.exp(
+                1j * (self.body[2] + sigma * self.start.swing[i])
+            )
             at_c = pins[i][[point == "C" for point, _, _ in self.assembly.pins]].sum(axis=0)
             torque[i] += sigma * cross(c, complex(*at_c))
             if isinstance(limb.drive, Motor):

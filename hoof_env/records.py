@@ -37,7 +37,7 @@ from hoof_env.lab.c3d import ezc3d, write_c3d
 from hoof_env.lab.forces import THRESHOLD, above_threshold, in_units, limbs_of, onto_surface
 from hoof_env.lab.forces import UNITS as FORCE_UNITS
 from hoof_env.lab.opensim import check_bodies, loads_path, write_mot
-from hoof_env.lab.reactions import REACTION_UNITS, JointReactions
+from hoof_env.lab.reactions import JointReactions, reaction_units
 from hoof_env.render import instant
 from hoof_env.render.instant import UNITS, Columns, Surroundings, columns_of, units_of_legs
 from hoof_env.saved_policy import find_saved
@@ -215,7 +215,7 @@ def _named(env: gym.Env[Any, Any], reactions: NDArray[np.float64]) -> Columns:
     limbs = [f"{leg}_" for leg in surroundings(env).hips] or [""]
     columns = {}
     for i, limb in enumerate(limbs):
-        for k, name in enumerate(REACTION_UNITS):
+        for k, name in enumerate(reaction_units(surroundings(env).geometry.mechanism)):
             columns[f"{limb}{name}"] = reactions[:, i, k]
     return columns
 
@@ -251,10 +251,10 @@ def record_episode(
 def units_of(env: gym.Env[Any, Any], reactions: bool = False) -> dict[str, str]:
     """Return the units of a record by column.
 
-    The columns are those of `RECORD`, with `reactions` also those of `REACTION_UNITS`. A horse has columns of
+    The columns are those of `RECORD`, with `reactions` also those of `reaction_units`. A horse has columns of
     its trunk, and those of each leg with its name as prefix: `left_fore_force_y`.
     """
-    of_leg = RECORD | (REACTION_UNITS if reactions else {})
+    of_leg = RECORD | (reaction_units(surroundings(env).geometry.mechanism) if reactions else {})
     return units_of_legs(of_leg, surroundings(env).hips)
 
 
@@ -412,11 +412,12 @@ def export_episode(
         record = record_episode(env, player, seed, seconds, reactions=reactions, tell=True)
         kept = above_threshold(record, threshold, surroundings(env).terrain)
         about = describe(env, environment=env_id, arguments=env_arguments, policy=policy, seed=seed)
+        of_joints = tuple(reaction_units(surroundings(env).geometry.mechanism)) if reactions else ()
         about |= {
             "threshold_n": threshold,
             "bodies": on,
             "units": names,
-            "reactions": [name for name in names if reactions and name.endswith(tuple(REACTION_UNITS))],
+            "reactions": [name for name in names if name.endswith(of_joints)],
         }
     written, description = in_units(kept, about, units)
     write(written, description, path)

@@ -1,4 +1,5 @@
-"""The leg as the paper solves it (Eqs. 2-9): 42 coordinates, 42 multipliers, Baumgarte stabilisation.
+"""A leg as the paper solves it (Eqs. 2-9): 42 coordinates, 42 multipliers, Baumgarte stabilisation. A leg of
+B bodies has 3 B of them; the numbers here are those of the paper's.
 
     [ M      Phi_q^T ] [ qdd    ]   [ h                                    ]
     [ Phi_q  0       ] [ lambda ] = [ gamma - 2 alpha Phi_dot - beta^2 Phi ]      (Eq. 8)
@@ -10,9 +11,9 @@ closed form.
 Phi_q is square, so the second row of Eq. 8 alone fixes qdd: contact, masses and weight change the multipliers
 (joint reactions, drive torques) and never the motion.
 
-q holds (x, y, th) of the 14 bodies of `leg.linkage` in the frame of the paper's drawing: O at the origin,
+q holds (x, y, th) of the bodies of the leg's mechanism in the frame of the paper's drawing: O at the origin,
 crank turning clockwise; hoof points go to the world, and ground forces come back, through one mirror. The
-leg's frame, which carries the pivot C and turns by phi about O, is treated as a fifteenth body whose motion
+leg's frame, which carries the pivot C and turns by phi about O, is treated as one more body whose motion
 is prescribed. So one expression serves every joint, and the Jacobian's column of the frame's orientation is
 d Phi / d phi.
 """
@@ -42,109 +43,128 @@ from hoof_env.gait import (
     gait_array,
     steady_filters,
 )
-from hoof_env.ground.contact import HEEL, TOE, Ground, new_contacts, touch
-from hoof_env.leg.geometry import Geometry, check_full_revolution
-from hoof_env.leg.kinematics import FrameMotion, cross, mirror, pose
-from hoof_env.leg.linkage import BODIES, CONSTRUCTION, DRIVER, FRAME, JOINTS, LOCK, Extension
+from hoof_env.ground.contact import Ground, new_contacts, touch
+from hoof_env.leg.assembly import ANGLES, check_full_revolution, coordinate, solve
+from hoof_env.leg.geometry import Geometry
+from hoof_env.leg.kinematics import FrameMotion, mirror, pose
+from hoof_env.leg.mechanism import FRAME, BodyPoint
+from hoof_env.leg.profile import cross
 
 Vector = NDArray[np.float64]
 
-SIZE = 3 * len(BODIES)
-"""Number of coordinates, and of constraint equations: the crank is driven, so that nothing is free."""
-
-JOINT_ROWS = 2 * len(JOINTS)
-LOCK_ROW, DRIVER_ROW = JOINT_ROWS, JOINT_ROWS + 1
-"""Order of the rows: x and y of every joint as in `JOINTS`, then the lock, then the driver."""
-
-_I = np.array([joint.i for joint in JOINTS])
-_J = np.array([joint.j for joint in JOINTS])  # FRAME is -1: the last of 15 bodies
-_X_ROWS, _Y_ROWS = np.arange(0, JOINT_ROWS, 2), np.arange(1, JOINT_ROWS, 2)
-
 
 class Closure(NamedTuple):
-    """The constraint equations at one instant, 42 rows (joint rows in m, lock and driver in rad)."""
+    """The constraint equations at one instant: rows x, y of every joint [m], then welds and driver [rad]."""
 
     error: Vector  # Phi(q, t)
     error_rate: Vector  # Phi_q qd + Phi_t
-    jacobian: Vector  # Phi_q, shape (42, 42) (Eq. 3)
+    jacobian: Vector  # Phi_q, square (Eq. 3)
     by_phi: Vector  # d Phi / d phi; d Phi / d theta is 1 in the driver's row and 0 elsewhere
     gamma: Vector  # what Phi_q qdd must be, -(Phi_q qd)_q qd - 2 Phi_qt qd - Phi_tt
 
 
 def body_coordinate(geometry: Geometry, point: str, body: int) -> complex:
-    """Place of a named point on a body, in the body's own axes: from its centre, first axis along e_i [m]."""
+    """Place of a named point on a body, in the body's own axes: from its centre of mass, first axis along e_i
+    [m]."""
     if body == FRAME:
-        return {"O": 0j, "C": complex(*geometry.pivot)}[point]
-    half = float(geometry.body_lengths[body]) / 2
-    place = {BODIES[body].tail: -half, BODIES[body].head: half}
-    if point not in place:  # A, on the line through the ends of link 8
-        step = next(s for s in CONSTRUCTION if isinstance(s, Extension) and s.point == point)
-        sense = np.sign(place[step.second] - place[step.first])
-        place[point] = place[step.origin] + sense * geometry.lengths[step.distance]
+        return geometry.fixed[point]
+    mechanism = geometry.mechanism
+    of = mechanism.bodies[body]
+    length = float(geometry.body_lengths[body])
+    centre = geometry.body_centres[body] * length
+    place = {of.tail: -centre, of.head: length - centre}
+    if point not in place:
+        step = next((s for s in mechanism.steps if isinstance(s, BodyPoint) and s.point == point), None)
+        if step is not None and {step.origin, step.toward} == {of.tail, of.head}:
+            sense = 1 if step.toward == of.head else -1
+            along, across = (coordinate(geometry.lengths, text) for text in (step.along, step.across))
+            place[point] = place[step.origin] + sense * complex(along, across)
+        else:
+            z = solve(geometry, np.linspace(0, 2 * np.pi, ANGLES))[0]
+            names = (of.tail, of.head, point)
+            tail, head, at = z[np.isfinite(z).all(1)][0, [mechanism.number[name] for name in names]]
+            place[point] = (at - tail) / (head - tail) * length - centre
     return complex(place[point])
 
 
 class Constraints:
-    """Eq. 2 of one leg."""
+    """Eq. 2 of one leg: rows x and y of every joint in the order of the mechanism's list, its welds, and the
+    driver."""
 
     def __init__(self, geometry: Geometry) -> None:
-        self._place_i = np.array([body_coordinate(geometry, joint.point, joint.i) for joint in JOINTS])
-        self._place_j = np.array([body_coordinate(geometry, joint.point, joint.j) for joint in JOINTS])
-        constant = np.zeros((SIZE, SIZE + 3))
-        for rows, axis in ((_X_ROWS, 0), (_Y_ROWS, 1)):
-            constant[rows, 3 * _I + axis] = 1.0
-            constant[rows, 3 * _J + axis] = -1.0
-        one, other = LOCK
-        constant[LOCK_ROW, 3 * one + 2], constant[LOCK_ROW, 3 * other + 2] = 1.0, -1.0
-        constant[DRIVER_ROW, 3 * DRIVER + 2], constant[DRIVER_ROW, 3 * FRAME + 2] = 1.0, -1.0
+        mechanism = geometry.mechanism
+        joints = mechanism.joints
+        self.size = 3 * len(mechanism.bodies)  # of coordinates and of equations: nothing is free
+        self.joint_rows = 2 * len(joints)
+        self.driver_row = self.size - 1
+        self.crank = mechanism.crank
+        self._x_rows = np.arange(0, self.joint_rows, 2)
+        self._y_rows = self._x_rows + 1
+        self._i = np.array([joint.i for joint in joints])
+        self._j = np.array([joint.j for joint in joints])  # FRAME is -1: the last of all bodies
+        self._place_i = np.array([body_coordinate(geometry, joint.point, joint.i) for joint in joints])
+        self._place_j = np.array([body_coordinate(geometry, joint.point, joint.j) for joint in joints])
+        self._welds = np.array(mechanism.welds, dtype=np.int64).reshape(-1, 2)
+        self._weld_rows = self.joint_rows + np.arange(len(self._welds))
+        constant = np.zeros((self.size, self.size + 3))
+        for rows, axis in ((self._x_rows, 0), (self._y_rows, 1)):
+            constant[rows, 3 * self._i + axis] = 1.0
+            constant[rows, 3 * self._j + axis] = -1.0
+        for bodies, sign in ((self._welds[:, 0], 1.0), (self._welds[:, 1], -1.0)):
+            constant[self._weld_rows, 3 * bodies + 2] = sign
+        constant[self.driver_row, 3 * self.crank + 2] = 1.0
+        constant[self.driver_row, 3 * FRAME + 2] = -1.0
         self._constant = constant
 
     def __call__(self, q: Vector, qd: Vector, motion: Any) -> Closure:
-        """Evaluate everything at coordinates q, rates qd (shape (42,) each) and a `MOTION` record."""
+        """Evaluate everything at coordinates q, rates qd (shape (size,) each) and a `MOTION` record."""
         x = np.append(q, (0.0, 0.0, motion["phi"])).reshape(-1, 3)
         v = np.append(qd, (0.0, 0.0, motion["phi_rate"]))
-        centre, e, rate = x[:, 0] + 1j * x[:, 1], np.exp(1j * x[:, 2]), v[2::3]
-        arm_i, arm_j = self._place_i * e[_I], self._place_j * e[_J]
+        i, j, x_rows, y_rows = self._i, self._j, self._x_rows, self._y_rows
+        centre = x[:, 0] + 1j * x[:, 1]
+        e = np.exp(1j * x[:, 2])
+        rate = v[2::3]
+        arm_i = self._place_i * e[i]
+        arm_j = self._place_j * e[j]
 
-        error = np.empty(SIZE)
-        gap = centre[_I] + arm_i - centre[_J] - arm_j
-        error[_X_ROWS], error[_Y_ROWS] = gap.real, gap.imag
-        error[LOCK_ROW] = x[LOCK[0], 2] - x[LOCK[1], 2]
-        error[DRIVER_ROW] = x[DRIVER, 2] + motion["theta"] - motion["phi"]
+        error = np.empty(self.size)
+        gap = centre[i] + arm_i - centre[j] - arm_j
+        error[x_rows] = gap.real
+        error[y_rows] = gap.imag
+        error[self._weld_rows] = x[self._welds[:, 0], 2] - x[self._welds[:, 1], 2]
+        error[self.driver_row] = x[self.crank, 2] + motion["theta"] - motion["phi"]
 
         jacobian = self._constant.copy()
-        for body, slope in ((_I, 1j * arm_i), (_J, -1j * arm_j)):
-            jacobian[_X_ROWS, 3 * body + 2], jacobian[_Y_ROWS, 3 * body + 2] = slope.real, slope.imag
+        for body, slope in ((i, 1j * arm_i), (j, -1j * arm_j)):
+            jacobian[x_rows, 3 * body + 2] = slope.real
+            jacobian[y_rows, 3 * body + 2] = slope.imag
         by_phi = jacobian[:, 3 * FRAME + 2]
 
         error_rate = jacobian @ v
-        error_rate[DRIVER_ROW] += motion["theta_rate"]
+        error_rate[self.driver_row] += motion["theta_rate"]
 
         gamma = -by_phi * motion["phi_acc"]
-        turning = arm_i * rate[_I] ** 2 - arm_j * rate[_J] ** 2
-        gamma[_X_ROWS] += turning.real
-        gamma[_Y_ROWS] += turning.imag
-        gamma[DRIVER_ROW] -= motion["theta_acc"]
-        return Closure(error, error_rate, jacobian[:, :SIZE], by_phi, gamma)
+        turning = arm_i * rate[i] ** 2 - arm_j * rate[j] ** 2
+        gamma[x_rows] += turning.real
+        gamma[y_rows] += turning.imag
+        gamma[self.driver_row] -= motion["theta_acc"]
+        return Closure(error, error_rate, jacobian[:, : self.size], by_phi, gamma)
 
 
 def closed_form(geometry: Geometry, motion: Any) -> tuple[Vector, Vector]:
-    """The q and qd, shape (42,) each, that solve Eq. 2 for a `MOTION` record, lock and driver included."""
+    """The q and qd, shape (size,) each, that solve Eq. 2 for a `MOTION` record, welds and driver included."""
     drawn = geometry.replace(travel=1)  # the paper's own frame, not the world's
     frame = FrameMotion(motion["phi"], motion["phi_rate"])
     p = pose(drawn, motion["theta"], motion["theta_rate"], frame=frame)
     angles = p.angles.copy()
-    angles[DRIVER] = motion["phi"] - motion["theta"]  # pose returns angles but for whole turns
-    angles[LOCK[0]] = angles[LOCK[1]]
+    # pose returns angles but for whole turns
+    angles[geometry.mechanism.crank] = motion["phi"] - motion["theta"]
+    for one, other in geometry.mechanism.welds:
+        angles[one] = angles[other]
     q = np.column_stack([p.centres, angles])
     qd = np.column_stack([p.centre_velocities, p.angular_velocities])
     return q.ravel(), qd.ravel()
 
-
-SOLE = next(i for i, body in enumerate(BODIES) if {body.tail, body.head} == {"I", "J"})
-"""The link whose ends are toe and heel."""
-
-_X, _Y, _TURN = 3 * SOLE, 3 * SOLE + 1, 3 * SOLE + 2
 
 TRACE = np.dtype([(name, "f8") for name in (*TRUNK_STATE, *TRUNK_REPORT, *LEG_STATE, *LEG_REPORT)])
 """State and report of one leg at the end of a substep, by the names that `TrunkEngine` gives them. On a fixed
@@ -167,7 +187,7 @@ class ConstrainedState:
     motion: Any  # record of dtype `MOTION`
     filters: NDArray[np.void]  # (4,)
     contacts: NDArray[np.void]  # (2,), toe first
-    q: Vector  # coordinates in the frame of the paper's drawing, (42,)
+    q: Vector  # coordinates in the frame of the paper's drawing, (3 bodies,)
     qd: Vector  # and their rates
 
     def copy(self) -> ConstrainedState:
@@ -222,15 +242,21 @@ class ConstrainedLeg:
         self._settings = filters.to_array()
         self._ground = ground.to_record()
         self._travel = float(geometry.travel)
-        self._corners = np.array([body_coordinate(geometry, p, SOLE) for p in (geometry.toe, geometry.heel)])
-        masses, inertias = geometry.body_masses, geometry.body_inertias
-        self._system = np.zeros((2 * SIZE, 2 * SIZE))
-        self._system[:SIZE, :SIZE] = np.diag(np.column_stack([masses, masses, inertias]).ravel())  # Eqs. 4, 5
-        self._weight = np.zeros(SIZE)
+        feet = [foot for foot in (geometry.toe, geometry.heel) if foot is not None]
+        self._feet = [geometry.mechanism.body_of_foot(foot) for foot in feet]
+        pairs = zip(feet, self._feet, strict=True)
+        self._corners = np.array([body_coordinate(geometry, foot, body) for foot, body in pairs])
+        self._columns = 3 * np.array(self._feet)[:, None] + np.arange(3)
+        masses = geometry.body_masses
+        inertias = geometry.body_inertias
+        self._size = size = self.constraints.size
+        self._system = np.zeros((2 * size, 2 * size))
+        self._system[:size, :size] = np.diag(np.column_stack([masses, masses, inertias]).ravel())  # Eqs. 4, 5
+        self._weight = np.zeros(size)
         self._weight[1::3] = -masses * GRAVITY  # Eq. 7
         self.state = ConstrainedState(
             np.zeros(1, BODY)[0], np.zeros(1, MOTION)[0], steady_filters(np.zeros(4)), new_contacts(),
-            np.zeros(SIZE), np.zeros(SIZE),
+            np.zeros(size), np.zeros(size),
         )  # fmt: skip
 
     def reset(
@@ -293,7 +319,7 @@ class ConstrainedLeg:
         return self.constraints(self.state.q, self.state.qd, self.state.motion)
 
     def solve(self, ground: bool = True) -> tuple[Vector, Vector]:
-        """qdd and lambda of Eq. 8 at the present state, shape (42,) each, with or without ground forces."""
+        """qdd and lambda of Eq. 8 at the present state, shape (size,) each, with or without ground forces."""
         return self._solve(self.closure(), self._ground_load() if ground else 0.0)
 
     def reactions(self) -> Reactions:
@@ -301,9 +327,12 @@ class ConstrainedLeg:
         closure, travel = self.closure(), self._travel
         _, multipliers = self._solve(closure, self._ground_load())
         load = -multipliers  # the constraints load the bodies with -Phi_q^T lambda; Phi_q is +1 at body i
-        joints = load[:JOINT_ROWS].reshape(-1, 2) * (travel, 1.0)
+        rows = self.constraints.joint_rows
+        joints = load[:rows].reshape(-1, 2) * (travel, 1.0)
         hip = float(travel * (multipliers @ closure.by_phi))
-        return Reactions(joints, float(travel * load[LOCK_ROW]), float(travel * load[DRIVER_ROW]), hip)
+        welds = travel * load[rows:-1]
+        lock = float(welds[0]) if len(welds) == 1 else welds
+        return Reactions(joints, lock, float(travel * load[-1]), hip)
 
     def _substep(self, command: NDArray[np.float64], t: float, row: np.void) -> bool:
         """One step of h to time t; fills `row` and returns whether all is finite."""
@@ -329,15 +358,17 @@ class ConstrainedLeg:
         evaluate_motion(state.motion, state.filters)
         trunk = complex(state.body["x"], self.trunk.height)
         arms = self._corner_arms()
-        at = complex(state.q[_X], state.q[_Y]) + arms
-        velocity = complex(state.qd[_X], state.qd[_Y]) + 1j * state.qd[_TURN] * arms
-        toe, heel = (trunk + mirror(z, travel) for z in at)
-        touch(state.contacts[TOE], toe, mirror(velocity[TOE], travel), self._ground)
-        touch(state.contacts[HEEL], heel, mirror(velocity[HEEL], travel), self._ground)
+        x, y, _ = state.q[self._columns].T
+        vx, vy, turning = state.qd[self._columns].T
+        at = x + 1j * y + arms
+        velocity = vx + 1j * vy + 1j * turning * arms
+        # a heel that is not there stays above the ground: `contacts` has one for it
+        for contact, place, rate in zip(state.contacts, at, velocity, strict=False):
+            touch(contact, trunk + mirror(place, travel), mirror(rate, travel), self._ground)
         closure = self.closure()
         _, multipliers = self._solve(closure, self._ground_load())
         # The drives bring in lambda . Phi_t, so the torques are lambda . dPhi/dtheta and lambda . dPhi/dphi.
-        crank, hip = multipliers[DRIVER_ROW], multipliers @ closure.by_phi
+        crank, hip = multipliers[-1], multipliers @ closure.by_phi
         self._report(row, float(crank), float(hip))
         return bool(np.isfinite(multipliers).all())
 
@@ -362,24 +393,26 @@ class ConstrainedLeg:
             )
 
     def _corner_arms(self) -> NDArray[np.complex128]:
-        """Toe and heel relative to the centre of the sole link, in the frame of q [m]."""
-        return self._corners * np.exp(1j * self.state.q[_TURN])
+        """Toe and heel relative to the centres of their links, in the frame of q [m]."""
+        return self._corners * np.exp(1j * self.state.q[self._columns[:, 2]])
 
     def _ground_load(self) -> Vector:
-        """Return the part of h from the present contact forces: force and moment on the sole link."""
-        load = np.zeros(SIZE)
-        for contact, arm in zip(self.state.contacts, self._corner_arms(), strict=True):
+        """Return the part of h from the present contact forces: force and moment on the links of the feet."""
+        load = np.zeros(self._size)
+        arms = self._corner_arms()
+        for contact, columns, arm in zip(self.state.contacts, self._columns, arms, strict=False):
             force = mirror(complex(contact["friction"], contact["normal"]), self._travel)
-            load[[_X, _Y, _TURN]] += force.real, force.imag, cross(arm, force)
+            load[columns] += force.real, force.imag, cross(arm, force)
         return load
 
     def _solve(self, closure: Closure, load: Vector | float = 0.0) -> tuple[Vector, Vector]:
-        """qdd and lambda of Eq. 8, shape (42,) each."""
-        self._system[SIZE:, :SIZE] = closure.jacobian
-        self._system[:SIZE, SIZE:] = closure.jacobian.T
+        """qdd and lambda of Eq. 8, shape (size,) each."""
+        size = self._size
+        self._system[size:, :size] = closure.jacobian
+        self._system[:size, size:] = closure.jacobian.T
         stabilised = closure.gamma - 2 * self.alpha * closure.error_rate - self.beta**2 * closure.error
         solution = np.linalg.solve(self._system, np.concatenate([self._weight + load, stabilised]))
-        return solution[:SIZE], solution[SIZE:]
+        return solution[:size], solution[size:]
 
 
 Acceleration = Callable[[float, Vector, Vector], Vector]

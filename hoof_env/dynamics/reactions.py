@@ -20,7 +20,8 @@ from numpy.typing import NDArray
 
 from hoof_env.dynamics.hoof import force_of
 from hoof_env.leg.geometry import Geometry
-from hoof_env.leg.linkage import CONSTRUCTION, JOINTS, NUMBER, Dyad
+from hoof_env.leg.mechanism import Dyad
+from hoof_env.leg.mechanism_list import PAPER
 from hoof_env.leg.profile import places
 from hoof_env.simd import cross, dot, full_like, perpendicular, sqrt, store_vectors, vector, where
 from hoof_env.simd.compile import inline_llvm
@@ -30,7 +31,7 @@ from hoof_env.simd.layout import Block, Layout, Row, Vector
 class Reactions(Layout):
     """Joint forces and moments of a leg."""
 
-    joints: Annotated[Block, 2 * len(JOINTS)]  # force of each joint, as in `linkage.JOINTS`: x and y [N]
+    joints: Annotated[Block, 2 * len(PAPER.joints)]  # force of each joint: x and y [N]
     lock: Row  # moment on body 10 by body 7 [N m]
     driver: Row  # moment on the crank by the leg's frame [N m]
     hip: Row  # moment on the leg's frame by the trunk, about O [N m]
@@ -93,17 +94,18 @@ class LegConstants(Layout):
 
 BETWEEN_ANGLES = 1.05  # more than a point comes farther out between the angles that are looked at
 
-_STEPS = {step.point: step for step in CONSTRUCTION}
+_STEPS = {step.point: step for step in PAPER.steps}
 _HINGES, _TRIANGLES = ("B", "F", "E", "J"), ("D", "I")
 
 
 def leg_constants(geometry: Geometry) -> NDArray[np.float64]:
     """The rows of `LegConstants` of a leg, shape (LegConstants.size,)."""
     lengths = geometry.lengths
-    values = [lengths["OP"], geometry.travel * geometry.pivot[0], geometry.pivot[1], float(geometry.travel)]
+    pivot = geometry.fixed["C"]
+    values = [lengths["OP"], geometry.travel * pivot.real, pivot.imag, float(geometry.travel)]
     values += [float(geometry.toe == "I"), lengths["FG"] / lengths["EF"], lengths["CA"] / lengths["CF"]]
     z = places(geometry, np.linspace(0.0, 2 * np.pi, 1000))[0]
-    hoof = [NUMBER[point] for point in ("G", geometry.toe, geometry.heel)]
+    hoof = [PAPER.number[point] for point in ("G", *geometry.corners)]
     g, toe, heel = z[np.isfinite(z).all(1)][0, hoof]
     fetlock, others = (g - toe) / (heel - toe), np.delete(z, hoof, axis=1)
     values += [fetlock.real, fetlock.imag, BETWEEN_ANGLES * float(np.nanmax(np.abs(others)))]

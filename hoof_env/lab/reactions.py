@@ -13,22 +13,27 @@ from numpy.typing import NDArray
 
 from hoof_env.dynamics.engine import TrunkEngine
 from hoof_env.errors import ParameterError
-from hoof_env.leg.linkage import FRAME, JOINTS
+from hoof_env.leg.mechanism import FRAME, Mechanism
 
 MOMENTS = {"lock_moment": "lock", "crank_moment": "driver", "hip_moment": "hip"}
 """Parts of `dynamics.parts.Reactions` by column [N m]: moments on body 10 by body 7, on the crank by the
 leg's frame, and on the leg's frame by the trunk about the crank centre."""
 
-JOINT_COLUMNS = tuple(
-    f"joint_{joint.point}_{joint.i + 1}_{'frame' if joint.j == FRAME else joint.j + 1}_{axis}"
-    for joint in JOINTS
-    for axis in "xy"
-)
-"""Columns of forces [N] at a joint on one body by another, with the bodies' numbers in the paper's Eq. 2:
-`joint_G_11_10_x` is the force at the ankle on the hoof triangle (11) by the shank (10) along x."""
 
-REACTION_UNITS = dict.fromkeys(JOINT_COLUMNS, "N") | dict.fromkeys(MOMENTS, "N m")
-"""Units by column of a limb's reactions."""
+def joint_columns(mechanism: Mechanism) -> list[str]:
+    """Return the columns of forces [N] at a joint on one body by another, with the bodies' numbers in Eq. 2:
+    `joint_G_11_10_x` is the force at the ankle on the hoof triangle (11) by the shank (10) along x."""
+    return [
+        f"joint_{joint.point}_{joint.i + 1}_{'frame' if joint.j == FRAME else joint.j + 1}_{axis}"
+        for joint in mechanism.joints
+        for axis in "xy"
+    ]
+
+
+def reaction_units(mechanism: Mechanism) -> dict[str, str]:
+    """Return the units by column of a limb's reactions."""
+    moments = [name for name in MOMENTS if name != "lock_moment" or mechanism.welds]
+    return dict.fromkeys(joint_columns(mechanism), "N") | dict.fromkeys(moments, "N m")
 
 
 class JointReactions:
@@ -77,7 +82,7 @@ class JointReactions:
 
     def after(self, before: NDArray[np.float64], steps: int) -> NDArray[np.float64]:
         """Compute the reactions at the `steps` substeps since `before`, shape (steps, legs, columns), with
-        the columns of `REACTION_UNITS`."""
+        the columns of `reaction_units`."""
         self._engine.set_column(0, before)
         # The command of these substeps is in the memory after them.
         command = self._engine.command_in(self.before())
@@ -91,5 +96,6 @@ class JointReactions:
         """Return the reactions of the second engine, shape (legs, columns)."""
         reactions = self._engine.reactions()
         legs = len(reactions.joints)
-        moments = [getattr(reactions, part)[:, 0] for part in MOMENTS.values()]
+        parts = [getattr(reactions, part)[..., 0] for part in MOMENTS.values()]
+        moments = [part for part in parts if part.size]
         return np.column_stack([reactions.joints.reshape(legs, -1), *moments])

@@ -7,20 +7,35 @@ in `hoof_env/data`, `identified`, is *identified* from the paper's results, for 
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping, Sequence
-from dataclasses import MISSING, asdict, dataclass, field, fields, is_dataclass, replace
+from collections.abc import Mapping
+from dataclasses import MISSING, dataclass, field, fields, replace
 from functools import cached_property
 from importlib import resources
 from pathlib import Path
 from types import MappingProxyType
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from hoof_env._output import staged
-from hoof_env.errors import DataFileError, GeometryError, ParameterError, check_choice, check_number
-from hoof_env.leg.linkage import BODIES, BODY_LENGTHS, CONSTRUCTION, DYADS, LENGTHS, NUMBER, Dyad
+from hoof_env.errors import DataFileError, ParameterError, check_choice, check_number
+from hoof_env.leg.assembly import check_full_revolution, transmission_margin
+from hoof_env.leg.checks import (
+    check_feet,
+    check_keys,
+    checked_pivot,
+    checked_solids,
+    count_of,
+    numbers_of,
+    scaled_solids,
+    with_solids,
+)
+from hoof_env.leg.mechanism import Mechanism
+from hoof_env.leg.mechanism_list import PAPER, read_mechanism
+
+if TYPE_CHECKING:
+    from hoof_env.leg.kinematics import Pose
 
 DEFAULT_PRESET = "identified"
 """The leg of the paper's reproduction."""
@@ -39,22 +54,25 @@ force."""
 
 @dataclass(frozen=True)
 class Geometry:
-    """A leg of the paper's mechanism, in the frame of the leg: O at the origin, crank turning clockwise.
+    """A leg in its own frame: the centre of the crank at the origin, the crank turning clockwise.
 
     Attributes:
-        lengths: the 15 lengths named in `linkage.LENGTHS` [m].
-        pivot: position of the fixed pivot C relative to the crank centre O [m].
+        lengths: the lengths that the mechanism names [m].
+        pivot: position of the fixed pivot relative to the crank's centre [m]; of several, by name.
         assembly: for each dyad's point, +1 if it lies left of the line between its two centres, else -1.
-        toe, heel: which of the hoof corners "I" and "J" is which.
+        toe, heel: which of the two feet is which; the heel of a leg with one foot is None.
         travel: +1 if the leg travels towards +x of its own frame, -1 if towards -x. The world's x always
             points forward; the mirror is applied where the leg is placed in the world and nowhere else.
         hip_height: height of O above the ground in the paper's set-up [m], one level for both gaits.
-        linear_density: mass per length of every link [kg/m], unless `masses` is given.
-        masses: 14 link masses [kg], or None for `linear_density` times length.
+        linear_density: mass per length of every body [kg/m], unless `masses` is given.
+        masses: the bodies' masses [kg], or None for `linear_density` times length.
         inertia: "uniform_rod" (J = m L^2 / 3 with half-length L) or "paper" (the printed J = 2 l / 3 with
             half-length l, in kg m^2 though its units do not match; it needs no mass).
         full_turn: whether the crank must be able to turn fully. If not, it may rock between dead points, and
             `TrunkEngine` alone takes such a leg.
+        mechanism: the structure, or the list of it; that of the paper by default.
+        solids: bodies that are no uniform rods, by name: "mass" [kg], "centre" along and across from the tail
+            [m], "inertia" about it [kg m^2]; what is left out is that of a rod.
         name, provenance: where the numbers come from.
 
     Raises:
@@ -63,10 +81,10 @@ class Geometry:
     """
 
     lengths: Mapping[str, float]
-    pivot: tuple[float, float]
+    pivot: tuple[float, float] | Mapping[str, tuple[float, float]]
     assembly: Mapping[str, int]
     toe: str
-    heel: str
+    heel: str | None
     travel: int
     hip_height: float
     linear_density: float = LINEAR_DENSITY
@@ -75,64 +93,96 @@ class Geometry:
     full_turn: bool = True
     name: str = "custom"
     provenance: str = field(default="", compare=False)
+    mechanism: Mechanism = PAPER
+    solids: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
-        _check_keys("lengths", self.lengths, LENGTHS)
-        lengths = {k: check_number(f"lengths[{k!r}]", self.lengths[k], low=1e-3, high=1e3) for k in LENGTHS}
-        points = [dyad.point for dyad in DYADS]
-        _check_keys("assembly", self.assembly, points)
+        given: Any = self.mechanism
+        if not isinstance(given, Mechanism):
+            object.__setattr__(self, "mechanism", read_mechanism(given))
+        names = self.mechanism.lengths
+        check_keys("lengths", self.lengths, names)
+        lengths = {k: check_number(f"lengths[{k!r}]", self.lengths[k], low=1e-3, high=1e3) for k in names}
+        points = [dyad.point for dyad in self.mechanism.dyads]
+        check_keys("assembly", self.assembly, points)
         signs = {f"assembly[{point!r}]": self.assembly[point] for point in points}
         for name, sign in {**signs, "travel": self.travel}.items():
             if np.ndim(sign) or sign not in (1, -1):
                 raise ParameterError(f"{name}: expected +1 or -1, got {sign!r}")
-        if (self.toe, self.heel) not in (("I", "J"), ("J", "I")):
-            given = f"{self.toe!r} and {self.heel!r}"
-            raise ParameterError(f"toe and heel: expected I and J, one each, got {given}")
+        check_feet(self.toe, self.heel, self.mechanism.feet)
         for name, text in (("name", self.name), ("provenance", self.provenance)):
             if not isinstance(text, str):
                 raise ParameterError(f"{name}: expected a text, got {text!r}")
-        if _count(self.pivot) != 2:
-            raise ParameterError(f"pivot: expected two numbers (C_x, C_y) in metres, got {self.pivot!r}")
-        pivot = tuple(check_number(f"pivot[{i}]", c) for i, c in enumerate(self.pivot))
         for name in ("hip_height", "linear_density"):
             check_number(name, getattr(self, name), low=0, exclusive_low=True)
         check_choice("inertia", self.inertia, ("uniform_rod", "paper"))
+        bodies = len(self.mechanism.bodies)
         if self.masses is not None:
-            if _count(self.masses) != len(BODIES):
-                raise ParameterError(f"masses: expected {len(BODIES)} link masses, got {self.masses!r}")
+            if count_of(self.masses) != bodies:
+                raise ParameterError(f"masses: expected {bodies} link masses, got {self.masses!r}")
             masses = tuple(
                 check_number(f"masses[{i}]", m, low=0, exclusive_low=True) for i, m in enumerate(self.masses)
             )
             object.__setattr__(self, "masses", masses)
         object.__setattr__(self, "lengths", MappingProxyType(lengths))
-        object.__setattr__(self, "pivot", pivot)
+        object.__setattr__(self, "pivot", checked_pivot(self.pivot, self.mechanism.pivots))
         object.__setattr__(self, "assembly", MappingProxyType({p: int(self.assembly[p]) for p in points}))
+        object.__setattr__(self, "solids", MappingProxyType(checked_solids(self.solids, self.mechanism)))
         if not isinstance(self.full_turn, bool):
             raise ParameterError(f"full_turn: expected True or False, got {self.full_turn!r}")
         if self.full_turn:
             check_full_revolution(self)
 
     def __hash__(self) -> int:
-        return hash((tuple(self.lengths.items()), self.pivot, tuple(self.assembly.items()), self.name))
+        lengths = tuple(self.lengths.items())
+        return hash((lengths, tuple(self.fixed.items()), tuple(self.assembly.items()), self.name))
 
     def __reduce__(self) -> tuple[Any, ...]:  # mapping proxies do not pickle
         return (Geometry.from_dict, (self.to_dict(),))
 
     @property
+    def fixed(self) -> dict[str, complex]:
+        """Places of the fixed points by name [m], as x + iy: the crank's centre at 0, then the pivots."""
+        pivots = self.mechanism.pivots
+        places = self.pivot if isinstance(self.pivot, Mapping) else {pivots[0]: self.pivot}
+        return {self.mechanism.centre: 0j} | {name: complex(*places[name]) for name in pivots}
+
+    @property
+    def corners(self) -> tuple[str, str]:
+        """Names of toe and heel, of the toe twice if that is the only foot."""
+        return self.toe, self.heel or self.toe
+
+    @property
+    def crank_length(self) -> float:
+        """Length of the crank [m]."""
+        return float(self.lengths[self.mechanism.crank_length])
+
+    @property
     def body_lengths(self) -> NDArray[np.float64]:
-        """Length of each of the 14 bodies [m], shape (14,)."""
-        return np.array([self.lengths[name] for name in BODY_LENGTHS])
+        """Length of each body [m], shape (bodies,)."""
+        return np.array([self.lengths[name] for name in self.mechanism.body_lengths])
 
     @property
     def body_masses(self) -> NDArray[np.float64]:
-        """Mass of each of the 14 bodies [kg], shape (14,)."""
-        return self.linear_density * self.body_lengths if self.masses is None else np.array(self.masses)
+        """Mass of each body [kg], shape (bodies,)."""
+        masses = self.linear_density * self.body_lengths if self.masses is None else np.array(self.masses)
+        return with_solids(masses, "mass", self.solids, self.mechanism)
+
+    @property
+    def body_centres(self) -> NDArray[np.complex128]:
+        """Centre of mass of each body from its tail, along + i across, in its length [-], shape (bodies,)."""
+        centres = np.full(len(self.mechanism.bodies), 0.5 + 0j)
+        for i, body in enumerate(self.mechanism.bodies):
+            if "centre" in self.solids.get(body.name, {}):
+                centres[i] = complex(*self.solids[body.name]["centre"]) / self.lengths[body.length]
+        return centres
 
     @property
     def body_inertias(self) -> NDArray[np.float64]:
-        """Moment of inertia of each body about its centre [kg m^2], shape (14,)."""
+        """Moment of inertia of each body about its centre of mass [kg m^2], shape (bodies,)."""
         half = self.body_lengths / 2
-        return 2 * half / 3 if self.inertia == "paper" else self.body_masses * half**2 / 3
+        rods = 2 * half / 3 if self.inertia == "paper" else self.body_masses * half**2 / 3
+        return with_solids(rods, "inertia", self.solids, self.mechanism)
 
     @property
     def mass(self) -> float:
@@ -142,19 +192,48 @@ class Geometry:
     @cached_property
     def transmission_margin(self) -> float:
         """Smallest |sine| of the angle between a dyad's two links over a revolution (0: a dead point) [-]."""
-        z, _ = _solve(self, np.linspace(0, 2 * np.pi, 3600))
-        arms = [(z[dyad.point] - z[dyad.first], z[dyad.point] - z[dyad.second]) for dyad in DYADS]
-        sines = [np.abs((np.conj(one) * two).imag) / (np.abs(one) * np.abs(two)) for one, two in arms]
-        return min(float(np.min(np.nan_to_num(sine))) for sine in sines)
+        return transmission_margin(self)
+
+    def pose(
+        self,
+        theta: float,
+        swing: float = 0.0,
+        theta_rate: float = 0.0,
+        swing_rate: float = 0.0,
+        theta_acc: float = 0.0,
+        swing_acc: float = 0.0,
+    ) -> Pose:
+        """Return places, angles, velocities and accelerations of all points and bodies, with O at rest at the
+        origin.
+
+        Args:
+            theta, theta_rate, theta_acc: crank angle from the leg's frame, clockwise in that frame before the
+                mirror of `travel` [rad, rad/s, rad/s^2].
+            swing, swing_rate, swing_acc: turn of the leg's frame about O, likewise before the mirror.
+
+        Raises:
+            ParameterError: a number is not finite.
+        """
+        # `kinematics` needs this class
+        from hoof_env.leg.kinematics import FrameMotion, pose
+
+        return pose(self, theta, theta_rate, theta_acc, FrameMotion(swing, swing_rate, swing_acc))
 
     def to_dict(self) -> dict[str, Any]:
         """Everything that `from_dict` needs, JSON-serialisable."""
         content = {item.name: getattr(self, item.name) for item in fields(self)}
         content |= {name: dict(content[name]) for name in ("lengths", "assembly")}
         content |= {"pivot": list(self.pivot), "masses": None if self.masses is None else list(self.masses)}
-        if content.pop("full_turn"):
-            return content
-        return {**content, "full_turn": False}
+        if isinstance(self.pivot, Mapping):
+            content["pivot"] = {name: list(place) for name, place in self.pivot.items()}
+        # what is the paper's or the default is left out
+        if content.pop("full_turn") is False:
+            content["full_turn"] = False
+        if content.pop("mechanism") != PAPER:
+            content["mechanism"] = self.mechanism.to_mapping()
+        if content.pop("solids"):
+            content["solids"] = {name: dict(solid) for name, solid in self.solids.items()}
+        return content
 
     @classmethod
     def from_dict(cls, data: Mapping[str, Any]) -> Geometry:
@@ -191,12 +270,12 @@ class Geometry:
         content: dict[str, Any] = {"provenance": geometry.pop("provenance")}
         content |= {"units": "m, kg, kg/m, rad, rad/s", "geometry": geometry}
         if ground is not None:
-            _check_keys("ground", ground, (), ("stiffness", "exponent"))
-            content["ground"] = _numbers("ground", ground)
+            check_keys("ground", ground, (), ("stiffness", "exponent"))
+            content["ground"] = numbers_of("ground", ground)
         if gaits is not None:
             if not isinstance(gaits, Mapping):
                 raise ParameterError(f"gaits: expected a mapping of gaits by name, got {gaits!r}")
-            content["gaits"] = {name: _numbers(f"gaits[{name!r}]", gait) for name, gait in gaits.items()}
+            content["gaits"] = {name: numbers_of(f"gaits[{name!r}]", gait) for name, gait in gaits.items()}
         with staged(path.parent) as stage:
             (stage / path.name).write_text(json.dumps(content, indent=1) + "\n", encoding="utf-8")
 
@@ -222,13 +301,17 @@ class Geometry:
         if mass_per_metre is not None:
             masses = None
             density = check_number("mass_per_metre", mass_per_metre, low=0, exclusive_low=True)
+        names = [body.name for body in self.mechanism.bodies]
+        new = factor * self.body_masses if mass_per_metre is None else density * factor * self.body_lengths
+        heavier = dict(zip(names, (new / self.body_masses).tolist(), strict=True))
         return replace(
             self,
             lengths={name: factor * length for name, length in self.lengths.items()},
-            pivot=(factor * self.pivot[0], factor * self.pivot[1]),
+            pivot={name: (factor * at.real, factor * at.imag) for name, at in list(self.fixed.items())[1:]},
             hip_height=factor * self.hip_height,
             linear_density=density,
             masses=None if masses is None else tuple(factor * mass for mass in masses),
+            solids=scaled_solids(self.solids, factor, heavier),
             provenance=f"{self.provenance} Scaled by {factor:g}.".lstrip(),
         )
 
@@ -240,89 +323,13 @@ class Geometry:
         return replace(self, **changes)
 
 
-def _numbers(what: str, given: Any) -> dict[str, Any]:
-    """The numbers, or lists of them, of a dataclass or mapping by name, as JSON can hold them."""
-    found = asdict(given) if is_dataclass(given) and not isinstance(given, type) else given
-    if not isinstance(found, Mapping):
-        raise ParameterError(f"{what}: expected numbers by name, got {given!r}")
-    return {
-        name: [check_number(f"{what}[{name!r}][{k}]", part) for k, part in enumerate(value)]
-        if isinstance(value, (list, tuple))
-        else check_number(f"{what}[{name!r}]", value)
-        for name, value in found.items()
-    }
-
-
-def _check_keys(what: str, given: Any, expected: Sequence[str], optional: Sequence[str] = ()) -> None:
-    if not isinstance(given, Mapping):
-        raise ParameterError(f"{what}: expected a mapping with {', '.join(expected)}, got {given!r}")
-    missing, unknown = set(expected) - set(given), set(given) - {*expected, *optional}
-    if missing or unknown:
-        parts = [f"missing {', '.join(sorted(missing))}"] if missing else []
-        parts += [f"unknown {', '.join(sorted(map(str, unknown)))}"] if unknown else []
-        wanted = ", ".join(expected) + (f", and perhaps {', '.join(optional)}" if optional else "")
-        raise ParameterError(f"{what}: expected exactly {wanted}; {'; '.join(parts)}")
-
-
 def _check_entries(data: Any) -> None:
-    has_default = {item.name: item.default is not MISSING for item in fields(Geometry)}
+    defaults = {item.name: (item.default, item.default_factory) for item in fields(Geometry)}
+    has_default = {name: given != (MISSING, MISSING) for name, given in defaults.items()}
     required, optional = (
         [name for name, has in has_default.items() if has is kind] for kind in (False, True)
     )
-    _check_keys("geometry", data, required, optional)
-
-
-def _count(values: Any) -> int:
-    return len(values) if isinstance(values, (Sequence, np.ndarray)) else 0
-
-
-def _solve(geometry: Geometry, theta: NDArray[np.floating[Any]]) -> tuple[dict[str, Any], dict[str, Any]]:
-    """Points and, per dyad, (d, r1, r2) at crank angles `theta`; NaN past a dyad that does not close."""
-    lengths = geometry.lengths
-    z: dict[str, Any] = {"O": 0j * theta, "C": complex(*geometry.pivot) + 0j * theta}
-    z["P"] = lengths["OP"] * np.exp(-1j * theta)
-    spans = {}
-    with np.errstate(invalid="ignore", divide="ignore"):
-        for step in CONSTRUCTION:
-            a, b = z[step.first], z[step.second]
-            if isinstance(step, Dyad):
-                r1, r2 = lengths[step.from_first], lengths[step.from_second]
-                d2 = np.abs(b - a) ** 2
-                u = (r1**2 - r2**2 + d2) / (2 * d2)
-                w = geometry.assembly[step.point] * np.sqrt(r1**2 / d2 - u**2)
-                z[step.point] = a + (b - a) * (u + 1j * w)
-                spans[step.point] = (np.sqrt(d2), r1, r2)
-            else:
-                z[step.point] = z[step.origin] + (b - a) * (lengths[step.distance] / lengths[step.span])
-    return z, spans
-
-
-def check_full_revolution(geometry: Geometry) -> None:
-    """Raise `GeometryError` unless every dyad closes at every crank angle.
-
-    The distance between a dyad's centres must stay strictly between the difference and the sum of its two
-    lengths. A grid of 3600 angles is refined three times around the tightest one.
-    """
-    grid = np.arange(3600) * (2 * np.pi / 3600)
-    for index, dyad in enumerate(DYADS):
-        theta = grid
-        for _ in range(4):
-            _, spans = _solve(geometry, theta)
-            d, r1, r2 = spans[dyad.point]
-            margins = np.stack([r1 + r2 - d, d - abs(r1 - r2)])
-            which, where = np.unravel_index(np.argmin(margins), margins.shape)
-            miss, angle = -margins[which, where], float(theta[where])
-            if not miss < 0:  # or not a number: an earlier dyad misses between two samples
-                break
-            theta = angle + np.linspace(-1, 1, 201) * (theta[1] - theta[0])
-        if not miss < 0:
-            reach = "too far apart by" if which == 0 else "too close by"
-            raise GeometryError(
-                f"dyad {index + 1} ({dyad.first}-{dyad.point}-{dyad.second}, lengths {r1:.6g} and {r2:.6g} m)"
-                f" does not close at crank angle {np.degrees(angle) % 360:.2f} deg: its centres, "
-                f"{float(d[where]):.6g} m apart, are {reach} {miss:.3g} m; "
-                "expected a leg that turns through a full revolution"
-            )
+    check_keys("geometry", data, required, optional)
 
 
 def preset_names() -> list[str]:
@@ -391,24 +398,3 @@ def load_geometry(source: Preset = DEFAULT_PRESET) -> Geometry:
     except ParameterError as error:
         raise preset_error_type(source)(f"{preset_label(source)}: {error}") from None
     return Geometry(**values)
-
-
-def tables(geometry: Geometry) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
-    """The construction of this leg as arrays for the kernels.
-
-    Returns:
-        steps: shape (8, 5), rows (is_dyad, point, first, second, origin) as indices into `linkage.POINTS`.
-        values: shape (8, 3), rows (r1, r2, side) for a dyad, (distance / span, 0, 0) for an extension.
-    """
-    lengths = geometry.lengths
-    steps, values = [], []
-    for step in CONSTRUCTION:
-        if isinstance(step, Dyad):
-            origin, side = step.first, float(geometry.assembly[step.point])
-            values.append((lengths[step.from_first], lengths[step.from_second], side))
-        else:
-            origin = step.origin
-            values.append((lengths[step.distance] / lengths[step.span], 0.0, 0.0))
-        points = [NUMBER[name] for name in (step.point, step.first, step.second, origin)]
-        steps.append((isinstance(step, Dyad), *points))
-    return np.array(steps, dtype=np.int64), np.array(values)

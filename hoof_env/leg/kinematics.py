@@ -1,8 +1,9 @@
 """Closed-form motion of the linkage: position, velocity and acceleration of every point and body.
 
-Planar vectors are complex numbers. `solve_points` finds every point in the frame of the leg, with its first
-and second derivative by the crank angle theta, dyad by dyad and without iteration. `place` turns these into
-motion in the world, for any motion of the crank and of the leg's frame. `pose` wraps both for people.
+Planar vectors are complex numbers. `closed_form.solve_points` finds every point in the frame of the leg, with
+its first and second derivative by the crank angle theta, step by step and without iteration. `place` turns
+these into motion in the world, for any motion of the crank and of the leg's frame. `pose` wraps both for
+people.
 """
 
 from __future__ import annotations
@@ -13,63 +14,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hoof_env.errors import check_number
-from hoof_env.leg.geometry import Geometry, tables
-from hoof_env.leg.linkage import HEADS, NUMBER, POINTS, TAILS
+from hoof_env.leg.assembly import centres, solve
+from hoof_env.leg.geometry import Geometry
+from hoof_env.leg.mechanism import Mechanism
 from hoof_env.simd.compile import kernel
-
-_O, _C, _P = NUMBER["O"], NUMBER["C"], NUMBER["P"]
-
-
-@kernel
-def dot(a: complex, b: complex) -> float:
-    """Scalar product of two planar vectors."""
-    return a.real * b.real + a.imag * b.imag
-
-
-@kernel
-def cross(a: complex, b: complex) -> float:
-    """Out-of-plane component of the vector product of two planar vectors."""
-    return a.real * b.imag - a.imag * b.real
-
-
-@kernel
-def intersect(e1: complex, e2: complex, k1: float, k2: float) -> complex:
-    """The vector p with e1 . p = k1 and e2 . p = k2."""
-    return 1j * (k2 * e1 - k1 * e2) / cross(e1, e2)
-
-
-@kernel
-def solve_points(theta, crank, pivot, steps, values, z, dz, ddz):  # type: ignore[no-untyped-def]
-    """Fill `z`, `dz`, `ddz` (complex, shape (11,)) with every point and its derivatives by the crank angle,
-    in the frame of the leg with O at the origin [m, m/rad, m/rad^2].
-
-    The crank turns clockwise, P = crank * exp(-i theta); `pivot` is C, `steps` and `values` are
-    `geometry.tables`.
-    """
-    z[_O], dz[_O], ddz[_O] = 0.0, 0.0, 0.0
-    z[_C], dz[_C], ddz[_C] = pivot, 0.0, 0.0
-    z[_P] = crank * complex(np.cos(theta), -np.sin(theta))
-    dz[_P] = -1j * z[_P]
-    ddz[_P] = -z[_P]
-    for k in range(steps.shape[0]):
-        p, a, b = steps[k, 1], steps[k, 2], steps[k, 3]
-        r1 = values[k, 0]
-        span, dspan, ddspan = z[b] - z[a], dz[b] - dz[a], ddz[b] - ddz[a]
-        if steps[k, 0] == 1:
-            r2, side = values[k, 1], values[k, 2]
-            d2 = dot(span, span)
-            along = 0.5 + (r1 * r1 - r2 * r2) / (2.0 * d2)
-            across = side * np.sqrt(r1 * r1 / d2 - along * along)
-            z[p] = z[a] + span * complex(along, across)
-            e1, e2 = z[p] - z[a], z[p] - z[b]
-            dz[p] = intersect(e1, e2, dot(e1, dz[a]), dot(e2, dz[b]))
-            w1, w2 = dz[p] - dz[a], dz[p] - dz[b]
-            ddz[p] = intersect(e1, e2, dot(e1, ddz[a]) - dot(w1, w1), dot(e2, ddz[b]) - dot(w2, w2))
-        else:
-            origin = steps[k, 4]
-            z[p] = z[origin] + r1 * span
-            dz[p] = dz[origin] + r1 * dspan
-            ddz[p] = ddz[origin] + r1 * ddspan
 
 
 @kernel
@@ -125,13 +73,16 @@ class Pose:
     """Places, angles and their derivatives in the world (x forward, y up, angles counter-clockwise).
 
     Attributes:
-        points, point_velocities, point_accelerations: shape (11, 2), rows in the order of `linkage.POINTS`
-            [m, m/s, m/s^2].
-        centres, centre_velocities, centre_accelerations: shape (14, 2), rows in the order of
-            `linkage.BODIES` [m, m/s, m/s^2].
-        angles, angular_velocities, angular_accelerations: shape (14,) [rad, rad/s, rad/s^2].
+        mechanism: structure of the leg, with the names of points and bodies.
+        points, point_velocities, point_accelerations: shape (points, 2), rows in the order of
+            `Mechanism.points` [m, m/s, m/s^2].
+        centres, centre_velocities, centre_accelerations: of mass, shape (bodies, 2), rows in the order of
+            `Mechanism.bodies` [m, m/s, m/s^2].
+        angles, angular_velocities, angular_accelerations: from tail to head, shape (bodies,)
+            [rad, rad/s, rad/s^2].
     """
 
+    mechanism: Mechanism
     points: NDArray[np.float64]
     point_velocities: NDArray[np.float64]
     point_accelerations: NDArray[np.float64]
@@ -144,7 +95,7 @@ class Pose:
 
     def point(self, name: str) -> NDArray[np.float64]:
         """Position (x, y) of a named point [m]."""
-        return self.points[NUMBER[name]]
+        return self.points[self.mechanism.number[name]]
 
 
 def pose(
@@ -168,26 +119,26 @@ def pose(
     theta = check_number("theta", theta)
     theta_rate, theta_acc = check_number("theta_rate", theta_rate), check_number("theta_acc", theta_acc)
     frame = frame or FrameMotion()
-    z, dz, ddz = (np.empty(len(POINTS), dtype=np.complex128) for _ in range(3))
-    steps, values = tables(geometry)
-    solve_points(theta, geometry.lengths["OP"], complex(*geometry.pivot), steps, values, z, dz, ddz)
+    mechanism = geometry.mechanism
+    z, dz, ddz = (w[0] for w in solve(geometry, [theta]))
     motion = [
         place(z[k], dz[k], ddz[k], theta_rate, theta_acc,
               float(frame.phi), float(frame.phi_rate), float(frame.phi_acc), float(geometry.travel))
-        for k in range(len(POINTS))
+        for k in range(len(mechanism.points))
     ]  # fmt: skip
     r = np.array([m[0] for m in motion]) + complex(*frame.position)
     v = np.array([m[1] for m in motion]) + complex(*frame.velocity)
     a = np.array([m[2] for m in motion]) + complex(*frame.acceleration)
-    link, dlink, ddlink = (w[HEADS] - w[TAILS] for w in (r, v, a))
+    link, dlink, ddlink = (w[mechanism.heads] - w[mechanism.tails] for w in (r, v, a))
     length2 = np.abs(link) ** 2
     return Pose(
+        mechanism=mechanism,
         points=_xy(r),
         point_velocities=_xy(v),
         point_accelerations=_xy(a),
-        centres=_xy((r[HEADS] + r[TAILS]) / 2),
-        centre_velocities=_xy((v[HEADS] + v[TAILS]) / 2),
-        centre_accelerations=_xy((a[HEADS] + a[TAILS]) / 2),
+        centres=_xy(centres(geometry, r, mirrored=True)),
+        centre_velocities=_xy(centres(geometry, v, mirrored=True)),
+        centre_accelerations=_xy(centres(geometry, a, mirrored=True)),
         angles=np.angle(link),
         angular_velocities=(np.conj(link) * dlink).imag / length2,
         angular_accelerations=(np.conj(link) * ddlink).imag / length2,

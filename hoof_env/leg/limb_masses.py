@@ -1,8 +1,8 @@
 """Segment masses of a horse's fore and hind limb on the links of a leg.
 
 The masses are published and stand, with where they were read, in `hoof_env/data/limbs`. Which link carries
-which segment is assumed here: the linkage has no bones. Links are taken from the hip down to the ground, as
-high as their centres are on average in the walk of `identified`; `docs/evidence/limb_masses.md` has them.
+which segment is assumed there, for the mechanism of the paper: it has no bones. Links are taken from the hip
+down to the ground, as high as their centres are on average in the walk of `identified`; `docs/evidence/limb_masses.md` has them.
 
 All that counts as scapula, brachium or thigh hangs on the links. What a horse has above, such as muscles of
 the croup as far as they were weighed with the trunk, stays with the trunk: `trunk_mass`.
@@ -15,20 +15,11 @@ from functools import cache
 from importlib import resources
 from typing import Any
 
-from hoof_env.errors import check_choice, check_number
+from hoof_env.errors import ParameterError, check_choice, check_number
 from hoof_env.leg.geometry import Geometry
-from hoof_env.leg.linkage import BODY_LENGTHS
+from hoof_env.leg.mechanism_list import PAPER
 
 LIMBS = ("fore", "hind")
-
-CARRIERS = (
-    ("OP", "PB", "CB", "BD", "CD", "DE"),  # scapula and brachium, thigh: crank, coupler, upper triangle, rod
-    ("EF", "CF", "PF"),  # antebrachium, crus: upper part of the shank, rocker, strut
-    ("FG", "AJ"),  # metacarpus, metatarsus: lower part of the shank, tie rod
-    ("GJ", "GI"),  # pastern: the hoof triangle's sides
-    ("IJ",),  # hoof: its sole
-)
-"""Links, by the names of their lengths, that carry each segment from proximal to distal (assumed)."""
 
 BODY_MASS = 475.0
 """Default mass of the animal [kg]. Shares of it are the same up to 600 kg (Nauwelaerts and others 2011)."""
@@ -38,6 +29,12 @@ BODY_MASS = 475.0
 def _measured() -> dict[str, Any]:
     file = resources.files("hoof_env").joinpath("data", "limbs", "warmblood.json")
     return dict(json.loads(file.read_text(encoding="utf-8")))
+
+
+def carriers() -> list[list[str]]:
+    """Return the links, by name, that carry each segment from proximal to distal (assumed)."""
+    links: list[list[str]] = _measured()["carriers"]
+    return links
 
 
 def segment_masses(limb: str, body_mass: float = BODY_MASS) -> dict[str, float]:
@@ -69,7 +66,7 @@ def trunk_mass(body_mass: float = BODY_MASS) -> float:
 def with_limb_masses(geometry: Geometry, limb: str, body_mass: float = BODY_MASS) -> Geometry:
     """Return the leg with the masses of a horse's limb instead of its own.
 
-    The mass of each segment lies evenly along the links that carry it (`CARRIERS`).
+    The mass of each segment lies evenly along the links that carry it (`carriers`).
 
     Args:
         geometry: of any size; lengths stay.
@@ -80,14 +77,20 @@ def with_limb_masses(geometry: Geometry, limb: str, body_mass: float = BODY_MASS
         The leg, by the same name; `provenance` says whose masses it has.
 
     Raises:
-        ParameterError: another limb, or a mass that is not finite or not above 0.
+        ParameterError: another limb, a mass that is not finite or not above 0, or a leg of another mechanism
+            than the paper's.
     """
+    if geometry.mechanism != PAPER:
+        raise ParameterError(
+            f"geometry {geometry.name!r}: expected the paper's mechanism, for whose links it is known which "
+            "segment each carries; give other legs `masses`"
+        )
     by_link: dict[str, float] = {}
-    for links, mass in zip(CARRIERS, segment_masses(limb, body_mass).values(), strict=True):
+    for links, mass in zip(carriers(), segment_masses(limb, body_mass).values(), strict=True):
         whole = sum(geometry.lengths[name] for name in links)
         by_link |= {name: mass * geometry.lengths[name] / whole for name in links}
     said = f"Masses of the {limb} limb of a horse of {float(body_mass):g} kg (Buchner and others 1997)."
     return geometry.replace(
-        masses=tuple(by_link[name] for name in BODY_LENGTHS),
+        masses=tuple(by_link[name] for name in PAPER.body_lengths),
         provenance=f"{geometry.provenance} {said}".lstrip(),
     )

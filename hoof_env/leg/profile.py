@@ -22,11 +22,10 @@ from numba.core import types
 from numpy.typing import NDArray
 
 from hoof_env.errors import GeometryError
-from hoof_env.leg.geometry import Geometry, tables
-from hoof_env.leg.kinematics import solve_points
-from hoof_env.leg.linkage import HEADS, NUMBER, POINTS, TAILS
+from hoof_env.leg.assembly import centres, solve
+from hoof_env.leg.geometry import Geometry
 from hoof_env.simd import floor, maximum, minimum
-from hoof_env.simd.compile import inline_llvm, kernel
+from hoof_env.simd.compile import inline_llvm
 from hoof_env.simd.functions import transposed
 from hoof_env.simd.layout import Layout, Row, Vector
 from hoof_env.simd.math import ROUNDER
@@ -81,22 +80,12 @@ DERIVATIVE_ERROR = 1e-9
 the largest where none does."""
 
 
-@kernel
-def _solve_all(theta, crank, pivot, steps, values, z, dz, ddz):  # type: ignore[no-untyped-def]
-    for k in range(theta.shape[0]):
-        solve_points(theta[k], crank, pivot, steps, values, z[k], dz[k], ddz[k])
-
-
 def places(geometry: Geometry, theta: NDArray[np.float64]) -> tuple[NDArray[np.complex128], ...]:
-    """Return the points from O in the leg's frame, and their first and second derivative by the crank angle.
+    """Return the points from O in the world's sense, and two derivatives by the crank angle.
 
-    Each has shape (len(theta), 11), points as in `linkage.POINTS`; NaN where the linkage cannot be closed.
+    Each has shape (len(theta), points), as in `Mechanism.points`; NaN where the linkage cannot be closed.
     """
-    theta = np.asarray(theta, dtype=np.float64)
-    z, dz, ddz = (np.empty((theta.size, len(POINTS)), np.complex128) for _ in range(3))
-    crank, pivot = geometry.lengths["OP"], complex(*geometry.pivot)
-    with np.errstate(invalid="ignore", divide="ignore"):
-        _solve_all(theta, crank, pivot, *tables(geometry), z, dz, ddz)
+    z, dz, ddz = solve(geometry, theta)
     return (z, dz, ddz) if geometry.travel > 0 else (-z.conj(), -dz.conj(), -ddz.conj())  # the mirror
 
 
@@ -106,11 +95,12 @@ def functions(
     """`Functions` in closed form, shape (len(theta), FUNCTIONS), and derivatives of the first `SLOPED`."""
     z, dz, ddz = places(geometry, theta)
     m, inertia = geometry.body_masses, geometry.body_inertias
-    r, v, acc = ((w[:, TAILS] + w[:, HEADS]) / 2 for w in (z, dz, ddz))
-    link, dlink, ddlink = (w[:, HEADS] - w[:, TAILS] for w in (z, dz, ddz))
+    mechanism = geometry.mechanism
+    r, v, acc = (centres(geometry, w, mirrored=True) for w in (z, dz, ddz))
+    link, dlink, ddlink = (w[:, mechanism.heads] - w[:, mechanism.tails] for w in (z, dz, ddz))
     length2 = geometry.body_lengths**2
     turn, dturn = cross(link, dlink) / length2, cross(link, ddlink) / length2
-    toe, heel = NUMBER[geometry.toe], NUMBER[geometry.heel]
+    toe, heel = (mechanism.number[point] for point in geometry.corners)
     s, ds, dds = r @ m, v @ m, acc @ m
     value = [
         z[:, toe].real, z[:, toe].imag, z[:, heel].real, z[:, heel].imag, ds.real, ds.imag,

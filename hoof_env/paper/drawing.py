@@ -13,7 +13,6 @@ from numpy.typing import NDArray
 from hoof_env._plotting import BLUE, GREEN, GREY, ORANGE, PURPLE, SOIL, STYLE
 from hoof_env.leg.geometry import Geometry
 from hoof_env.leg.kinematics import FrameMotion, pose
-from hoof_env.leg.linkage import POINTS as JOINTS
 from hoof_env.paper.measure import POINTS, Stance, Trace, measure_stance
 from hoof_env.paper.rows import CONDITIONS, EXACT, PublishedRow, Reproduction
 
@@ -61,7 +60,9 @@ def leg_at(geometry: Geometry, trace: Trace, t: float) -> dict[str, Point]:
     """Return the world position (x, y) [m] of every named point, at the row of a trace nearest to `t` [s]."""
     row = trace[int(np.argmin(np.abs(trace["time"] - t)))]
     frame = FrameMotion(phi=float(row["phi"]), position=(float(row["x"]), float(row["y"])))
-    return dict(zip(JOINTS, pose(geometry, float(row["theta"]), frame=frame).points, strict=True))
+    return dict(
+        zip(geometry.mechanism.points, pose(geometry, float(row["theta"]), frame=frame).points, strict=True)
+    )
 
 
 def elastic_cycles(reproduction: Reproduction) -> dict[str, tuple[Trace, Stance]]:

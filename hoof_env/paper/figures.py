@@ -16,7 +16,7 @@ import numpy as np
 
 from hoof_env._output import staged
 from hoof_env._plotting import BLUE, GREY, SKY, check_matplotlib
-from hoof_env.leg.linkage import BODIES
+from hoof_env.leg.mechanism_list import PAPER
 from hoof_env.paper.drawing import (
     CONDITION_COLOURS,
     FORWARD,
@@ -100,7 +100,7 @@ def _instants(stance: Stance) -> Point:
 def _draw_leg(ax: Any, reproduction: Reproduction, trace: Trace, stance: Stance) -> None:
     """Draw the leg at mid-stance, and the hoof around the cycle."""
     at = leg_at(reproduction.geometry, trace, stance.middle)
-    for body in BODIES:
+    for body in PAPER.bodies:
         line = np.array([at[body.tail], at[body.head]])
         ax.plot(*line.T, color=GREY, lw=0.9, label="leg at mid-stance", zorder=6, solid_capstyle="round")
     for name in ("O", "C"):
@@ -193,7 +193,7 @@ def draw_angles(figure: Any, reproduction: Reproduction) -> None:
 def _hooves(reproduction: Reproduction, trace: Trace, stance: Stance) -> Point:
     """Return the corners G, toe and heel of the hoof at the instants of the sketches, shape (SKETCHES, 3, 2)
     [m]; x is measured from the middle of each hoof."""
-    names = ("G", reproduction.geometry.toe, reproduction.geometry.heel)
+    names = ("G", *reproduction.geometry.corners)
     legs = [leg_at(reproduction.geometry, trace, t) for t in np.linspace(stance.start, stance.end, SKETCHES)]
     hooves = np.array([[at[name] for name in names] for at in legs])
     x = hooves[..., 0]

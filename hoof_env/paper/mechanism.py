@@ -8,7 +8,7 @@ import numpy as np
 
 from hoof_env._plotting import AMBER, BLUE, GREEN, GREY, ORANGE, PURPLE, SKY
 from hoof_env.leg.geometry import Geometry
-from hoof_env.leg.linkage import BODIES
+from hoof_env.leg.mechanism_list import PAPER
 from hoof_env.paper.drawing import (
     FORWARD,
     HEIGHT,
@@ -58,7 +58,7 @@ def draw_mechanism(figure: Any, reproduction: Reproduction) -> None:
     row = trace[int(np.argmax(trace[f"{tip}_normal"] * (0.01 + np.abs(trace["hoof_angle"]))))]
     at = leg_at(geometry, trace, float(row["time"]))
     points = np.array(list(at.values()))
-    hoof = np.array([at["G"], at[geometry.toe], at[geometry.heel]])
+    hoof = np.array([at[name] for name in ("G", *geometry.corners)])
     side = float(np.ptp(hoof, axis=0).max())
     boxes = [
         np.array([np.minimum(points.min(axis=0) - 0.2, (np.inf, -0.2)), points.max(axis=0) + 0.2]),
@@ -78,7 +78,9 @@ def draw_mechanism(figure: Any, reproduction: Reproduction) -> None:
         _draw_links(ax, at, close=names == hoof_points)
         _name_points(ax, at, names, geometry)
         ax.set(title=title, xlabel=FORWARD, ylabel=HEIGHT)
-    _draw_contact(axes[1], at[getattr(geometry, tip)], at[geometry.toe], at[geometry.heel], tip, row, side)
+    _draw_contact(
+        axes[1], at[getattr(geometry, tip)], *(at[name] for name in geometry.corners), tip, row, side
+    )
     legend_below(figure, 4)
 
 
@@ -86,9 +88,9 @@ def _draw_links(ax: Any, at: dict[str, Point], *, close: bool) -> None:
     """Draw all links; number those of the hoof in the close view, and the others in the view of the leg."""
     # The legend has the numbers of all links with the same role.
     numbers: dict[str, str] = {}
-    for number, body in enumerate(BODIES, start=1):
+    for number, body in enumerate(PAPER.bodies, start=1):
         numbers[body.role] = f"{numbers[body.role]}, {number}" if body.role in numbers else str(number)
-    for number, body in enumerate(BODIES, start=1):
+    for number, body in enumerate(PAPER.bodies, start=1):
         tail = at[body.tail]
         tip = at[body.head]
         colour = ROLE_COLOURS[body.role]
@@ -112,7 +114,7 @@ def _name_points(ax: Any, at: dict[str, Point], names: Any, geometry: Geometry) 
         look = {"marker": "^", "ms": 6, "mfc": "black"} if fixed else {"marker": "o", "ms": 4, "mfc": fill}
         ax.plot(*point, mec="black", mew=0.8, zorder=7, **look)
         if name in names:
-            ends = [(body.tail, body.head) for body in BODIES if name in (body.tail, body.head)]
+            ends = [(body.tail, body.head) for body in PAPER.bodies if name in (body.tail, body.head)]
             others = np.array([at[tip if tail == name else tail] - point for tail, tip in ends])
             # Away from the mean direction of the links at this point.
             free = -(others / np.linalg.norm(others, axis=1, keepdims=True)).sum(axis=0)

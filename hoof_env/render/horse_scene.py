@@ -13,7 +13,7 @@ import numpy as np
 import pygame
 
 from hoof_env.ground.terrain import Terrain
-from hoof_env.leg.geometry import Geometry, tables
+from hoof_env.leg.geometry import Geometry
 from hoof_env.render.brush import CRANK, FINE, FORCE, GREY, HEEL, TOE, Brush, arrow, bar
 from hoof_env.render.ground import GroundPainter
 from hoof_env.render.instant import HorseInstant
@@ -49,7 +49,6 @@ class HorseScene(Scene):
         self._level = size[1] - SOIL_M * self._animal * self._scale
         self._camera = 0j
         self._ground = GroundPainter(brush, terrain, size, self._scale, size[0] - right)
-        self._leg = tables(geometry)
         self._sky = self._paint_sky()
         self._key = lru_cache(maxsize=8)(self._paint_key)
 

@@ -18,10 +18,9 @@ import pygame
 
 from hoof_env.gait import LIMITS
 from hoof_env.ground.terrain import Terrain
-from hoof_env.leg.geometry import Geometry, tables
-from hoof_env.leg.kinematics import pose, solve_points
-from hoof_env.leg.linkage import BODIES, POINTS
-from hoof_env.leg.linkage import CRANK as CRANK_BODY
+from hoof_env.leg.assembly import solve
+from hoof_env.leg.geometry import Geometry
+from hoof_env.leg.kinematics import pose
 from hoof_env.render.brush import CRANK, FINE, FORCE, GREY, HEEL, INK, PAPER, TOE, Brush, arrow, bar, mix
 from hoof_env.render.ground import SOIL_LINE, GroundPainter
 from hoof_env.render.instant import Instant
@@ -83,7 +82,6 @@ class Scene:
         self._camera = 0j
         self._paths: deque[tuple[float, complex, complex]] = deque()  # time [s], heel, toe [m]
         self._ground = GroundPainter(brush, terrain, size, self._scale, 2 * self._centre)
-        self._leg = tables(geometry)
         self._kind, self._girth = trunk, self.small
         self._trunk = self._paint_trunk()
         self._sky = self._paint_sky()
@@ -136,13 +134,11 @@ class Scene:
     def points_of(self, now: Instant) -> dict[str, complex]:
         """Return the place of each named point of a leg [pixels]."""
         hip = complex(now.trunk_x, now.trunk_y)
-        z, dz, ddz = np.empty((3, len(POINTS)), np.complex128)
-        crank, pivot = self._geometry.lengths["OP"], complex(*self._geometry.pivot)
-        solve_points(now.crank_angle, crank, pivot, *self._leg, z, dz, ddz)
+        z = solve(self._geometry, [now.crank_angle])[0][0]
         z *= np.exp(1j * now.swing_angle)
         z.real *= self._geometry.travel
         points = hip + z * np.exp(1j * now.pitch)
-        return dict(zip(POINTS, self._pixels(points).tolist(), strict=True))
+        return dict(zip(self._geometry.mechanism.points, self._pixels(points).tolist(), strict=True))
 
     def _pixels(self, z: Any) -> Any:
         """World position, complex [m], to position in the picture, complex with y down [pixels]."""
@@ -207,8 +203,9 @@ class Scene:
 
     def _draw_leg(self, canvas: Any, pixels: dict[str, complex], lettered: bool = True) -> None:
         metre = self._girth * self._scale * FINE  # on the fine surface
-        crank = self._geometry.lengths["OP"] / self._girth
+        crank = self._geometry.crank_length / self._girth
         edge = 1.5 * FINE
+        mechanism = self._geometry.mechanism
 
         def paint(fine: Any, place: Any) -> None:
             at = {name: place(z) for name, z in pixels.items()}
@@ -221,8 +218,8 @@ class Scene:
             pygame.draw.circle(fine, CRANK, at["O"], crank * metre, round(1.3 * FINE))
             bar(fine, PLATE, at["O"], at["C"], 0.02 * metre, 0.02 * metre)
             pygame.draw.polygon(fine, PLATE, [at["C"], at["B"], at["D"]])
-            for i, link in enumerate(BODIES):
-                colour, radius = (CRANK, 0.024 * metre) if i == CRANK_BODY else (LINK, 0.015 * metre)
+            for i, link in enumerate(mechanism.bodies):
+                colour, radius = (CRANK, 0.024 * metre) if i == mechanism.crank else (LINK, 0.015 * metre)
                 bar(fine, colour, at[link.tail], at[link.head], radius, radius)
             for name, where in at.items():
                 radius = (0.038 if name in "OC" else 0.025) * metre
@@ -231,7 +228,7 @@ class Scene:
             for pivot in "OC":
                 pygame.draw.circle(fine, INK, at[pivot], 0.013 * metre)
 
-        turn = self._geometry.lengths["OP"] * self._scale * (1 + 1j)
+        turn = self._geometry.crank_length * self._scale * (1 + 1j)
         box = [*pixels.values(), pixels["O"] - turn, pixels["O"] + turn]
         self._brush.smooth(canvas, box, 0.16 * self._girth * self._scale + 2, paint)
         for pivot, side, shift in (("O", "midbottom", -0.05j), ("C", "midleft", 0.06)) if lettered else ():
@@ -242,7 +239,7 @@ class Scene:
         if len(self._paths) < 2:
             return
         times, *paths = zip(*self._paths, strict=True)
-        points_now = pixels[self._geometry.heel], pixels[self._geometry.toe]
+        points_now = [pixels[point] for point in reversed(self._geometry.corners)]
         for colour, places, end in zip((HEEL, TOE), paths, points_now, strict=True):
             line = np.append(self._pixels(np.array(places)), end)
             points = list(zip(line.real.tolist(), line.imag.tolist(), strict=True))

@@ -2,15 +2,14 @@
 
 import numpy as np
 
-from hoof_env.dynamics.constrained import SOLE
 from hoof_env.dynamics.engine import TrunkEngine
 from hoof_env.dynamics.parts import GRAVITY, Limb, Motor, Trunk
 from hoof_env.dynamics.tally import tally_of
 from hoof_env.gait import load_gait
 from hoof_env.ground.contact import Ground
 from hoof_env.leg.geometry import load_geometry
-from hoof_env.leg.linkage import CRANK, FRAME, JOINTS, LOCK
 from tests.legs import FIRST_FIT
+from tests.linkage import CRANK, FRAME, JOINTS, LOCK, SOLE
 
 LEG = load_geometry(FIRST_FIT)
 RUN, WALK = load_gait("run", FIRST_FIT), load_gait("walk", FIRST_FIT)

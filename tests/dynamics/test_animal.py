@@ -18,9 +18,9 @@ from hoof_env.gait import GaitParameters, HarmonicGait
 from hoof_env.ground.contact import Ground
 from hoof_env.ground.terrain import Terrain
 from hoof_env.leg.kinematics import FrameMotion, pose
-from hoof_env.leg.linkage import POINTS
 from hoof_env.leg.profile import places
 from tests.dynamics.scenes import HIPS, LEG, LOWEST, NATURAL, THETA, WALK, horse
+from tests.linkage import POINTS
 
 SPRING = HoofSpring(4e4, 600.0)
 ROCKER = LEG.replace(lengths={"CF": 0.8 * LEG.lengths["CF"]}, full_turn=False)

@@ -22,9 +22,9 @@ from hoof_env.gait import LIMITS, GaitParameters
 from hoof_env.ground.contact import Ground
 from hoof_env.leg.geometry import load_geometry
 from hoof_env.leg.kinematics import FrameMotion, pose
-from hoof_env.leg.linkage import FRAME, POINTS
 from tests.dynamics.scenes import LEG as GEOMETRY
 from tests.dynamics.scenes import RUN, WALK, inertia, loads
+from tests.linkage import FRAME, POINTS
 
 OTHER = load_geometry("identified")
 LEGS = (

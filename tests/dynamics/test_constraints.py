@@ -8,11 +8,11 @@ import sympy
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from hoof_env.dynamics.constrained import SIZE, Constraints, closed_form
+from hoof_env.dynamics.constrained import Constraints, closed_form
 from hoof_env.gait import MOTION
 from hoof_env.leg.geometry import load_geometry
-from hoof_env.leg.linkage import BODY_LENGTHS
 from tests.legs import FIRST_FIT
+from tests.linkage import BODY_LENGTHS, SIZE
 
 GEOMETRY = load_geometry(FIRST_FIT)
 CONSTRAINTS = Constraints(GEOMETRY)

@@ -11,9 +11,9 @@ from hoof_env.gait import load_gait
 from hoof_env.ground.terrain import Terrain
 from hoof_env.leg.geometry import load_geometry
 from hoof_env.leg.kinematics import FrameMotion, pose
-from hoof_env.leg.linkage import FRAME, JOINTS
 from tests.dynamics.scenes import LEG, NATURAL, RUN, WALK, horse, inertia, loads
 from tests.legs import PRESETS, load_ensemble
+from tests.linkage import FRAME, JOINTS
 
 OTHER = load_geometry("identified")
 LEGS = {

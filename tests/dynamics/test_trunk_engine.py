@@ -14,9 +14,9 @@ from hoof_env.ground.contact import Ground
 from hoof_env.ground.laws import FRICTION_LAWS
 from hoof_env.ground.terrain import Terrain
 from hoof_env.leg.geometry import load_geometry
-from hoof_env.leg.linkage import NUMBER
 from hoof_env.leg.profile import leg_profile, places
 from tests.legs import FIRST_FIT
+from tests.linkage import NUMBER
 from tests.oracle.horse import PlainHorse
 
 FIRST, IDENTIFIED = load_geometry(FIRST_FIT), load_geometry("identified")

@@ -3,15 +3,14 @@
 import numpy as np
 import pytest
 
-from hoof_env.dynamics.constrained import SOLE
 from hoof_env.dynamics.engine import TrunkEngine
 from hoof_env.dynamics.parts import Limb, Motor, Prescribed, Trunk
 from hoof_env.gait import LIMITS
 from hoof_env.ground.contact import Ground
 from hoof_env.leg.geometry import load_geometry
 from hoof_env.leg.kinematics import FrameMotion, pose
-from hoof_env.leg.linkage import BODIES
 from tests.dynamics.scenes import LEG, RUN
+from tests.linkage import BODIES, SOLE
 
 LEGS = (LEG, load_geometry("identified"), LEG.replace(travel=-LEG.travel))
 LOW, HIGH = np.array(list(LIMITS.values())).T

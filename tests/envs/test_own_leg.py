@@ -19,8 +19,8 @@ from hoof_env.errors import DataFileError, ParameterError
 from hoof_env.gait import LIMITS
 from hoof_env.ground import contact as ground
 from hoof_env.leg.geometry import PARTS
-from hoof_env.leg.linkage import DYADS, LENGTHS
 from hoof_env.leg.profile import by_name, functions
+from tests.linkage import DYADS, LENGTHS
 
 DOCS = Path(__file__).parents[2] / "docs"
 PAGE = (DOCS / "own_task.md").read_text(encoding="utf-8").split("## A leg of your own", 1)[1]
@@ -59,7 +59,10 @@ def entries(heading: str) -> dict[str, list[str]]:
 def test_the_page_has_every_entry():
     assert set(entries("### The form of a preset")) == set(PARTS)
     geometry = entries("#### geometry")
-    needed = {item.name: "yes" if item.default is MISSING else "no" for item in fields(Geometry)}
+    needed = {
+        item.name: "yes" if item.default is item.default_factory is MISSING else "no"
+        for item in fields(Geometry)
+    }
     assert {name: row[0] for name, row in geometry.items()} == needed
     assert re.findall(r"`(\w+)`", geometry["lengths"][2]) == list(LENGTHS)
     assert re.findall(r"`(\w+)`", geometry["assembly"][2]) == [dyad.point for dyad in DYADS]

@@ -8,8 +8,8 @@ from hypothesis import strategies as st
 from hoof_env.errors import ParameterError
 from hoof_env.leg.geometry import load_geometry
 from hoof_env.leg.kinematics import FrameMotion, pose
-from hoof_env.leg.linkage import BODIES, CONSTRUCTION, LOCK, NUMBER, Dyad
 from tests.legs import FIRST_FIT
+from tests.linkage import BODIES, CONSTRUCTION, LOCK, NUMBER, Dyad
 
 LEG = load_geometry(FIRST_FIT)
 THETAS = np.linspace(-7.0, 7.0, 500)

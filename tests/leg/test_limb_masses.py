@@ -11,9 +11,9 @@ from hoof_env.errors import ParameterError
 from hoof_env.gait import load_gait
 from hoof_env.leg.geometry import load_geometry
 from hoof_env.leg.kinematics import FrameMotion, pose
-from hoof_env.leg.limb_masses import CARRIERS, segment_masses, trunk_mass, with_limb_masses
-from hoof_env.leg.linkage import BODY_LENGTHS
+from hoof_env.leg.limb_masses import carriers, segment_masses, trunk_mass, with_limb_masses
 from tests.legs import FIRST_FIT, PRESETS
+from tests.linkage import BODY_LENGTHS
 
 LEG = load_geometry(FIRST_FIT)
 
@@ -34,14 +34,14 @@ def test_masses_of_links_sum_to_the_published_ones(limb, body_mass, size):
     assert given_masses.mass == pytest.approx(sum(PUBLISHED[limb]) * body_mass / 538)
     assert given_masses == leg.replace(masses=given_masses.masses)  # and nothing else has changed
     by_link = dict(zip(BODY_LENGTHS, given_masses.masses, strict=True))
-    for links, mass in zip(CARRIERS, PUBLISHED[limb], strict=True):
+    for links, mass in zip(carriers(), PUBLISHED[limb], strict=True):
         densities = [by_link[name] / leg.lengths[name] for name in links]
         assert densities == pytest.approx([densities[0]] * len(links))
         assert sum(by_link[name] for name in links) == pytest.approx(mass * body_mass / 538)
 
 
 def test_every_link_carries_one_segment():
-    assert sorted(name for links in CARRIERS for name in links) == sorted(BODY_LENGTHS)
+    assert sorted(name for links in carriers() for name in links) == sorted(BODY_LENGTHS)
 
 
 @pytest.mark.parametrize("preset", PRESETS.values(), ids=PRESETS)
@@ -55,7 +55,7 @@ def test_segments_follow_each_other_from_hip_to_ground(preset):
         at = pose(leg, theta, frame=FrameMotion(phi=phi, position=(0.0, leg.hip_height)))
         heights.append(at.centres[:, 1])
     height = dict(zip(BODY_LENGTHS, np.mean(heights, 0), strict=True))
-    for upper, lower in pairwise(CARRIERS):
+    for upper, lower in pairwise(carriers()):
         assert min(height[name] for name in upper) > max(height[name] for name in lower)
 
 

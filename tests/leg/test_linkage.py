@@ -1,16 +1,7 @@
-"""The table of joints is the mechanism that the paper counts: 42 rows, one driver, no freedom left."""
+"""The paper's list is the mechanism that the paper counts: 42 rows, one driver, no freedom left."""
 
-from hoof_env.leg.linkage import (
-    BODIES,
-    BODY_LENGTHS,
-    CONSTRUCTION,
-    FRAME,
-    JOINTS,
-    LENGTHS,
-    LOCK,
-    POINTS,
-    Dyad,
-)
+from hoof_env.leg.mechanism_list import PAPER, read_mechanism
+from tests.linkage import BODIES, BODY_LENGTHS, CONSTRUCTION, FRAME, JOINTS, LENGTHS, LOCK, POINTS, Dyad
 
 
 def test_the_paper_counts_42_rows_and_nothing_is_left_free():
@@ -34,13 +25,16 @@ def test_joints_tie_bodies_that_share_their_points_and_hold_every_body():
 
 def test_the_construction_finds_each_point_from_points_known_before_it():
     known = ["O", "C", "P"]
-    used = {"OP"}
     for step in CONSTRUCTION:
-        assert {step.first, step.second} <= set(known)
-        used |= {step.from_first, step.from_second} if isinstance(step, Dyad) else {step.span, step.distance}
+        ends = {step.first, step.second} if isinstance(step, Dyad) else {step.origin, step.toward}
+        assert ends <= set(known)
         known.append(step.point)
     assert tuple(known) == POINTS
-    assert used == set(LENGTHS)
     assert set(BODY_LENGTHS) == set(LENGTHS) - {"CA"}  # A divides the rocker: no link of its own
     for body, name in zip(BODIES, BODY_LENGTHS, strict=True):
         assert {body.tail, body.head} == set(name)
+
+
+def test_a_list_is_what_it_was_read_from():
+    assert read_mechanism(PAPER.to_mapping()) == PAPER
+    assert hash(read_mechanism(PAPER.to_mapping())) == hash(PAPER)

@@ -8,7 +8,8 @@ import numpy as np
 
 from hoof_env.dynamics.parts import Motor
 from hoof_env.gait import OFFSET
-from hoof_env.leg.linkage import BODIES, CONSTRUCTION, Dyad
+from hoof_env.leg.assembly import coordinate
+from tests.linkage import BODIES, CONSTRUCTION, Dyad
 from tests.oracle.jet import Jet, concatenate, direction, inverse, root, stack, turn
 
 
@@ -51,7 +52,8 @@ class PlainBodies:
         z = {"O": Jet(np.zeros_like(self._pivot)), "C": Jet(self._pivot)}
         z["P"] = self._lengths["OP"] * turn(theta * -1.0)
         for step in CONSTRUCTION:
-            start, span = z[step.first], z[step.second] - z[step.first]
+            ends = (step.first, step.second) if isinstance(step, Dyad) else (step.origin, step.toward)
+            start, span = z[ends[0]], z[ends[1]] - z[ends[0]]
             if isinstance(step, Dyad):
                 r1, r2 = self._lengths[step.from_first], self._lengths[step.from_second]
                 per_d2 = inverse((span * span.part(np.conj)).part(np.real))
@@ -59,8 +61,8 @@ class PlainBodies:
                 across = self._side[step.point] * root(per_d2 * r1**2 - along * along)
                 z[step.point] = start + span * (along + 1j * across)
             else:
-                part = self._lengths[step.distance] / self._lengths[step.span]
-                z[step.point] = z[step.origin] + span * part
+                part = coordinate(self._lengths, step.along) / self._lengths[step.span]
+                z[step.point] = start + span * part
 
         def mirrored(w):
             return self._travel * np.real(w) + 1j * np.imag(w)

@@ -4,7 +4,6 @@ from itertools import combinations
 import numpy as np
 import pytest
 
-from hoof_env.leg.linkage import BODIES, POINTS
 from hoof_env.paper import figures
 from hoof_env.paper.drawing import PRINT, shade
 from hoof_env.paper.figures import DRAWINGS, draw_angles, draw_forces, draw_paths, draw_vectors
@@ -12,6 +11,7 @@ from hoof_env.paper.measure import measure_stance
 from hoof_env.paper.mechanism import draw_mechanism
 from hoof_env.paper.reproduce import run_cycle
 from hoof_env.paper.rows import EXACT
+from tests.linkage import BODIES, POINTS
 
 Figure = pytest.importorskip("matplotlib.figure").Figure
 

@@ -11,7 +11,6 @@ from hoof_env.gait import load_gait
 from hoof_env.ground.contact import load_ground
 from hoof_env.leg.geometry import load_geometry
 from hoof_env.leg.kinematics import FrameMotion, pose
-from hoof_env.leg.linkage import POINTS
 from hoof_env.paper import report
 from hoof_env.paper.measure import integral, measure_stance
 from hoof_env.paper.report import largest_drift, which_beta
@@ -29,6 +28,7 @@ from hoof_env.paper.rows import (
     slowest_root,
 )
 from hoof_env.paper.shapes import BRAKING, HOOF_ON_GROUND
+from tests.linkage import POINTS
 
 ROW_KEYS = {"kind", "id", "gait", "quantity", "unit", "condition", "reading", "definition", "published",
             "bar", "solver", "simulated", "error", "spared", "within_bar", "beside"}  # fmt: skip

@@ -10,7 +10,7 @@ from hoof_env.gait import GaitParameters
 from hoof_env.ground.contact import Ground
 from hoof_env.leg.geometry import load_geometry
 from hoof_env.leg.kinematics import FrameMotion, pose
-from hoof_env.leg.linkage import POINTS
+from tests.linkage import POINTS
 
 mujoco = pytest.importorskip("mujoco")
 pytest.importorskip("exudyn")

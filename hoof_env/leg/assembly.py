@@ -1,0 +1,130 @@
+"""A leg's points at many crank angles, and whether they can be found at each: its dead points."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hoof_env.errors import GeometryError
+from hoof_env.leg.closed_form import solve_all
+from hoof_env.leg.mechanism import Dyad
+
+if TYPE_CHECKING:
+    from hoof_env.leg.geometry import Geometry
+
+ANGLES = 3600
+"""Number of crank angles at which a leg is looked at."""
+
+
+def coordinate(lengths: Any, text: str) -> float:
+    """Return a coordinate of a `BodyPoint` [m]."""
+    if not text:
+        return 0.0
+    return -lengths[text[1:]] if text.startswith("-") else lengths[text]
+
+
+def tables(geometry: Geometry) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
+    """Return how each point of a leg is found, as arrays for `closed_form.solve_points`.
+
+    Returns:
+        steps: shape (points to find, 4), rows (is_dyad, point, first, second) by `Mechanism.number`.
+        values: shape (points to find, 3), rows (r1^2, r1^2 - r2^2, side) for a dyad, (along, across, 0) in
+            lengths of the body for a point of one.
+    """
+    number = geometry.mechanism.number
+    lengths = geometry.lengths
+    steps = []
+    values = []
+    for step in geometry.mechanism.steps:
+        if isinstance(step, Dyad):
+            ends = (step.first, step.second)
+            r1 = lengths[step.from_first]
+            r2 = lengths[step.from_second]
+            values.append((r1 * r1, r1 * r1 - r2 * r2, float(geometry.assembly[step.point])))
+        else:
+            ends = (step.origin, step.toward)
+            span = lengths[step.span]
+            along, across = (coordinate(lengths, text) for text in (step.along, step.across))
+            values.append((along / span, across / span, 0.0))
+        steps.append((isinstance(step, Dyad), number[step.point], *(number[end] for end in ends)))
+    return np.array(steps, dtype=np.int64).reshape(-1, 4), np.array(values).reshape(-1, 3)
+
+
+def solve(geometry: Geometry, theta: Any) -> tuple[NDArray[np.complex128], ...]:
+    """Return the points of a leg, and their first and second derivative by the crank angle, in its own frame.
+
+    Each has shape (len(theta), points); NaN where the linkage cannot be closed.
+    """
+    theta = np.asarray(theta, dtype=np.float64)
+    z, dz, ddz = (np.empty((theta.size, len(geometry.mechanism.points)), np.complex128) for _ in range(3))
+    crank = geometry.lengths[geometry.mechanism.crank_length]
+    fixed = np.array(list(geometry.fixed.values()), np.complex128)
+    with np.errstate(invalid="ignore", divide="ignore"):
+        solve_all(theta, crank, fixed, *tables(geometry), z, dz, ddz)
+    return z, dz, ddz
+
+
+def centres(geometry: Geometry, z: NDArray[np.complex128], mirrored: bool) -> NDArray[np.complex128]:
+    """Return the bodies' centres of mass from the points, or their derivatives, shape (..., bodies).
+
+    `mirrored` says whether the points are in the world's sense, after the mirror of `Geometry.travel`.
+    """
+    mechanism = geometry.mechanism
+    tail = z[..., mechanism.tails]
+    head = z[..., mechanism.heads]
+    middle = (tail + head) / 2
+    if not geometry.solids:
+        return middle
+    place = geometry.body_centres
+    place = place.conj() if mirrored and geometry.travel < 0 else place
+    return np.where(place == 0.5, middle, tail + (head - tail) * place)
+
+
+def check_full_revolution(geometry: Geometry) -> None:
+    """Raise `GeometryError` unless every dyad closes at every crank angle.
+
+    The distance between a dyad's centres must stay strictly between the difference and the sum of its two
+    lengths. A grid of angles is refined three times around the tightest one.
+    """
+    number = geometry.mechanism.number
+    grid = np.arange(ANGLES) * (2 * np.pi / ANGLES)
+    places = solve(geometry, grid)[0]
+    for index, dyad in enumerate(geometry.mechanism.dyads):
+        r1 = geometry.lengths[dyad.from_first]
+        r2 = geometry.lengths[dyad.from_second]
+        theta = grid
+        z = places
+        for _ in range(4):
+            d = np.abs(z[:, number[dyad.second]] - z[:, number[dyad.first]])
+            margins = np.stack([r1 + r2 - d, d - abs(r1 - r2)])
+            which, where = np.unravel_index(np.argmin(margins), margins.shape)
+            miss, angle = -margins[which, where], float(theta[where])
+            # or not a number: an earlier dyad misses between two samples
+            if not miss < 0:
+                break
+            theta = angle + np.linspace(-1, 1, 201) * (theta[1] - theta[0])
+            z = solve(geometry, theta)[0]
+        if not miss < 0:
+            reach = "too far apart by" if which == 0 else "too close by"
+            raise GeometryError(
+                f"dyad {index + 1} ({dyad.first}-{dyad.point}-{dyad.second}, lengths {r1:.6g} and {r2:.6g} m)"
+                f" does not close at crank angle {np.degrees(angle) % 360:.2f} deg: its centres, "
+                f"{float(d[where]):.6g} m apart, are {reach} {miss:.3g} m; "
+                "expected a leg that turns through a full revolution"
+            )
+
+
+def transmission_margin(geometry: Geometry) -> float:
+    """Return the smallest |sine| of the angle between a dyad's two links over a revolution [-]."""
+    number = geometry.mechanism.number
+    z = solve(geometry, np.linspace(0, 2 * np.pi, ANGLES))[0]
+    smallest = 1.0
+    for dyad in geometry.mechanism.dyads:
+        point, first, second = (z[:, number[name]] for name in (dyad.point, dyad.first, dyad.second))
+        one = point - first
+        two = point - second
+        sines = np.abs((np.conj(one) * two).imag) / (np.abs(one) * np.abs(two))
+        smallest = min(smallest, float(np.min(np.nan_to_num(sines))))
+    return smallest

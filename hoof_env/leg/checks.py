@@ -1,0 +1,127 @@
+"""Checks of the parts of a `Geometry`, and bodies that are no uniform rods."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, is_dataclass
+from types import MappingProxyType
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hoof_env.errors import ParameterError, check_number
+from hoof_env.leg.mechanism import Mechanism
+
+Solids = Mapping[str, Mapping[str, Any]]
+"""Bodies that are no uniform rods, see `Geometry`."""
+
+
+def numbers_of(what: str, given: Any) -> dict[str, Any]:
+    """Return the numbers, or lists of them, of a dataclass or mapping by name, as JSON can hold them."""
+    found = asdict(given) if is_dataclass(given) and not isinstance(given, type) else given
+    if not isinstance(found, Mapping):
+        raise ParameterError(f"{what}: expected numbers by name, got {given!r}")
+    return {
+        name: [check_number(f"{what}[{name!r}][{k}]", part) for k, part in enumerate(value)]
+        if isinstance(value, (list, tuple))
+        else check_number(f"{what}[{name!r}]", value)
+        for name, value in found.items()
+    }
+
+
+def check_keys(what: str, given: Any, expected: Sequence[str], optional: Sequence[str] = ()) -> None:
+    """Raise `ParameterError` unless a mapping has the expected keys, and no others than the optional ones."""
+    if not isinstance(given, Mapping):
+        raise ParameterError(f"{what}: expected a mapping with {', '.join(expected)}, got {given!r}")
+    missing, unknown = set(expected) - set(given), set(given) - {*expected, *optional}
+    if missing or unknown:
+        parts = [f"missing {', '.join(sorted(missing))}"] if missing else []
+        parts += [f"unknown {', '.join(sorted(map(str, unknown)))}"] if unknown else []
+        wanted = ", ".join(expected) + (f", and perhaps {', '.join(optional)}" if optional else "")
+        raise ParameterError(f"{what}: expected exactly {wanted}; {'; '.join(parts)}")
+
+
+def count_of(values: Any) -> int:
+    """Return the number of values in a sequence, 0 if it is none."""
+    return len(values) if isinstance(values, (Sequence, np.ndarray)) else 0
+
+
+def check_feet(toe: Any, heel: Any, feet: Sequence[str]) -> None:
+    """Raise `ParameterError` unless toe and heel are the feet of a mechanism; the heel may be None of one."""
+    given = [foot for foot in (toe, heel) if foot is not None]
+    if toe is None or sorted(map(str, given)) != sorted(feet):
+        expected = f"{' and '.join(sorted(feet))}, one each" if len(feet) == 2 else f"{feet[0]} and None"
+        raise ParameterError(f"toe and heel: expected {expected}, got {toe!r} and {heel!r}")
+
+
+def checked_pivot(given: Any, pivots: Sequence[str]) -> Any:
+    """Return the place of the one pivot as a pair, of several as a mapping.
+
+    Raises:
+        ParameterError: a place is missing or no pair of finite numbers.
+    """
+    if isinstance(given, Mapping):
+        check_keys("pivot", given, pivots)
+    elif len(pivots) == 1:
+        given = {pivots[0]: given}
+    else:
+        raise ParameterError(f"pivot: expected the places of {', '.join(pivots)} by name, got {given!r}")
+    places = {}
+    for name in pivots:
+        if count_of(given[name]) != 2:
+            raise ParameterError(
+                f"pivot: expected two numbers ({name}_x, {name}_y) in metres, got {given[name]!r}"
+            )
+        places[name] = tuple(check_number(f"pivot[{i}]", c) for i, c in enumerate(given[name]))
+    return places[pivots[0]] if len(pivots) == 1 else MappingProxyType(places)
+
+
+def checked_solids(given: Any, mechanism: Mechanism) -> dict[str, Mapping[str, Any]]:
+    """Return the bodies that are no uniform rods.
+
+    Raises:
+        ParameterError: no such body, an unknown entry, or a number that is not finite or, of mass and
+            inertia, not above 0.
+    """
+    names = [body.name for body in mechanism.bodies]
+    check_keys("solids", given, (), names)
+    solids: dict[str, Mapping[str, Any]] = {}
+    for name, solid in given.items():
+        what = f"solids[{name!r}]"
+        check_keys(what, solid, (), ("mass", "centre", "inertia"))
+        checked: dict[str, Any] = {
+            key: check_number(f"{what}[{key!r}]", solid[key], low=0, exclusive_low=True)
+            for key in ("mass", "inertia")
+            if key in solid
+        }
+        if "centre" in solid:
+            if count_of(solid["centre"]) != 2:
+                raise ParameterError(
+                    f"{what}['centre']: expected two numbers, along and across from the tail, in metres, "
+                    f"got {solid['centre']!r}"
+                )
+            checked["centre"] = [check_number(f"{what}['centre']", part) for part in solid["centre"]]
+        solids[name] = MappingProxyType(checked)
+    return solids
+
+
+def with_solids(
+    values: NDArray[np.float64], key: str, solids: Solids, mechanism: Mechanism
+) -> NDArray[np.float64]:
+    """Return masses or inertias of rods with those that are given instead."""
+    given = [solids.get(body.name, {}) for body in mechanism.bodies]
+    return np.array([solid.get(key, value) for solid, value in zip(given, values, strict=True)])
+
+
+def scaled_solids(solids: Solids, factor: float, heavier: Mapping[str, float]) -> dict[str, dict[str, Any]]:
+    """Return bodies of `factor` times the size and, by name, `heavier` times the mass."""
+    scaled = {}
+    for name, solid in solids.items():
+        scaled[name] = dict(solid)
+        if "centre" in solid:
+            scaled[name]["centre"] = [factor * part for part in solid["centre"]]
+        for key, power in (("mass", 0), ("inertia", 2)):
+            if key in solid:
+                scaled[name][key] = solid[key] * heavier[name] * factor**power
+    return scaled
