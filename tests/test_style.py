@@ -20,7 +20,7 @@ LONGEST_FUNCTION, LONGEST_CLASS, LONGEST_FILE = 60, 250, 450
 MOST_PARAMETERS, MOST_OF_KERNELS = 8, 12
 
 MOST = {
-    "packed": 130,
+    "packed": 108,
     "unformatted": 15,
     "fragments": 3,
     "people": 2,

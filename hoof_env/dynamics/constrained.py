@@ -44,10 +44,10 @@ from hoof_env.gait import (
     steady_filters,
 )
 from hoof_env.ground.contact import Ground, new_contacts, touch
-from hoof_env.leg.assembly import ANGLES, check_full_revolution, coordinate, solve
+from hoof_env.leg.assembly import body_coordinate, check_full_revolution
 from hoof_env.leg.geometry import Geometry
 from hoof_env.leg.kinematics import FrameMotion, mirror, pose
-from hoof_env.leg.mechanism import FRAME, BodyPoint
+from hoof_env.leg.mechanism import FRAME
 from hoof_env.leg.profile import cross
 
 Vector = NDArray[np.float64]
@@ -61,30 +61,6 @@ class Closure(NamedTuple):
     jacobian: Vector  # Phi_q, square (Eq. 3)
     by_phi: Vector  # d Phi / d phi; d Phi / d theta is 1 in the driver's row and 0 elsewhere
     gamma: Vector  # what Phi_q qdd must be, -(Phi_q qd)_q qd - 2 Phi_qt qd - Phi_tt
-
-
-def body_coordinate(geometry: Geometry, point: str, body: int) -> complex:
-    """Place of a named point on a body, in the body's own axes: from its centre of mass, first axis along e_i
-    [m]."""
-    if body == FRAME:
-        return geometry.fixed[point]
-    mechanism = geometry.mechanism
-    of = mechanism.bodies[body]
-    length = float(geometry.body_lengths[body])
-    centre = geometry.body_centres[body] * length
-    place = {of.tail: -centre, of.head: length - centre}
-    if point not in place:
-        step = next((s for s in mechanism.steps if isinstance(s, BodyPoint) and s.point == point), None)
-        if step is not None and {step.origin, step.toward} == {of.tail, of.head}:
-            sense = 1 if step.toward == of.head else -1
-            along, across = (coordinate(geometry.lengths, text) for text in (step.along, step.across))
-            place[point] = place[step.origin] + sense * complex(along, across)
-        else:
-            z = solve(geometry, np.linspace(0, 2 * np.pi, ANGLES))[0]
-            names = (of.tail, of.head, point)
-            tail, head, at = z[np.isfinite(z).all(1)][0, [mechanism.number[name] for name in names]]
-            place[point] = (at - tail) / (head - tail) * length - centre
-    return complex(place[point])
 
 
 class Constraints:

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from hoof_env.errors import GeometryError
 from hoof_env.leg.closed_form import solve_all
-from hoof_env.leg.mechanism import Dyad
+from hoof_env.leg.mechanism import FRAME, BodyPoint, Dyad
 
 if TYPE_CHECKING:
     from hoof_env.leg.geometry import Geometry
@@ -80,6 +80,30 @@ def centres(geometry: Geometry, z: NDArray[np.complex128], mirrored: bool) -> ND
     place = geometry.body_centres
     place = place.conj() if mirrored and geometry.travel < 0 else place
     return np.where(place == 0.5, middle, tail + (head - tail) * place)
+
+
+def body_coordinate(geometry: Geometry, point: str, body: int) -> complex:
+    """Place of a named point on a body, in the body's own axes: from its centre of mass, first axis along e_i
+    [m]."""
+    if body == FRAME:
+        return geometry.fixed[point]
+    mechanism = geometry.mechanism
+    of = mechanism.bodies[body]
+    length = float(geometry.body_lengths[body])
+    centre = geometry.body_centres[body] * length
+    place = {of.tail: -centre, of.head: length - centre}
+    if point not in place:
+        step = next((s for s in mechanism.steps if isinstance(s, BodyPoint) and s.point == point), None)
+        if step is not None and {step.origin, step.toward} == {of.tail, of.head}:
+            sense = 1 if step.toward == of.head else -1
+            along, across = (coordinate(geometry.lengths, text) for text in (step.along, step.across))
+            place[point] = place[step.origin] + sense * complex(along, across)
+        else:
+            z = solve(geometry, np.linspace(0, 2 * np.pi, ANGLES))[0]
+            names = (of.tail, of.head, point)
+            tail, head, at = z[np.isfinite(z).all(1)][0, [mechanism.number[name] for name in names]]
+            place[point] = (at - tail) / (head - tail) * length - centre
+    return complex(place[point])
 
 
 def check_full_revolution(geometry: Geometry) -> None:

@@ -47,6 +47,31 @@ def count_of(values: Any) -> int:
     return len(values) if isinstance(values, (Sequence, np.ndarray)) else 0
 
 
+def check_signs(signs: Mapping[str, Any]) -> None:
+    """Raise `ParameterError` unless all values are +1 or -1."""
+    for name, sign in signs.items():
+        if np.ndim(sign) or sign not in (1, -1):
+            raise ParameterError(f"{name}: expected +1 or -1, got {sign!r}")
+
+
+def check_texts(texts: Mapping[str, Any]) -> None:
+    """Raise `ParameterError` unless all values are texts."""
+    for name, text in texts.items():
+        if not isinstance(text, str):
+            raise ParameterError(f"{name}: expected a text, got {text!r}")
+
+
+def checked_masses(given: Any, bodies: int) -> tuple[float, ...]:
+    """Return the bodies' masses.
+
+    Raises:
+        ParameterError: another number of them, or one that is not finite or not above 0.
+    """
+    if count_of(given) != bodies:
+        raise ParameterError(f"masses: expected {bodies} link masses, got {given!r}")
+    return tuple(check_number(f"masses[{i}]", m, low=0, exclusive_low=True) for i, m in enumerate(given))
+
+
 def check_feet(toe: Any, heel: Any, feet: Sequence[str]) -> None:
     """Raise `ParameterError` unless toe and heel are the feet of a mechanism; the heel may be None of one."""
     given = [foot for foot in (toe, heel) if foot is not None]
@@ -114,14 +139,16 @@ def with_solids(
     return np.array([solid.get(key, value) for solid, value in zip(given, values, strict=True)])
 
 
-def scaled_solids(solids: Solids, factor: float, heavier: Mapping[str, float]) -> dict[str, dict[str, Any]]:
-    """Return bodies of `factor` times the size and, by name, `heavier` times the mass."""
-    scaled = {}
+def scaled_solids(solids: Solids, factor: float, heavier: Any, mechanism: Mechanism) -> dict[str, Any]:
+    """Return bodies of `factor` times the size and `heavier` times the mass, one number or one a body."""
+    scaled: dict[str, Any] = {}
+    names = [body.name for body in mechanism.bodies]
+    times = dict(zip(names, np.broadcast_to(heavier, len(names)).tolist(), strict=True))
     for name, solid in solids.items():
         scaled[name] = dict(solid)
         if "centre" in solid:
             scaled[name]["centre"] = [factor * part for part in solid["centre"]]
         for key, power in (("mass", 0), ("inertia", 2)):
             if key in solid:
-                scaled[name][key] = solid[key] * heavier[name] * factor**power
+                scaled[name][key] = solid[key] * times[name] * factor**power
     return scaled

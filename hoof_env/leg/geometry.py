@@ -19,14 +19,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hoof_env._output import staged
-from hoof_env.errors import DataFileError, ParameterError, check_choice, check_number
+from hoof_env.errors import DataFileError, ParameterError, check_choice, check_number, flag
 from hoof_env.leg.assembly import check_full_revolution, transmission_margin
 from hoof_env.leg.checks import (
     check_feet,
     check_keys,
+    check_signs,
+    check_texts,
+    checked_masses,
     checked_pivot,
     checked_solids,
-    count_of,
     numbers_of,
     scaled_solids,
     with_solids,
@@ -105,31 +107,20 @@ class Geometry:
         lengths = {k: check_number(f"lengths[{k!r}]", self.lengths[k], low=1e-3, high=1e3) for k in names}
         points = [dyad.point for dyad in self.mechanism.dyads]
         check_keys("assembly", self.assembly, points)
-        signs = {f"assembly[{point!r}]": self.assembly[point] for point in points}
-        for name, sign in {**signs, "travel": self.travel}.items():
-            if np.ndim(sign) or sign not in (1, -1):
-                raise ParameterError(f"{name}: expected +1 or -1, got {sign!r}")
+        check_signs({f"assembly[{point!r}]": self.assembly[point] for point in points})
+        check_signs({"travel": self.travel})
         check_feet(self.toe, self.heel, self.mechanism.feet)
-        for name, text in (("name", self.name), ("provenance", self.provenance)):
-            if not isinstance(text, str):
-                raise ParameterError(f"{name}: expected a text, got {text!r}")
+        check_texts({"name": self.name, "provenance": self.provenance})
         for name in ("hip_height", "linear_density"):
             check_number(name, getattr(self, name), low=0, exclusive_low=True)
         check_choice("inertia", self.inertia, ("uniform_rod", "paper"))
-        bodies = len(self.mechanism.bodies)
         if self.masses is not None:
-            if count_of(self.masses) != bodies:
-                raise ParameterError(f"masses: expected {bodies} link masses, got {self.masses!r}")
-            masses = tuple(
-                check_number(f"masses[{i}]", m, low=0, exclusive_low=True) for i, m in enumerate(self.masses)
-            )
-            object.__setattr__(self, "masses", masses)
+            object.__setattr__(self, "masses", checked_masses(self.masses, len(self.mechanism.bodies)))
         object.__setattr__(self, "lengths", MappingProxyType(lengths))
         object.__setattr__(self, "pivot", checked_pivot(self.pivot, self.mechanism.pivots))
         object.__setattr__(self, "assembly", MappingProxyType({p: int(self.assembly[p]) for p in points}))
         object.__setattr__(self, "solids", MappingProxyType(checked_solids(self.solids, self.mechanism)))
-        if not isinstance(self.full_turn, bool):
-            raise ParameterError(f"full_turn: expected True or False, got {self.full_turn!r}")
+        flag("full_turn", self.full_turn)
         if self.full_turn:
             check_full_revolution(self)
 
@@ -266,16 +257,7 @@ class Geometry:
         path = Path(path)
         if path.suffix != ".json":
             raise ParameterError(f"path: expected a file that ends in .json, got {str(path)!r}")
-        geometry = self.to_dict()
-        content: dict[str, Any] = {"provenance": geometry.pop("provenance")}
-        content |= {"units": "m, kg, kg/m, rad, rad/s", "geometry": geometry}
-        if ground is not None:
-            check_keys("ground", ground, (), ("stiffness", "exponent"))
-            content["ground"] = numbers_of("ground", ground)
-        if gaits is not None:
-            if not isinstance(gaits, Mapping):
-                raise ParameterError(f"gaits: expected a mapping of gaits by name, got {gaits!r}")
-            content["gaits"] = {name: numbers_of(f"gaits[{name!r}]", gait) for name, gait in gaits.items()}
+        content = _preset_content(self, gaits, ground)
         with staged(path.parent) as stage:
             (stage / path.name).write_text(json.dumps(content, indent=1) + "\n", encoding="utf-8")
 
@@ -301,9 +283,9 @@ class Geometry:
         if mass_per_metre is not None:
             masses = None
             density = check_number("mass_per_metre", mass_per_metre, low=0, exclusive_low=True)
-        names = [body.name for body in self.mechanism.bodies]
-        new = factor * self.body_masses if mass_per_metre is None else density * factor * self.body_lengths
-        heavier = dict(zip(names, (new / self.body_masses).tolist(), strict=True))
+        heavier = (
+            factor if mass_per_metre is None else density * factor * self.body_lengths / self.body_masses
+        )
         return replace(
             self,
             lengths={name: factor * length for name, length in self.lengths.items()},
@@ -311,7 +293,7 @@ class Geometry:
             hip_height=factor * self.hip_height,
             linear_density=density,
             masses=None if masses is None else tuple(factor * mass for mass in masses),
-            solids=scaled_solids(self.solids, factor, heavier),
+            solids=scaled_solids(self.solids, factor, factor * lighter, self.mechanism),
             provenance=f"{self.provenance} Scaled by {factor:g}.".lstrip(),
         )
 
@@ -321,6 +303,22 @@ class Geometry:
             if name in changes:
                 changes[name] = {**getattr(self, name), **changes[name]}
         return replace(self, **changes)
+
+
+def _preset_content(
+    geometry: Geometry, gaits: Mapping[str, Any] | None, ground: Mapping[str, float] | None
+) -> dict[str, Any]:
+    shape = geometry.to_dict()
+    content: dict[str, Any] = {"provenance": shape.pop("provenance")}
+    content |= {"units": "m, kg, kg/m, rad, rad/s", "geometry": shape}
+    if ground is not None:
+        check_keys("ground", ground, (), ("stiffness", "exponent"))
+        content["ground"] = numbers_of("ground", ground)
+    if gaits is not None:
+        if not isinstance(gaits, Mapping):
+            raise ParameterError(f"gaits: expected a mapping of gaits by name, got {gaits!r}")
+        content["gaits"] = {name: numbers_of(f"gaits[{name!r}]", gait) for name, gait in gaits.items()}
+    return content
 
 
 def _check_entries(data: Any) -> None:

@@ -2,7 +2,8 @@
 
 The masses are published and stand, with where they were read, in `hoof_env/data/limbs`. Which link carries
 which segment is assumed there, for the mechanism of the paper: it has no bones. Links are taken from the hip
-down to the ground, as high as their centres are on average in the walk of `identified`; `docs/evidence/limb_masses.md` has them.
+down to the ground, as high as their centres are on average in the walk of `identified`;
+`docs/evidence/limb_masses.md` has them.
 
 All that counts as scapula, brachium or thigh hangs on the links. What a horse has above, such as muscles of
 the croup as far as they were weighed with the trunk, stays with the trunk: `trunk_mass`.

@@ -78,9 +78,8 @@ def draw_mechanism(figure: Any, reproduction: Reproduction) -> None:
         _draw_links(ax, at, close=names == hoof_points)
         _name_points(ax, at, names, geometry)
         ax.set(title=title, xlabel=FORWARD, ylabel=HEIGHT)
-    _draw_contact(
-        axes[1], at[getattr(geometry, tip)], *(at[name] for name in geometry.corners), tip, row, side
-    )
+    toe, heel = (at[name] for name in geometry.corners)
+    _draw_contact(axes[1], at[getattr(geometry, tip)], toe, heel, tip, row, side)
     legend_below(figure, 4)
 
 
