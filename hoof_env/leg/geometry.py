@@ -283,9 +283,7 @@ class Geometry:
         if mass_per_metre is not None:
             masses = None
             density = check_number("mass_per_metre", mass_per_metre, low=0, exclusive_low=True)
-        heavier = (
-            factor if mass_per_metre is None else density * factor * self.body_lengths / self.body_masses
-        )
+        changed: Any = 1.0 if mass_per_metre is None else density * self.body_lengths / self.body_masses
         return replace(
             self,
             lengths={name: factor * length for name, length in self.lengths.items()},
@@ -293,7 +291,7 @@ class Geometry:
             hip_height=factor * self.hip_height,
             linear_density=density,
             masses=None if masses is None else tuple(factor * mass for mass in masses),
-            solids=scaled_solids(self.solids, factor, factor * lighter, self.mechanism),
+            solids=scaled_solids(self.solids, factor, factor * changed, self.mechanism),
             provenance=f"{self.provenance} Scaled by {factor:g}.".lstrip(),
         )
 
