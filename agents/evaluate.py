@@ -44,9 +44,9 @@ class Metric:
 METRICS = {
     "return": Metric("return", digits=1),
     "distance_m": Metric("progress\nm", digits=1),
-    "peak_grf_n": Metric("peak GRF\nkN", 1e-3),
+    "highest_grf_n": Metric("peak GRF\nkN", 1e-3),
     "stance_peak_n": Metric("stance peak\nkN", 1e-3),
-    "mean_grf_n": Metric("mean GRF\nkN", 1e-3),
+    "mean_normal_n": Metric("mean GRF\nkN", 1e-3),
     "weight_share": Metric("weight\nshare"),
     "duty_factor": Metric("duty\nfactor"),
     "cost_of_transport": Metric("cost of\ntransport"),

@@ -161,7 +161,7 @@ def watch(envs: Any, policy: Any, speed: float, gait: Floats | None = None) -> P
 
 def _place(measured: Any) -> Floats:
     """Return position [m] and crank angles [rad], shape (5, n)."""
-    return np.array([measured[name] for name in ("x", *(f"{leg}_theta" for leg in LEGS))])
+    return np.array([measured[name] for name in ("x", *(f"{leg}_crank_angle" for leg in LEGS))])
 
 
 def play(envs: Any, policy: Any, speed: float, gait: Floats | None = None) -> dict[str, Any]:

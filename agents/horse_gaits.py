@@ -354,7 +354,7 @@ def trunk_series(gait: list[float], speed: float) -> list[list[float]]:
         # The first half is the way into the gait
         if k >= course.steps // 2:
             m = infos["measured"]
-            rows.append([m[name].copy() for name in ("left_hind_theta", "y", "vx", "pitch")])
+            rows.append([m[name].copy() for name in ("left_hind_crank_angle", "y", "vx", "pitch")])
     theta, y, vx, pitch = np.moveaxis(np.array(rows), 1, 0)[..., upright].reshape(4, -1)
     ones = np.ones(1)
     zeros = np.zeros(1)

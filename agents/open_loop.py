@@ -71,7 +71,7 @@ KEPT = (
     "stance_peak_n",
     "loading_rate_n_s",
     "cost_of_transport",
-    "peak_grf_n",
+    "highest_grf_n",
     "weight_share",
     "stances",
     "failed",

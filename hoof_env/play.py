@@ -15,7 +15,6 @@ from numpy.typing import NDArray
 from hoof_env import records
 from hoof_env.errors import HoofEnvError, check_number, parse_pairs
 from hoof_env.gait import PARAMETERS, GaitParameters
-from hoof_env.render.instant import HorseInstant
 
 HELD = {
     "up": (0, 1), "down": (0, -1), "right": (1, 1), "left": (1, -1),
@@ -64,7 +63,7 @@ class Game:
         self._wanted: Any = None
         self.news = self._happened()
         self.score = 0.0
-        self.distance_from = trunk_x(self.news[0])
+        self.distance_from = self.news[0].x
         self.ended, self.why = False, ""
         self.begun = True
 
@@ -121,11 +120,6 @@ class Game:
 
     def _happened(self) -> list[Any]:
         return records.instants_of(self._env, records.substeps(self._env))
-
-
-def trunk_x(now: Any) -> float:
-    """Where the trunk is [m]."""
-    return float(now.x if isinstance(now, HorseInstant) else now.trunk_x)
 
 
 def play(
@@ -190,7 +184,7 @@ def _draw_strip(window: Any, renderer: Any, game: Game, size: tuple[int, int]) -
     unit, top = brush.unit, size[1]
     window.fill(PAPER, (0, top, size[0], _strip(size)))
     rows = [top + y * unit for y in (20, 48, 76)]
-    ahead = trunk_x(renderer.latest) - game.distance_from
+    ahead = renderer.latest.x - game.distance_from
     for y, (text, colour) in zip(
         rows,
         (

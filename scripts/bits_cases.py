@@ -446,7 +446,7 @@ def run_engine(
                 small = [Limb(leg.scaled(0.9), hip=(0.9 * x, 0.0), drive=drive) for x in hips]
                 engine.vary(0, Trunk(kind, mass=50.0 * legs, height=0.9 * leg.hip_height), limbs=small)
         theta = np.add.outer(np.arange(len(hips)) * 1.7, 0.1 * np.arange(count))
-        engine.reset(gait, theta=theta)
+        engine.reset(gait, theta)
         for k in range(5):
             digests.add("results", engine.advance(steps=40))
             for name in ("state", "report", "account", "strides"):

@@ -223,7 +223,7 @@ def of_engines() -> Iterator[Case]:
     yield "law of three numbers", lambda: TrunkEngine(limb, trunk, contact_law=lambda a, b, c: a)
     engine = TrunkEngine(limb, trunk, num_envs=2)
     yield "move before a reset", lambda: engine.advance()
-    yield "reset: theta", lambda: engine.reset(walk, theta=[[1, 2, 3]])
+    yield "reset: theta", lambda: engine.reset(walk, [[1, 2, 3]])
     yield "reset: far", lambda: engine.reset(walk, x=1e10)
     yield "reset: not a gait", lambda: engine.reset([1, 2, 3])  # type: ignore[list-item]
     yield "reset: pitch", lambda: engine.reset(walk, pitch=0.1)

@@ -71,7 +71,7 @@ def test_the_leg_starts_in_its_gait_and_a_digit_goes_to_another(seed):
         game = Game(env, seed=seed)
         first, before = game.news[0], gait_of(env)
         assert first.time == 0
-        assert first.command_crank_speed == first.crank_speed
+        assert first.command_crank_speed == first.crank_angle_rate
         game.tick()
         np.testing.assert_array_equal(gait_of(env), before)
         for number, name in enumerate(game.gaits, 1):
@@ -137,7 +137,7 @@ def test_a_new_episode_starts_in_the_gait_that_was_chosen_last(env_id):
         game.tick()
         np.testing.assert_array_equal(gait_of(env), env.unwrapped.gaits["run"].to_array())
         game.tick(["down"])
-        assert game.news[-1].command_crank_speed < game.news[0].crank_speed
+        assert game.news[-1].command_crank_speed < game.news[0].crank_angle_rate
 
 
 def test_a_vector_reward_scores_by_its_sum():

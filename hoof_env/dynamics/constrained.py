@@ -142,6 +142,9 @@ def closed_form(geometry: Geometry, motion: Any) -> tuple[Vector, Vector]:
     return q.ravel(), qd.ravel()
 
 
+MOTION_NAMES = LEG_STATE[:2] + LEG_REPORT[:4]
+"""Names of the fields of `MOTION`, whose own are the symbols of Eq. 8's motion law."""
+
 TRACE = np.dtype([(name, "f8") for name in (*TRUNK_STATE, *TRUNK_REPORT, *LEG_STATE, *LEG_REPORT)])
 """State and report of one leg at the end of a substep, by the names that `TrunkEngine` gives them. On a fixed
 trunk its velocity, momentum and pitch are 0."""
@@ -353,8 +356,8 @@ class ConstrainedLeg:
         body, motion = self.state.body, self.state.motion
         row["time"], row["x"], row["y"] = body["time"], body["x"], self.trunk.height
         row["centre_x"], row["centre_y"] = row["x"], row["y"]
-        for name in ("theta", "theta_rate", "theta_acc", "phi", "phi_rate", "phi_acc"):
-            row[name] = motion[name]
+        for name, symbol in zip(MOTION_NAMES, MOTION.names or (), strict=True):
+            row[name] = motion[symbol]
         for name, command in zip(PARAMETERS, self.state.filters, strict=True):
             row[name], row[f"{name}_rate"] = command["value"], command["rate"]
         row["crank_torque"], row["crank_power"] = crank, crank * motion["theta_rate"]

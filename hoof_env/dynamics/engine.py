@@ -22,6 +22,7 @@ from hoof_env.dynamics.advance import BY_LEGS, LANES, RESET_REQUESTED, advance_k
 from hoof_env.dynamics.engine_memory import EngineMemory
 from hoof_env.dynamics.layout import Features
 from hoof_env.dynamics.limits import CHECK_EVERY
+from hoof_env.dynamics.names import NamedColumns
 from hoof_env.dynamics.parts import (
     GRAVITY,
     Limb,
@@ -249,7 +250,7 @@ class TrunkEngine(EngineMemory):
     def reset(
         self,
         gaits: GaitParameters | Sequence[GaitParameters] | Floats,
-        theta: ArrayLike = 0.0,
+        crank_angle: ArrayLike = 0.0,
         *,
         x: ArrayLike = 0.0,
         y: ArrayLike | None = None,
@@ -257,7 +258,7 @@ class TrunkEngine(EngineMemory):
         vx: ArrayLike = 0.0,
         vy: ArrayLike = 0.0,
         pitch_rate: ArrayLike = 0.0,
-        theta_rate: ArrayLike | None = None,
+        crank_angle_rate: ArrayLike | None = None,
         envs: ArrayLike | None = None,
     ) -> None:
         """Start environments with their filters at rest at a gait.
@@ -267,11 +268,12 @@ class TrunkEngine(EngineMemory):
         Args:
             gaits: gait parameters, one set for all legs or one for each; or an array of shape (legs, 2 + 2
                 harmonics, n).
-            theta: crank angles [rad], of shape (), (legs,) or (legs, n), where n is the number of
+            crank_angle: crank angles [rad], of shape (), (legs,) or (legs, n), where n is the number of
                 environments that start.
             x, y, pitch, vx, vy, pitch_rate: place, pitch, velocity and pitch rate of the trunk's centre of
                 mass [m, rad, s], shape () or (n,); a `y` of None is the trunk's height.
-            theta_rate: speeds of motor-driven cranks [rad/s], as theta; None is the commanded speed.
+            crank_angle_rate: speeds of motor-driven cranks [rad/s], shaped as `crank_angle`; None is the
+                commanded speed.
             envs: environments that start, as indices or as a mask of shape (num_envs,); None is all.
 
         Raises:
@@ -286,7 +288,7 @@ class TrunkEngine(EngineMemory):
         height = heights if y is None else y
         trunk = {"x": x, "y": height, "pitch": pitch, "vx": vx, "vy": vy, "pitch_rate": pitch_rate}
         m.trunk[:, where], m.limbs[:, :, where] = memory.start(
-            self, values, theta, theta_rate, trunk, heights
+            self, values, crank_angle, crank_angle_rate, trunk, heights
         )
         m.command[:, :, where] = values
         m.account[:, where] = 0.0
@@ -366,7 +368,7 @@ class TrunkEngine(EngineMemory):
                 break
         kept = memory.memory_of(whole[..., :times], self.num_envs, m.constants, m.reactions, m.features)
         named = {name: np.moveaxis(values, -1, 0) for name, values in memory.named_rows(kept).items()}
-        return named | {"result": self.results}
+        return NamedColumns(named | {"result": self.results})
 
     def _go_on(self, steps: int, account: bool) -> None:
         """Advance as `_go`, a long call in parts, so that Ctrl-C takes effect."""

@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from hoof_env.dynamics import engine_states, layout, memory
 from hoof_env.dynamics.form import engine_layout
+from hoof_env.dynamics.names import NamedColumns
 from hoof_env.dynamics.parts import (
     Drive,
     Limb,
@@ -115,7 +116,7 @@ class EngineMemory(Mechanics):
 
     def _named(self, names: Sequence[str]) -> dict[str, Floats]:
         named = memory.named_rows(self._memory)
-        return {name: named[name].copy() for name in names}
+        return NamedColumns({name: named[name].copy() for name in names})
 
     @property
     def account(self) -> dict[str, Floats]:

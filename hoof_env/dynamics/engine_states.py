@@ -31,7 +31,7 @@ _MOVING = TrunkState.rows("moving").start
 _PLACES = [
     _MOVING + row for name in ("centre", "pitch") for row in range(*Moving.rows(name).indices(Moving.size))
 ]
-_ANGLES = LegState.rows("theta")
+_ANGLES = LegState.rows("crank_angle")
 _FIRST_ROW = layout.LegSettings.rows("first_row")
 
 

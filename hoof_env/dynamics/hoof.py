@@ -70,13 +70,13 @@ def meet_point(trunk, leg, point, memory, arm, arm_by_theta, hip, hip_velocity, 
         point.friction_scale = friction_scale
     point.penetration = penetration
     point.penetration_rate = rate
-    point.sliding_speed = sliding_speed
+    point.slide = sliding_speed
 
     if model.form.springs:
         press_through_spring(trunk, leg, point, memory, model)
     else:
         press_rigidly(trunk, point, memory, penetration, rate, sliding_speed, model)
-    force = vector(point.friction_force, point.normal_force)  # on level ground
+    force = vector(point.friction, point.normal)  # on level ground
     if model.is_terrain:
         force = force_of(point)
     return force, dot(force, by_theta), cross(arm, force)
@@ -85,9 +85,7 @@ def meet_point(trunk, leg, point, memory, arm, arm_by_theta, hip, hip_velocity, 
 @inline_llvm
 def force_of(point):  # type: ignore[no-untyped-def]
     """Return the force of the ground on a hoof point, in the world [N]."""
-    return point.normal_force * point.ground_normal - point.friction_force * perpendicular(
-        point.ground_normal
-    )
+    return point.normal * point.ground_normal - point.friction * perpendicular(point.ground_normal)
 
 
 @inline_llvm
@@ -117,8 +115,8 @@ def press_rigidly(trunk, point, memory, penetration, rate, sliding_speed, model)
         spring = where(inside, stored, nothing)
     point.spring_force = spring
     point.inverse_approach_speed = inverse_speed
-    point.normal_force = force
-    point.friction_force = friction
+    point.normal = force
+    point.friction = friction
 
 
 @inline_llvm
@@ -136,7 +134,7 @@ def press_through_spring(trunk, leg, point, memory, model):  # type: ignore[no-u
     damping = leg.settings.hoof_damping
     deflection = point.deflection[0]
     along = point.deflection[1]
-    speed = point.sliding_speed
+    speed = point.slide
     depth_rate = point.penetration_rate
     elastic = stiffness[0] * deflection
     penetration = point.penetration - deflection
@@ -167,11 +165,11 @@ def press_through_spring(trunk, leg, point, memory, model):  # type: ignore[no-u
     point.deflection_rate[1] = shear
     point.penetration = penetration
     point.penetration_rate = depth_rate - rate
-    point.sliding_speed = speed - shear
+    point.slide = speed - shear
     point.spring_force = spring
     point.inverse_approach_speed = inverse_speed
-    point.normal_force = force
-    point.friction_force = -held
+    point.normal = force
+    point.friction = -held
 
 
 @inline_llvm

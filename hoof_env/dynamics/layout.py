@@ -192,8 +192,8 @@ class ContactMemory(Layout):
 class LegState(Layout):
     """State of a leg: all that changes from step to step."""
 
-    theta: Row  # crank angle [rad]
-    theta_rate: Row  # [rad/s]
+    crank_angle: Row  # [rad]
+    crank_angle_rate: Row  # [rad/s]
     gait: Annotated[Block, GAIT]  # outputs of the command filters, in the order of `gait.parameter_names`
     gait_rate: Annotated[Block, GAIT]
     toe: ContactMemory
@@ -293,11 +293,11 @@ class Contact(Layout):
     ground_normal: Vector  # [-]
     stiffness_scale: Row  # factor of K there [-]
     friction_scale: Row  # factor of mu there [-]
-    sliding_speed: Row  # along the ground, with a spring of the sole [m/s]
+    slide: Row  # along the ground, with a spring of the sole [m/s]
     spring_force: Row  # the part of the normal force that comes back [N]
     inverse_approach_speed: Row  # [s/m]
-    normal_force: Row  # [N]
-    friction_force: Row  # along the ground [N]
+    normal: Row  # [N]
+    friction: Row  # along the ground [N]
 
 
 class LegRows(Layout):
@@ -365,12 +365,12 @@ class LegReport(Layout):
     transmitted by the gear between them, and `hip_power` is that of the actuator that changes the swing's
     parameters."""
 
-    theta_acc: Row  # crank and swing [rad, s]
-    phi: Row
-    phi_rate: Row
-    phi_acc: Row
-    crank_torque: Row  # along theta [N m]
-    hip_torque: Row  # along phi [N m]
+    crank_angle_acceleration: Row  # [rad/s^2]
+    swing_angle: Row  # [rad]
+    swing_angle_rate: Row  # [rad/s]
+    swing_angle_acceleration: Row  # [rad/s^2]
+    crank_torque: Row  # along the crank angle [N m]
+    hip_torque: Row  # along the swing angle [N m]
     crank_power: Row  # of the crank's drive [W]
     hip_power: Row  # of the swing's [W]
     toe: PointReport
@@ -391,7 +391,7 @@ class LegMemory(Layout):
 # Names in records, states and infos
 
 TRUNK_STATE = ("time", "centre_x", "centre_y", "momentum_x", "momentum_y", "pitch", "spin")
-TRUNK_REPORT = ("x", "y", "vx", "vy", "ax", "ay", "pitch_rate", "pitch_acc")
+TRUNK_REPORT = ("x", "y", "vx", "vy", "ax", "ay", "pitch_rate", "pitch_acceleration")
 LEG_REPORT = LegReport.names
 STRIDES = Strides.names
 
@@ -406,7 +406,7 @@ def leg_state(features: Features = PLAIN) -> tuple[str, ...]:
         *("deflection_normal", "deflection_tangential")[: 2 * features.springs],
     )
     points = (f"{point}_{name}" for point in ("toe", "heel") for name in contact)
-    return ("theta", "theta_rate", *gait, *(f"{name}_rate" for name in gait), *points)
+    return ("crank_angle", "crank_angle_rate", *gait, *(f"{name}_rate" for name in gait), *points)
 
 
 def stride_sums(features: Features = PLAIN) -> tuple[str, ...]:

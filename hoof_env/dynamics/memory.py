@@ -361,8 +361,8 @@ def gaits_of(gaits: Any, legs: int, n: int, harmonics: int) -> Floats:
 def start(
     scene: Mechanics,
     gaits: Floats,
-    theta: ArrayLike,
-    theta_rate: ArrayLike | None,
+    crank_angle: ArrayLike,
+    crank_angle_rate: ArrayLike | None,
     trunk: Mapping[str, ArrayLike],
     heights: Floats,
 ) -> tuple[Floats, Floats]:
@@ -375,17 +375,22 @@ def start(
     """
     legs = len(scene.limbs)
     n = len(heights)
-    angle = spread("theta", theta, (legs, n), MAX_STATE)
-    spin = spread("theta_rate", gaits[:, 0] if theta_rate is None else theta_rate, (legs, n), MAX_STATE)
+    angle = spread("crank_angle", crank_angle, (legs, n), MAX_STATE)
+    spin = spread(
+        "crank_angle_rate",
+        gaits[:, 0] if crank_angle_rate is None else crank_angle_rate,
+        (legs, n),
+        MAX_STATE,
+    )
     for i, limb in enumerate(scene.limbs):
         if not isinstance(limb.drive, Motor) and (spin[i] != gaits[i, 0]).any():
             raise ParameterError(
-                f"theta_rate: leg {i} is prescribed to turn at {gaits[i, 0]} rad/s, got {spin[i]}"
+                f"crank_angle_rate: leg {i} is prescribed to turn at {gaits[i, 0]} rad/s, got {spin[i]}"
             )
         # a crank that turns fully has a place for its links everywhere: no look-up needed
         turns = limb.geometry.full_turn
         if not turns and not np.isfinite(scene.profiles[i](angle[i])[0]).all():
-            raise ParameterError(f"theta: the links of leg {i} have no place at some of {angle[i]} rad")
+            raise ParameterError(f"crank_angle: the links of leg {i} have no place at some of {angle[i]} rad")
     at = {name: spread(name, value, (n,), MAX_STATE) for name, value in trunk.items()}
     kind = TRUNKS.index(scene.trunk.kind)
     movable = {
@@ -407,7 +412,7 @@ def start(
     moving[Moving.rows("spin")] = at["pitch_rate"]
     rows = scene.features.of(LegState)
     leg = np.zeros((legs, rows.size, n))
-    leg[:, rows.rows("theta")] = angle[:, None]
-    leg[:, rows.rows("theta_rate")] = spin[:, None]
+    leg[:, rows.rows("crank_angle")] = angle[:, None]
+    leg[:, rows.rows("crank_angle_rate")] = spin[:, None]
     leg[:, rows.rows("gait")] = gaits
     return state, leg

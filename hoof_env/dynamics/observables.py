@@ -81,10 +81,8 @@ def keep_account(trunk, legs, leg_count, model, account, weight):  # type: ignor
         toe = leg.toe.penetration_rate
         heel = leg.heel.penetration_rate
         stored = leg.toe.spring_force * toe + leg.heel.spring_force * heel
-        spent = leg.toe.normal_force * toe + leg.heel.normal_force * heel - stored
-        rubbed = (
-            leg.toe.friction_force * leg.toe.sliding_speed + leg.heel.friction_force * leg.heel.sliding_speed
-        )
+        spent = leg.toe.normal * toe + leg.heel.normal * heel - stored
+        rubbed = leg.toe.friction * leg.toe.slide + leg.heel.friction * leg.heel.slide
         account.crank_work = add(account.crank_work, weight * leg.crank_power, lanes_are_legs)
         account.swing_work = add(account.swing_work, weight * leg.swing_power, lanes_are_legs)
         account.ground_stored = add(account.ground_stored, weight * stored, lanes_are_legs)
@@ -124,10 +122,10 @@ def report_leg(trunk, leg, report):  # type: ignore[no-untyped-def]
     k = leg.beta_by_theta
     w = leg.theta_rate
     acc = leg.theta_acceleration
-    report.theta_acc = acc
-    report.phi = leg.phi
-    report.phi_rate = side * (k * w + leg.swing_rate)
-    report.phi_acc = side * (k * acc + leg.swing_acceleration)
+    report.crank_angle_acceleration = acc
+    report.swing_angle = leg.phi
+    report.swing_angle_rate = side * (k * w + leg.swing_rate)
+    report.swing_angle_acceleration = side * (k * acc + leg.swing_acceleration)
     report.crank_torque = leg.crank_torque
     report.hip_torque = side * leg.frame_torque
     report.crank_power = leg.crank_power
@@ -142,9 +140,9 @@ def report_point(point, place, report):  # type: ignore[no-untyped-def]
     """Fill a `PointReport`."""
     report.x = place.real
     report.y = place.imag
-    report.slide = point.sliding_speed
-    report.normal = point.normal_force
-    report.friction = point.friction_force
+    report.slide = point.slide
+    report.normal = point.normal
+    report.friction = point.friction
 
 
 @inline_llvm
@@ -152,17 +150,19 @@ def count_stride(trunk, leg, form, h):  # type: ignore[no-untyped-def]
     """Update the open stance and the sums with a whole step of `h` [s] that ends here."""
     find_drives(trunk, leg)
     push = leg.ground_force
-    load = leg.toe.normal_force + leg.heel.normal_force
+    load = leg.toe.normal + leg.heel.normal
     force = sqrt(dot(push, push))
     loaded = load > leg.settings.lift_off
-    was_open = (leg.strides.stance_open > 0.0) & (leg.state.theta - leg.strides.stance_began < REVOLUTION)
+    was_open = (leg.strides.stance_open > 0.0) & (
+        leg.state.crank_angle - leg.strides.stance_began < REVOLUTION
+    )
     goes_on = loaded & was_open
     # 1 in the first step of a stance; a stance longer than a revolution is followed by another
     begins = where(loaded, 1.0, 0.0) - where(goes_on, 1.0, 0.0)
     peak = where(goes_on, leg.strides.stance_peak, 0.0)
     higher = where(loaded, maximum(peak, force), 0.0)
     leg.strides.stance_open = where(loaded, 1.0, 0.0)
-    leg.strides.stance_began = where(begins > 0.0, leg.state.theta, leg.strides.stance_began)
+    leg.strides.stance_began = where(begins > 0.0, leg.state.crank_angle, leg.strides.stance_began)
     leg.strides.stance_peak = higher
     rise = where(higher > peak, (load - leg.strides.load) * (1.0 / h), 0.0)
     steepest = where(goes_on, leg.strides.steepest_rise, 0.0)
@@ -182,10 +182,10 @@ def count_stride(trunk, leg, form, h):  # type: ignore[no-untyped-def]
     down = load > 0.0
     leg.sums.loaded_time = leg.sums.loaded_time + where(down, h, 0.0)
     per_load = h / where(down, load, 1.0)  # 1 avoids a division by 0; the result is not used there
-    slid = leg.toe.normal_force * leg.toe.sliding_speed + leg.heel.normal_force * leg.heel.sliding_speed
+    slid = leg.toe.normal * leg.toe.slide + leg.heel.normal * leg.heel.slide
     leg.sums.travel = leg.sums.travel - where(down, slid * per_load, 0.0)
-    rubbed = leg.toe.normal_force * absolute(leg.toe.sliding_speed)
-    rubbed = rubbed + leg.heel.normal_force * absolute(leg.heel.sliding_speed)
+    rubbed = leg.toe.normal * absolute(leg.toe.slide)
+    rubbed = rubbed + leg.heel.normal * absolute(leg.heel.slide)
     # in stance alone: a sole without mass flies back as it is unloaded, which is no slip of the hoof
     leg.sums.slip = leg.sums.slip + where(loaded, rubbed * per_load, 0.0)
     if form.has_limits:

@@ -58,8 +58,8 @@ def begin_step(trunk, legs, leg_count, model):  # type: ignore[no-untyped-def]
     for i in range(leg_count):
         leg = block_at(legs, i)
         filter_accelerations(leg, model.form.gait, model.settings)
-        leg.theta = leg.state.theta
-        leg.theta_rate = leg.state.theta_rate
+        leg.theta = leg.state.crank_angle
+        leg.theta_rate = leg.state.crank_angle_rate
         begin_springs(leg, model.form.springs)
         if model.averages:
             leg.mean_theta_rate = 0.0
@@ -89,7 +89,9 @@ def prescribed(leg, elapsed):  # type: ignore[no-untyped-def]
     value = leg.state.gait[SPEED]
     rate = leg.state.gait_rate[SPEED]
     acceleration = leg.gait_acceleration[SPEED]
-    theta = leg.state.theta + elapsed * (value + elapsed * (0.5 * rate + elapsed * (1 / 6) * acceleration))
+    theta = leg.state.crank_angle + elapsed * (
+        value + elapsed * (0.5 * rate + elapsed * (1 / 6) * acceleration)
+    )
     return theta, value + elapsed * (rate + 0.5 * elapsed * acceleration)
 
 
@@ -103,8 +105,8 @@ def next_stage(trunk, legs, leg_count, model, elapsed):  # type: ignore[no-untyp
         is_motor = leg.settings.is_motor > 0.0
         # a prescribed crank is where its filter says at each stage, not where the scheme would bring it
         angle, spin = prescribed(leg, elapsed)
-        leg.theta = where(is_motor, leg.state.theta + elapsed * leg.theta_rate, angle)
-        leg.theta_rate = where(is_motor, leg.state.theta_rate + elapsed * leg.theta_acceleration, spin)
+        leg.theta = where(is_motor, leg.state.crank_angle + elapsed * leg.theta_rate, angle)
+        leg.theta_rate = where(is_motor, leg.state.crank_angle_rate + elapsed * leg.theta_acceleration, spin)
         move_springs(leg, model.form.springs, elapsed)
 
 
@@ -134,11 +136,11 @@ def end_step(trunk, legs, leg_count, model, h):  # type: ignore[no-untyped-def]
         if model.averages:
             rate = leg.mean_theta_rate
             acceleration = leg.mean_theta_acceleration
-        omega = leg.state.theta_rate + h * acceleration
+        omega = leg.state.crank_angle_rate + h * acceleration
         if model.new_rates:  # semi-implicit Euler
             rate = omega
-        leg.state.theta = where(is_motor, leg.state.theta + h * rate, angle)
-        leg.state.theta_rate = where(is_motor, omega, spin)
+        leg.state.crank_angle = where(is_motor, leg.state.crank_angle + h * rate, angle)
+        leg.state.crank_angle_rate = where(is_motor, omega, spin)
         end_springs(leg, model.form.springs, model.averages, h)
         # exact with every scheme: a filter's acceleration is constant during a step
         for k in range(model.form.gait):

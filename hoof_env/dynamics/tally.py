@@ -25,8 +25,8 @@ def tally_of(engine: TrunkEngine) -> Tally:
     spin = trunk.pitch_inertia * pitch_rate + trunk.mass * cross(place, velocity)  # about the origin
     kinetic = 0.5 * trunk.mass * np.abs(velocity) ** 2 + 0.5 * trunk.pitch_inertia * pitch_rate**2
     for i, limb in enumerate(engine.limbs):
-        theta_rate = s["theta_rate"][i]
-        f = by_name(engine.profiles[i](s["theta"][i])[0])
+        theta_rate = s["crank_angle_rate"][i]
+        f = by_name(engine.profiles[i](s["crank_angle"][i])[0])
         a = f["crank_inertia"]
         b = f["coupling"]
         c = f["frame_inertia"]
@@ -37,8 +37,8 @@ def tally_of(engine: TrunkEngine) -> Tally:
             a = a + gear**2 * rotor
             b = b - side * gear * rotor
             c = c + rotor
-        frame = turn * np.exp(1j * side * r["phi"][i])
-        frame_rate = pitch_rate + side * r["phi_rate"][i]
+        frame = turn * np.exp(1j * side * r["swing_angle"][i])
+        frame_rate = pitch_rate + side * r["swing_angle_rate"][i]
         first_moment = frame * (f["first_moment_x"] + 1j * f["first_moment_y"])
         slope = f["moment_slope_x"] + 1j * f["moment_slope_y"]
         own_rate = frame * slope * theta_rate + 1j * first_moment * frame_rate

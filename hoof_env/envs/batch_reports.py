@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hoof_env.dynamics.layout import stride_sums
+from hoof_env.dynamics.names import NamedColumns
 from hoof_env.dynamics.parts import Result, broken
 from hoof_env.envs.infos import name_columns
 from hoof_env.tasks.episode import FAILED
@@ -50,15 +51,15 @@ def infos_of(batch: Any, ended: bool = True) -> dict[str, NDArray[Any]]:
 
 def summary_of(batch: Any, env: int) -> dict[str, float]:
     """Return the figures of one episode by name, see `summaries_of`."""
-    return {name: float(values[0]) for name, values in summaries_of(batch, [env]).items()}
+    return NamedColumns({name: float(values[0]) for name, values in summaries_of(batch, [env]).items()})
 
 
 def summaries_of(batch: Any, envs: Sequence[int] | NDArray[np.int64]) -> dict[str, Floats]:
     """Return figures of the episodes of some environments, by name, shape (len(envs),) each.
 
-    seconds, distance_m, speed_m_s, peak_grf_n (highest of the episode), mean_grf_n (normal force over the
-    whole time), stance_peak_sum_n, stances, loading_rate_n_s (mean over stances), duty_factor,
-    drive_work_j (braking is not recovered), cost_of_transport (work per weight and distance; infinite
+    seconds, distance_m, speed_m_s, highest_grf_n (of the episode), mean_normal_n (normal force over the whole
+    time), stance_peak_sum_n, stances, loading_rate_n_s (mean over stances), duty_factor,
+    positive_work_j (braking is not recovered), cost_of_transport (work per weight and distance; infinite
     without forward progress), weight_share (mean normal force over weight: the leg's share), support_share
     (the rest: the share of rail or suspension), slip_m (mean over stances), failed (0 or 1). A horse's mean
     force and sum of peaks are sums over its legs, its duty factor is the mean of its legs.
@@ -82,14 +83,14 @@ def summaries_of(batch: Any, envs: Sequence[int] | NDArray[np.int64]) -> dict[st
         "seconds": np.array([round(count * batch.dt, 12) for count in steps]),
         "distance_m": distance,
         "speed_m_s": distance / time,
-        "peak_grf_n": total["highest_grf"],
-        "mean_grf_n": mean,
+        "highest_grf_n": total["highest_grf"],
+        "mean_normal_n": mean,
         "stance_peak_sum_n": total["peak_grf_increase"],
         "stances": stances,
         "loading_rate_n_s": total["loading_rate_increase"] / each,
         "duty_factor": total["loaded_time"] / time / batch.legs,
         "slip_m": total["slip"] / each,
-        "drive_work_j": work,
+        "positive_work_j": work,
         "cost_of_transport": cost,
         "weight_share": mean / weight,
         "support_share": 1 - mean / weight,
@@ -115,7 +116,7 @@ def endings_of(batch: Any, done: NDArray[np.bool_], terminated: NDArray[np.bool_
         done: True for environments that ended an episode, shape (num_envs,).
         terminated: True for those that failed, shape (num_envs,).
     """
-    figures: dict[str, Any] = {}
+    figures: dict[str, Any] = NamedColumns()
     for name, values in summaries_of(batch, np.flatnonzero(done)).items():
         figures[name] = np.zeros(batch.num_envs)
         figures[f"_{name}"] = done.copy()

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, ItemsView, KeysView, Mapping, Sequence, ValuesView
 from functools import cache
-from types import MappingProxyType
 from typing import Any
 
 import numpy as np
@@ -24,6 +23,7 @@ from hoof_env.dynamics.layout import (
     leg_state,
     stride_sums,
 )
+from hoof_env.dynamics.names import present_name
 from hoof_env.gait import parameter_names
 
 
@@ -81,33 +81,6 @@ class InfoLayout:
         return lambda: column[rows].view(kind)
 
 
-RENAMED = MappingProxyType(
-    {
-        "peak_increase": "peak_grf_increase",
-        "highest": "highest_grf",
-        "load_impulse": "normal_impulse",
-        "toe_rate": "toe_penetration_rate",
-        "heel_rate": "heel_penetration_rate",
-        "toe_slowness": "toe_inverse_approach_speed",
-        "heel_slowness": "heel_inverse_approach_speed",
-        "toe_give_normal": "toe_deflection_normal",
-        "toe_give_tangential": "toe_deflection_tangential",
-        "heel_give_normal": "heel_deflection_normal",
-        "heel_give_tangential": "heel_deflection_tangential",
-    }
-)
-"""New names of measurements, by the old ones, for the message of a look-up."""
-
-
-def _present_name(key: str, names: tuple[str, ...]) -> str | None:
-    """Return the new name of a measurement, also behind the name of a leg; None if it is no old one."""
-    for old, new in RENAMED.items():
-        name = key.removesuffix(old) + new
-        if (key == old or key.endswith(f"_{old}")) and name in names:
-            return name
-    return None
-
-
 class NamedArray(np.ndarray[Any, np.dtype[np.float64]]):
     """Numbers that have names along the last axis: `row["crank_speed"]` is `row[..., 0]`.
 
@@ -122,7 +95,7 @@ class NamedArray(np.ndarray[Any, np.dtype[np.float64]]):
     def __getitem__(self, key: Any) -> Any:
         if isinstance(key, str):
             if key not in self.names:
-                new = _present_name(key, self.names)
+                new = present_name(key, self.names)
                 raise KeyError(f"{key!r} is called {new!r} now" if new else key)
             key = (..., self.names.index(key))
         return np.asarray(self)[key][()]

@@ -4,17 +4,18 @@ from __future__ import annotations
 
 from hoof_env.dynamics.layout import StrideSums
 from hoof_env.dynamics.limits import has_moved
-from hoof_env.envs.infos import RENAMED
+from hoof_env.dynamics.names import RENAMED
 from hoof_env.simd import block_at, lane_of, maximum, minimum, where
 from hoof_env.simd.compile import inline_llvm
 from hoof_env.tasks.episode import FAILED, TRUNCATED
 from hoof_env.tasks.reward import BEARING, LONGEST_STRIDE, Outcome
 
 MOVED = {
+    **RENAMED,
     **{name: f"sums.{name}" for name in StrideSums.names},
     **{old: f"sums.{new}" for old, new in RENAMED.items() if new in StrideSums.names},
 }
-"""Present names of what was an attribute of the `Outcome` itself, by the old ones, for messages."""
+"""Present names of attributes by the old ones, for messages; sums were attributes of the `Outcome` itself."""
 
 
 @inline_llvm

@@ -19,6 +19,7 @@ from hoof_env.dynamics.constrained import TRACE, ConstrainedLeg, ConstrainedStat
 from hoof_env.dynamics.engine import TrunkEngine
 from hoof_env.dynamics.layout import LEG_REPORT, LEG_STATE, TRUNK_REPORT, TRUNK_STATE, stride_sums
 from hoof_env.dynamics.memory import LIFT_OFF, Memory, memory_of
+from hoof_env.dynamics.names import NamedColumns
 from hoof_env.dynamics.observables import StanceCounter
 from hoof_env.dynamics.parts import Result
 from hoof_env.errors import ParameterError
@@ -155,7 +156,7 @@ class PaperSolver:
         trace = self.traces[env]
         of_trunk = {*TRUNK_STATE, *TRUNK_REPORT}
         shapes = {name: (-1, 1) if name in of_trunk else (-1, 1, 1) for name in TRACE.names or ()}
-        return {name: trace[name].reshape(shape).copy() for name, shape in shapes.items()}
+        return NamedColumns({name: trace[name].reshape(shape).copy() for name, shape in shapes.items()})
 
     def get_state(self) -> dict[str, Any]:
         """Return everything that changes outside the engine's memory."""
@@ -227,7 +228,7 @@ class PaperSolver:
         rubbing = trace["toe_normal"] * np.abs(trace["toe_slide"])
         rubbing = rubbing + trace["heel_normal"] * np.abs(trace["heel_slide"])
         powers = trace["crank_power"], trace["hip_power"]
-        columns = trace["theta"], normal, force, sliding, rubbing, *powers
+        columns = trace["crank_angle"], normal, force, sliding, rubbing, *powers
         growth = higher = steeper = work = travel = slip = 0.0
         # Substep by substep, in the order in which the engine adds.
         rows = zip(*(values.tolist() for values in columns), strict=True)

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from hoof_env.dynamics.engine import TrunkEngine
 from hoof_env.dynamics.form import engine_layout
 from hoof_env.dynamics.memory import LIFT_OFF
+from hoof_env.dynamics.names import NamedColumns
 from hoof_env.dynamics.parts import broken
 from hoof_env.envs.batch import EpisodeBatch
 from hoof_env.render.instant import columns_of, instants_of
@@ -92,7 +93,7 @@ class Recording:
         command = self.batch.engine.command_in(end)
         record = self._run(self._ends[k - 1], command, self.batch.substeps)
         # Without the first instant, which is the end of the step before.
-        return {name: values[1:] for name, values in record.items()}
+        return NamedColumns({name: values[1:] for name, values in record.items()})
 
     def _run(self, column: NDArray[np.float64], command: Any, steps: int) -> Record:
         """Run substeps from a column of the engine's memory, under a command."""

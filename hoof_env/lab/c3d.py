@@ -78,7 +78,7 @@ def write_c3d(record: Columns, about: Mapping[str, Any], path: Path) -> None:
     parameters = file["parameters"]
     rate = [1 / float(np.median(np.diff(time)))]
     markers = {f"{limb}{name}": f"{limb}{name}_" for limb in limbs for name in MARKERS}
-    markers["trunk"] = "trunk_" if "trunk_x" in record else ""
+    markers["trunk"] = ""
     # Homogeneous coordinates, as ezc3d takes them: the fourth is 1.
     points = [
         [record[f"{column}x"] * MM, 0 * time, record[f"{column}y"] * MM, 0 * time + 1]

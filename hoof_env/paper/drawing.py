@@ -59,10 +59,9 @@ Point = NDArray[np.float64]
 def leg_at(geometry: Geometry, trace: Trace, t: float) -> dict[str, Point]:
     """Return the world position (x, y) [m] of every named point, at the row of a trace nearest to `t` [s]."""
     row = trace[int(np.argmin(np.abs(trace["time"] - t)))]
-    frame = FrameMotion(phi=float(row["phi"]), position=(float(row["x"]), float(row["y"])))
-    return dict(
-        zip(geometry.mechanism.points, pose(geometry, float(row["theta"]), frame=frame).points, strict=True)
-    )
+    frame = FrameMotion(phi=float(row["swing_angle"]), position=(float(row["x"]), float(row["y"])))
+    points = pose(geometry, float(row["crank_angle"]), frame=frame).points
+    return dict(zip(geometry.mechanism.points, points, strict=True))
 
 
 def elastic_cycles(reproduction: Reproduction) -> dict[str, tuple[Trace, Stance]]:

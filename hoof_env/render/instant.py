@@ -9,6 +9,7 @@ from typing import Annotated, Any, NamedTuple, get_type_hints
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from hoof_env.dynamics.names import NamedColumns
 from hoof_env.gait import PARAMETERS
 from hoof_env.ground.terrain import Terrain
 from hoof_env.leg.geometry import Geometry
@@ -50,8 +51,8 @@ class Surroundings(NamedTuple):
 class Instant(NamedTuple):
     """One instant of one leg, in the world: x forward, y up, angles counter-clockwise; SI units and radians.
 
-    `trunk_x`, `trunk_y` are the place of the crank centre O and `trunk_vx`, `trunk_vy` its velocity; `pitch`
-    turns the trunk. `crank_angle` and `swing_angle` are the leg's theta and phi, in its own sense. A normal
+    `x`, `y` are the place of the crank centre O, where the trunk of one leg is, and `vx`, `vy` its velocity;
+    `pitch` turns the trunk. Crank angle and swing angle are in the leg's own sense. A normal
     and a friction force act along the ground's normal and tangent on a hoof point, and together they are
     (force_x, force_y); depth is penetration, negative in the air. The hoof's own (force_x, force_y) is the
     sum; its point of application, the centre of pressure (cop_x, cop_y), is where the moment of both forces
@@ -59,13 +60,13 @@ class Instant(NamedTuple):
     """
 
     time: Second
-    trunk_x: Metre
-    trunk_y: Metre
-    trunk_vx: MetrePerSecond
-    trunk_vy: MetrePerSecond
+    x: Metre
+    y: Metre
+    vx: MetrePerSecond
+    vy: MetrePerSecond
     pitch: Radian
     crank_angle: Radian
-    crank_speed: RadianPerSecond
+    crank_angle_rate: RadianPerSecond
     swing_angle: Radian
     swing_offset: Radian
     swing_sin: Radian
@@ -152,7 +153,7 @@ def columns_of_horse(
         wanted = None if command is None else command[i, :4]
         own = columns_of_engine(record, terrain, command=wanted, leg=i, hip=hip)
         columns |= {f"{leg}_{name}": values for name, values in own.items()}
-    return columns
+    return NamedColumns(columns)
 
 
 def columns_of(
@@ -179,9 +180,8 @@ def units_of_legs(of_leg: Mapping[str, str], hips: Iterable[str]) -> dict[str, s
     trunk, and each leg's under its name."""
     if not hips:
         return dict(of_leg)
-    found = {name: UNITS[name if name in UNITS else f"trunk_{name}"] for name in OF_TRUNK}
-    own = {name: unit for name, unit in of_leg.items() if name not in ("time", "pitch")}
-    own = {name: unit for name, unit in own.items() if not name.startswith("trunk_")}
+    found = {name: UNITS[name] for name in OF_TRUNK}
+    own = {name: unit for name, unit in of_leg.items() if name not in OF_TRUNK}
     return found | {f"{leg}_{name}": unit for leg in hips for name, unit in own.items()}
 
 
@@ -214,8 +214,8 @@ def columns_of_engine(
         of_trunk["vx"], of_trunk["vy"] = of_trunk["vx"] + turning.real, of_trunk["vy"] + turning.imag
     columns = {
         "time": of_trunk["time"],
-        **{f"trunk_{name}": of_trunk[name] for name in ("x", "y", "vx", "vy")}, "pitch": of_trunk["pitch"],
-        "crank_angle": of_leg["theta"], "crank_speed": of_leg["theta_rate"], "swing_angle": of_leg["phi"],
+        **{name: of_trunk[name] for name in ("x", "y", "vx", "vy", "pitch")},
+        **{name: of_leg[name] for name in ("crank_angle", "crank_angle_rate", "swing_angle")},
         **{name: of_leg[name] for name in PARAMETERS[1:]},
         **{f"command_{name}": np.full(n, value)
            for name, value in zip(PARAMETERS, wanted.tolist(), strict=True)},
@@ -229,12 +229,12 @@ def columns_of_engine(
             f"{point}_normal": normal, f"{point}_friction": friction,
             f"{point}_force_x": force.real, f"{point}_force_y": force.imag,
         }  # fmt: skip
-    return columns | _together(columns)
+    return NamedColumns(columns | _together(columns))
 
 
 _TRUNK = ("time", "x", "y", "vx", "vy", "pitch")
 _LEG = (
-    "theta", "theta_rate", "phi", *PARAMETERS[1:],
+    "crank_angle", "crank_angle_rate", "swing_angle", *PARAMETERS[1:],
     *(f"{point}_{name}" for point in POINTS for name in ("x", "y", "normal", "friction")),
 )  # fmt: skip
 

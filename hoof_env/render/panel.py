@@ -49,12 +49,12 @@ def unit_of(lift_off_n: float) -> Unit:
 
 
 GAIT = (
-    ("crank speed", "crank_speed", "rad/s"),
-    ("swing offset", "swing_offset", "rad"),
-    ("swing sine", "swing_sin", "rad"),
-    ("swing cosine", "swing_cos", "rad"),
+    ("crank speed", "crank_angle_rate", "crank_speed", "rad/s"),
+    ("swing offset", "swing_offset", "swing_offset", "rad"),
+    ("swing sine", "swing_sin", "swing_sin", "rad"),
+    ("swing cosine", "swing_cos", "swing_cos", "rad"),
 )
-"""Title, field of `Instant` and unit of each gait parameter."""
+"""Title, field of `Instant`, parameter that is commanded and unit."""
 
 
 class Peak(NamedTuple):
@@ -144,7 +144,7 @@ class Panel:
     def draw(self, canvas: Any, now: Instant) -> None:
         canvas.blit(self._card(self.full_scale), self._box, special_flags=pygame.BLEND_PREMULTIPLIED)
         stances = self.stances
-        values = now.time, now.trunk_vx, now.grf, stances.running_peak, stances.highest
+        values = now.time, now.vx, now.grf, stances.running_peak, stances.highest
         for k, (value, (_, own, colour)) in enumerate(zip(values, NUMBERS, strict=True)):
             shown, digits = (value, 2) if own else (value / self._force.newtons, self._force.digits)
             text = f"{round(shown, digits) + 0.0:.{digits}f}"  # + 0.0 takes the sign off a zero
@@ -180,12 +180,12 @@ class Panel:
         write("now", inside.left + 122 * unit, y, 18)
         self._mark_command(whole, inside.left + 172 * unit, y + 8 * unit)
         write("commanded", inside.left + 182 * unit, y, 18)
-        for k, (title, name, _) in enumerate(GAIT):
+        for k, (title, _, parameter, _) in enumerate(GAIT):
             x, y = self._line(first + 1 + k, 0)
             write(title, x, y, 20)
             left, right = self._track
             whole.fill(FAINT, (round(left), round(y - unit), round(right - left), max(2, round(3 * unit))))
-            low, high = self._limits[name]
+            low, high = self._limits[parameter]
             if low < 0 < high:
                 whole.fill(GREY, (round(left + (right - left) * -low / (high - low)), round(y - 4 * unit), 1,
                                   round(9 * unit)))  # fmt: skip
@@ -212,10 +212,11 @@ class Panel:
     def _draw_gait(self, canvas: Any, now: Instant) -> None:
         """Draw each gait parameter between its limits, with its command."""
         left, right = self._track
-        for k, (_, name, unit_name) in enumerate(GAIT):
+        for k, (_, name, parameter, unit_name) in enumerate(GAIT):
             _, y = self._line(len(NUMBERS) + 1.4 + k, 0)
-            low, high = self._limits[name]
-            actual, wanted = getattr(now, name), getattr(now, f"command_{name}")
+            low, high = self._limits[parameter]
+            actual = getattr(now, name)
+            wanted = getattr(now, f"command_{parameter}")
             for value, mark in ((wanted, self._mark_command), (actual, self._mark_actual)):
                 if math.isfinite(value):
                     part = min(max((value - low) / (high - low), 0.0), 1.0)

@@ -124,7 +124,7 @@ class Scene:
     def look_at(self, now: Instant) -> dict[str, complex]:
         """Point the camera at an instant; returns where each named point of the leg lies [pixels]."""
         usual = self._geometry.hip_height
-        hip = complex(now.trunk_x, now.trunk_y)
+        hip = complex(now.x, now.y)
         level = float(self._ground.height(hip.real + self.small * AROUND_M).mean())
         high, slack = hip.imag - level, HEIGHT_SLACK_M * self.small
         rise = high - min(max(high, usual - slack), usual + slack)
@@ -133,7 +133,7 @@ class Scene:
 
     def points_of(self, now: Instant) -> dict[str, complex]:
         """Return the place of each named point of a leg [pixels]."""
-        hip = complex(now.trunk_x, now.trunk_y)
+        hip = complex(now.x, now.y)
         z = solve(self._geometry, [now.crank_angle])[0][0]
         z *= np.exp(1j * now.swing_angle)
         z.real *= self._geometry.travel

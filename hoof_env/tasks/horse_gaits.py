@@ -383,7 +383,7 @@ def command_gait(task, actions, episode, first_leg, parameters, n, scratch):  # 
         for side in range(2):
             i = 2 * p + side
             sign = 1.0 - 2.0 * side
-            cosine, sine = cos_sin(block_at(first_leg, i).state.theta)
+            cosine, sine = cos_sin(block_at(first_leg, i).state.crank_angle)
             crank = vector(cosine, sine)
             # Phase of the stride that this leg alone would be in: the same for all legs that are in step.
             phase = sign * (conjugate(begin) * phase_of(wave, half, fold, crank))

@@ -48,11 +48,11 @@ def _of_leg(i: int, measure: Callable[[Any], Any]) -> Callable[[Any], Any]:
 
 
 def _sine(leg):  # type: ignore[no-untyped-def]
-    return cos_sin(leg.state.theta)[1]
+    return cos_sin(leg.state.crank_angle)[1]
 
 
 def _cosine(leg):  # type: ignore[no-untyped-def]
-    return cos_sin(leg.state.theta)[0]
+    return cos_sin(leg.state.crank_angle)[0]
 
 
 def _toe_contact(leg):  # type: ignore[no-untyped-def]
@@ -82,7 +82,7 @@ def _offset(k: int) -> Callable[[Any], Any]:
 _PER_LEG: tuple[tuple[str, str, str, Callable[[Any], Any], Scale], ...] = (
     ("sin(crank angle)", "crank", "-", _sine, PLAIN),
     ("cos(crank angle)", "crank", "-", _cosine, PLAIN),
-    (TRUE_RATE, "crank", "rad/s", lambda leg: leg.state.theta_rate, tanh_of(10.0)),
+    (TRUE_RATE, "crank", "rad/s", lambda leg: leg.state.crank_angle_rate, tanh_of(10.0)),
     ("crank speed", "gait", "rad/s", _filter(0), tanh_of(10.0)),
     ("swing offset", "gait", "rad", _filter(1), _in_bounds(1)),
     ("swing sine coefficient", "gait", "rad", _filter(2), _in_bounds(2)),

@@ -161,11 +161,11 @@ def _gait_rate(k: int) -> Callable[[Any], Any]:
 
 
 def _sine(scene):  # type: ignore[no-untyped-def]
-    return cos_sin(scene.leg.state.theta)[1]
+    return cos_sin(scene.leg.state.crank_angle)[1]
 
 
 def _cosine(scene):  # type: ignore[no-untyped-def]
-    return cos_sin(scene.leg.state.theta)[0]
+    return cos_sin(scene.leg.state.crank_angle)[0]
 
 
 @inline_llvm
@@ -207,7 +207,7 @@ those of the published one, see `envs.manual_bodies.LegPage.scaling`."""
 ENTRIES = (
     Entry("sin(crank angle)", "crank", "-", _sine, PLAIN),
     Entry("cos(crank angle)", "crank", "-", _cosine, PLAIN),
-    Entry(TRUE_RATE, "crank", "rad/s", lambda s: s.leg.state.theta_rate, IN_RANGE[0]),
+    Entry(TRUE_RATE, "crank", "rad/s", lambda s: s.leg.state.crank_angle_rate, IN_RANGE[0]),
     *(Entry(name, "gait", _UNITS[k], _gait(k), IN_RANGE[k]) for k, name in enumerate(_PARAMETERS)),
     *(
         Entry(f"rate of {name}", "gait", "rad/s^2" if k == 0 else "rad/s", _gait_rate(k), IN_RATE[k])

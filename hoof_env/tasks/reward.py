@@ -107,7 +107,7 @@ def support(step, weight):  # type: ignore[no-untyped-def]
     commanded = maximum(step.commanded_progress, 1e-9)
     pace = minimum(maximum(step.progress / commanded, -1.0), 1.0)
     # Without a commanded speed the ratio above is 0: then only the crank counts.
-    pace = minimum(where(commanded < np.inf, pace, 1.0), step.leg.state.theta_rate * (1.0 / STEPPING))
+    pace = minimum(where(commanded < np.inf, pace, 1.0), step.leg.state.crank_angle_rate * (1.0 / STEPPING))
     # The minimum, because two negative factors would reward too much bearing in backward motion.
     return weight * minimum(pace * step.borne, absolute(pace) * step.borne)
 

@@ -104,7 +104,7 @@ def test_the_time_to_a_return_is_that_of_the_first_crossing(tmp_path):
 
 
 def test_the_cost_of_transport_is_that_of_the_whole():
-    one = {"distance_m": 10.0, "drive_work_j": 800.0, "mean_grf_n": 400.0, "weight_share": 0.5,
+    one = {"distance_m": 10.0, "positive_work_j": 800.0, "mean_normal_n": 400.0, "weight_share": 0.5,
            "return": 1.0, "cost_of_transport": 0.1}  # fmt: skip
     back = {**one, "distance_m": -5.0, "cost_of_transport": np.inf}
     assert mean_figures([one])["cost_of_transport"] == pytest.approx(0.1)
@@ -273,9 +273,9 @@ def test_one_seed_has_no_interval():
 
 def test_the_interval_of_the_cost_of_transport_is_around_the_whole():
     """Far and cheap, or short and dear: the mean of the costs of episodes is far from the cost of all."""
-    far = {"distance_m": 90.0, "drive_work_j": 90.0, "mean_grf_n": 1.0, "weight_share": 1.0,
+    far = {"distance_m": 90.0, "positive_work_j": 90.0, "mean_normal_n": 1.0, "weight_share": 1.0,
            "return": 1.0, "cost_of_transport": 1.0}  # fmt: skip
-    short = {**far, "distance_m": 1.0, "drive_work_j": 10.0, "cost_of_transport": 10.0}
+    short = {**far, "distance_m": 1.0, "positive_work_j": 10.0, "cost_of_transport": 10.0}
     episodes = [far, short] * 20
     cost = over_episodes(episodes)["cost_of_transport"]
     assert cost.low < cost.mean == mean_figures(episodes)["cost_of_transport"] < cost.high < 2
@@ -284,7 +284,7 @@ def test_the_interval_of_the_cost_of_transport_is_around_the_whole():
     assert back["return"].low == 1.0
 
 
-RUN = {"speed_m_s": 2.0, "peak_grf_n": 4.0, "stance_peak_n": 3.0, "cost_of_transport": 1.0,
+RUN = {"speed_m_s": 2.0, "highest_grf_n": 4.0, "stance_peak_n": 3.0, "cost_of_transport": 1.0,
        "loading_rate_n_s": 1.0, "weight_share": 0.7}  # fmt: skip
 BETTER = RUN | {"speed_m_s": 2.5} | {key: 0.9 * part * RUN[key] for key, part in LOWER.items()}
 
@@ -372,7 +372,7 @@ def pretend_results(folder, done):
 def page(done, tmp_path, monkeypatch):
     pretend_results(tmp_path / "runs", done)
     point = {key: Interval(x, x, x) for key, x in (
-        ("return", 6.0), ("speed_m_s", 2.0), ("peak_grf_n", 4e3), ("stance_peak_n", 3500.0),
+        ("return", 6.0), ("speed_m_s", 2.0), ("highest_grf_n", 4e3), ("stance_peak_n", 3500.0),
         ("loading_rate_n_s", 1e5), ("cost_of_transport", 1.3), ("weight_share", 0.7))}  # fmt: skip
     known = {name: Scored(name, point) for name in ("run", "walk", "open-loop")}
     monkeypatch.setattr(baselines_report, "references", lambda env_id: known)

@@ -283,7 +283,7 @@ class Toy:
         one = np.ones(self.num_envs)
         measured = {"x": SPEED * DT * self.k * one}
         for leg, name in enumerate(self.legs):
-            measured[f"{name}_theta"] = 2 * np.pi / 0.8 * DT * self.k * one
+            measured[f"{name}_crank_angle"] = 2 * np.pi / 0.8 * DT * self.k * one
             for place, of in enumerate(self.names):
                 measured[f"{name}_{of}"] = self.sum_of(place, leg // 2) * one
         failed = np.isin(np.arange(self.num_envs), self.fallen)

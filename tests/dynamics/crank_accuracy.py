@@ -77,7 +77,7 @@ class Case:
                                  num_envs=len(PHASES))  # fmt: skip
         engine.reset(self.gait, PHASES[None])
         results = engine.advance(steps=round(DURATION / step), account=False)
-        return np.where(results == 0, np.abs(engine.state["theta"][0] - ends), np.inf)
+        return np.where(results == 0, np.abs(engine.state["crank_angle"][0] - ends), np.inf)
 
 
 CASES = tuple(Case(preset, ground) for preset in PRESETS for ground in GROUNDS)

@@ -127,7 +127,7 @@ def test_a_constant_command_is_the_paper_s_crank():
     trace = new_trace(100)
     leg.advance(WALK.to_array(), trace)
     np.testing.assert_allclose(trace["time"], np.arange(1, 101) * 1e-3, rtol=1e-14)
-    np.testing.assert_allclose(trace["theta"], 2 * np.pi * trace["time"], rtol=1e-13)
+    np.testing.assert_allclose(trace["crank_angle"], 2 * np.pi * trace["time"], rtol=1e-13)
 
 
 def test_contact_changes_the_multipliers_and_never_the_motion():
@@ -198,8 +198,13 @@ def loaded(request):
     leg = ConstrainedLeg(geometry, Ground(restitution=0.3), height=GEOMETRY.hip_height - 0.05)
     row = leg.reset(gait, theta)[0]
     assert (normal(row) > 0) == (theta > 1)
-    frame = FrameMotion(row["phi"], row["phi_rate"], row["phi_acc"], position=(0.0, leg.trunk.height))
-    return leg, row, pose(geometry, theta, row["theta_rate"], 0.0, frame)
+    frame = FrameMotion(
+        row["swing_angle"],
+        row["swing_angle_rate"],
+        row["swing_angle_acceleration"],
+        position=(0.0, leg.trunk.height),
+    )
+    return leg, row, pose(geometry, theta, row["crank_angle_rate"], 0.0, frame)
 
 
 def test_every_body_obeys_newton_and_euler(loaded):

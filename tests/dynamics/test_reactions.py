@@ -36,13 +36,15 @@ def leg_motion(engine, i):
     limb, side = engine.limbs[i], engine.limbs[i].geometry.travel
     arm = np.exp(1j * s["pitch"]) * complex(*limb.hip)
     place = complex(r["x"], r["y"]) + arm
-    acc = complex(r["ax"], r["ay"]) + (1j * r["pitch_acc"] - r["pitch_rate"] ** 2) * arm
+    acc = complex(r["ax"], r["ay"]) + (1j * r["pitch_acceleration"] - r["pitch_rate"] ** 2) * arm
     frame = FrameMotion(
-        r["phi"][i] + side * s["pitch"], r["phi_rate"][i] + side * r["pitch_rate"],
-        r["phi_acc"][i] + side * r["pitch_acc"],
+        r["swing_angle"][i] + side * s["pitch"], r["swing_angle_rate"][i] + side * r["pitch_rate"],
+        r["swing_angle_acceleration"][i] + side * r["pitch_acceleration"],
         position=(place.real, place.imag), acceleration=(acc.real, acc.imag),
     )  # fmt: skip
-    motion = pose(limb.geometry, s["theta"][i], s["theta_rate"][i], r["theta_acc"][i], frame)
+    motion = pose(
+        limb.geometry, s["crank_angle"][i], s["crank_angle_rate"][i], r["crank_angle_acceleration"][i], frame
+    )
     return motion, *(np.array([r[f"{p}_friction"][i], r[f"{p}_normal"][i]]) for p in ("toe", "heel"))
 
 
@@ -111,9 +113,13 @@ def test_forces_and_moments_at_the_hips_move_the_trunk():
         moment = (arms.conj() * (on_trunk @ [1, 1j])).imag.sum() - found.hip[:, 0].sum()
         # A rotor is not among the links: it turns with the frame and, geared, with the crank.
         motor, side = engine.limbs[0].drive, LEG.travel
-        turning = r["pitch_acc"] + side * r["phi_acc"] - side * motor.gear_ratio * r["theta_acc"]
+        turning = (
+            r["pitch_acceleration"]
+            + side * r["swing_angle_acceleration"]
+            - side * motor.gear_ratio * r["crank_angle_acceleration"]
+        )
         moment -= motor.rotor_inertia * turning.sum()
-        assert_close(moment, trunk.pitch_inertia * r["pitch_acc"], scale, 1e-8)
+        assert_close(moment, trunk.pitch_inertia * r["pitch_acceleration"], scale, 1e-8)
 
 
 def test_reactions_change_no_bit_of_the_motion_and_are_the_same_in_a_batch():

@@ -96,9 +96,9 @@ def test_a_servo_gets_the_substeps_that_it_needs(scheme, motor):
         """How far the crank is from the commanded speed after 0.3 s in the air [rad/s]."""
         trunk = Trunk(kind, mass=80.0, height=FAR, drag=0.0)
         engine = TrunkEngine(Limb(LEG, drive=motor), trunk, integrator=scheme, substeps=substeps)
-        engine.reset(WALK, 0.3, theta_rate=0.0)
+        engine.reset(WALK, 0.3, crank_angle_rate=0.0)
         failed = engine.advance(steps=300)[0]
-        return engine, np.inf if failed else abs(engine.state["theta_rate"][0, 0] - WALK.crank_speed)
+        return engine, np.inf if failed else abs(engine.state["crank_angle_rate"][0, 0] - WALK.crank_speed)
 
     for kind in TRUNKS:
         engine, error = left(kind=kind)
@@ -155,7 +155,7 @@ def stiff(scheme, substeps=None):
     way, most = [], 0.0
     for _ in range(30):
         assert not e.advance(steps=10).any()
-        way.append([e.report["y"][0], e.state["pitch"][0], *e.state["theta"][:, 0]])
+        way.append([e.report["y"][0], e.state["pitch"][0], *e.state["crank_angle"][:, 0]])
         most = max(most, e.report["toe_normal"].max())
     assert most > e.weight / 4
     return e, np.array(way)

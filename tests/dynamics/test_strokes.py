@@ -59,9 +59,9 @@ def drive(case):
         command[0] = value + wanted / QUICK.gain
         engine.advance(command)
         s, r = engine.state, engine.report
-        theta, low = s["theta"][0, 0], "toe" if r["toe_y"][0, 0] < r["heel_y"][0, 0] else "heel"
+        theta, low = s["crank_angle"][0, 0], "toe" if r["toe_y"][0, 0] < r["heel_y"][0, 0] else "heel"
         height, slide = r[f"{low}_y"][0, 0] - HIGH, r[f"{low}_slide"][0, 0]
-        rows.append([theta, height, slide, s["crank_speed_rate"][0, 0], r["phi_rate"][0, 0]])
+        rows.append([theta, height, slide, s["crank_speed_rate"][0, 0], r["swing_angle_rate"][0, 0]])
     rows = np.array(rows)[np.array(rows)[:, 0] > start + TURN]
     rows[:, 0] = (rows[:, 0] - case["stance_start_rad"]) % TURN
     return rows.T

@@ -94,7 +94,7 @@ def put_somewhere(engine, rng, depth):
         rows[name][:] = value[:, k]
         rows[f"{name}_rate"][:] = rng.normal(0, 3, (legs, n))
     motors = np.array([isinstance(limb.drive, Motor) for limb in engine.limbs])[:, None]
-    rows["theta_rate"][:] = np.where(motors, rng.normal(5, 4, (legs, n)), rows["crank_speed"])
+    rows["crank_angle_rate"][:] = np.where(motors, rng.normal(5, 4, (legs, n)), rows["crank_speed"])
     for point in ("toe", "heel"):
         rows[f"{point}_penetration"][:] = 1.0
         rows[f"{point}_inverse_approach_speed"][:] = 1 / rng.uniform(0.1, 1.5, (legs, n))
@@ -134,7 +134,9 @@ def oracle(engine, horse, e):
             at = complex(r[f"{name}_x"][leg, e], r[f"{name}_y"][leg, e])
             if horse.ground.depth(at, 0j)[0] <= give[leg, point, 0]:
                 approach[leg, point] = np.nan
-    return horse.at(place, velocity, s["theta"][:, e], s["theta_rate"][:, e], steady, approach, give)
+    return horse.at(
+        place, velocity, s["crank_angle"][:, e], s["crank_angle_rate"][:, e], steady, approach, give
+    )
 
 
 def assert_close(found, expected, scale, name, rtol=1e-9):
@@ -222,15 +224,15 @@ def check_instants(engine, horses):
         push = max(engine.weight, np.abs(now.hoof_force).max())
         turn = max(push, np.abs(now.crank_torque).max(), np.abs(now.hip_torque).max())
         quick = max(1.0, np.abs(now.theta_acc).max(), np.abs(now.phi_acc).max(), np.abs(now.trunk_acc).max())
-        fast = max(1.0, np.abs(s["theta_rate"][:, e]).max())
+        fast = max(1.0, np.abs(s["crank_angle_rate"][:, e]).max())
         for name, found, expected, scale in (
             ("hoof", hoof, now.hoof, 1.0),
             ("force", force, now.hoof_force, push),
-            ("trunk_acc", [r[k][e] for k in ("ax", "ay", "pitch_acc")], now.trunk_acc, quick),
-            ("theta_acc", r["theta_acc"][:, e], now.theta_acc, quick),
-            ("phi", r["phi"][:, e], now.phi, 1.0),
-            ("phi_rate", r["phi_rate"][:, e], now.phi_rate, fast),
-            ("phi_acc", r["phi_acc"][:, e], now.phi_acc, quick),
+            ("trunk_acc", [r[k][e] for k in ("ax", "ay", "pitch_acceleration")], now.trunk_acc, quick),
+            ("crank_angle_acceleration", r["crank_angle_acceleration"][:, e], now.theta_acc, quick),
+            ("swing_angle", r["swing_angle"][:, e], now.phi, 1.0),
+            ("swing_angle_rate", r["swing_angle_rate"][:, e], now.phi_rate, fast),
+            ("swing_angle_acceleration", r["swing_angle_acceleration"][:, e], now.phi_acc, quick),
             ("crank_torque", r["crank_torque"][:, e], now.crank_torque, turn),
             ("hip_torque", r["hip_torque"][:, e], now.hip_torque, turn),
             ("crank_power", r["crank_power"][:, e].sum(), now.power["crank"], turn * fast),

@@ -58,7 +58,7 @@ def test_the_energy_account_closes_at_the_order_of_the_scheme(scheme, kind, dept
         settings = {"sim_dt": 0.02 / steps, "integrator": scheme, "substeps": 1}
         engine = horse(SMOOTH, kind=kind, height=LOWEST - depth, drag=25.0, settings=settings)
         moves = {"vx": 1.0, "vy": -0.05, "pitch_rate": 0.1}
-        engine.reset(STRIDE, THETA, theta_rate=5.0, **dict(list(moves.items())[: TRUNKS.index(kind)]))
+        engine.reset(STRIDE, THETA, crank_angle_rate=5.0, **dict(list(moves.items())[: TRUNKS.index(kind)]))
         before = energy(engine)
         assert not engine.advance([8.0, 0.3, -0.2, 0.1], steps).any()
         gaps.append(abs(energy(engine) - before - drives_less_losses(engine))[0])
@@ -127,7 +127,7 @@ def test_at_rest_the_ground_carries_the_weight(scheme):
     engine.reset(GaitParameters(0.0, 0.0, 0.0, 0.0), THETA)  # nothing but viscous friction holds it along x
     assert not engine.advance(steps=8000).any()
     r = {name: row[..., 0] for name, row in engine.report.items()}
-    for name in ("vx", "vy", "pitch_rate", "ax", "ay", "pitch_acc"):
+    for name in ("vx", "vy", "pitch_rate", "ax", "ay", "pitch_acceleration"):
         assert abs(r[name]) < 1e-9
     assert r["toe_normal"].sum() + r["heel_normal"].sum() == pytest.approx(engine.weight, rel=1e-9)
     assert r["toe_friction"].sum() + r["heel_friction"].sum() == pytest.approx(0, abs=1e-9 * engine.weight)

@@ -26,7 +26,7 @@ def aloft(drive, n=1, kind="fixed", geometry=ROCKER, extra=()):
 
 
 @pytest.mark.parametrize("n", [1, 3, 9])
-@pytest.mark.parametrize("row", ["theta_rate", "swing_sin_rate"])
+@pytest.mark.parametrize("row", ["crank_angle_rate", "swing_sin_rate"])
 @pytest.mark.parametrize(
     ("limbs", "trunk"), [((Limb(LEG),), HANGING), (LIMBS, FREE)], ids=["leg", "two legs"]
 )
@@ -68,7 +68,7 @@ def test_a_crank_driven_past_its_end(kind, drive, n):
         assert len(results) < 100
     assert results[-1].tolist() == [Result.DEAD_POINT] + [Result.OK] * (n - 1)
     assert "a crank was driven to an angle at which its linkage does not close" in e.messages()[0]
-    assert END - 0.1 < e.state["theta"][0, 0] < END + 0.01
+    assert END - 0.1 < e.state["crank_angle"][0, 0] < END + 0.01
     assert same(e.state, before, 0)
     assert same(e.report, report, 0)  # of the last good state
     assert not same(e.state, before, 1)
@@ -83,7 +83,7 @@ def test_no_crank_passes_a_dead_point_unnoticed(calls):
     results = [int(engine.advance(steps=600 // calls)[0]) for _ in range(calls)]
     assert Result.DEAD_POINT in results
     assert np.isfinite(engine.account["crank_work"]).all()
-    assert engine.state["theta"][0, 0] < 6.0
+    assert engine.state["crank_angle"][0, 0] < 6.0
 
 
 def test_a_crank_that_rocks_keeps_its_energy_account():
@@ -94,9 +94,9 @@ def test_a_crank_that_rocks_keeps_its_energy_account():
     assert energy(e) - before == pytest.approx(drives_less_losses(e), abs=1e-4 * tally_of(e).kinetic[0])
     r, toe = (
         {name: row[..., 0] for name, row in e.report.items()},
-        functions(ROCKER, e.state["theta"][0])[0][0],
+        functions(ROCKER, e.state["crank_angle"][0])[0][0],
     )
-    turn = np.exp(1j * (e.state["pitch"][0] + ROCKER.travel * r["phi"][0]))
+    turn = np.exp(1j * (e.state["pitch"][0] + ROCKER.travel * r["swing_angle"][0]))
     expected = complex(r["x"], r["y"]) + turn * complex(toe[0], toe[1])
     assert complex(r["toe_x"][0], r["toe_y"][0]) == pytest.approx(expected, abs=1e-10)
 
@@ -166,13 +166,13 @@ def test_the_record_of_a_run():
     command = [5.0, 0.3, 0.1, 0.0]
     record = one.run(command, 25, every=10)
     assert record["time"][:, 0] == pytest.approx([0.0, 0.01, 0.02, 0.025])
-    assert record["theta"].shape == (4, 1, 2)
+    assert record["crank_angle"].shape == (4, 1, 2)
     assert set(record) == {*one.state, *one.report, "result"}
     assert not record["result"].any()
     other.advance(command, 20)
     np.testing.assert_array_equal(record["toe_x"][2], other.report["toe_x"])
-    np.testing.assert_array_equal(record["theta"][2], other.state["theta"])
-    assert (record["theta"][0, 0] == [0.0, 1.0]).all()
+    np.testing.assert_array_equal(record["crank_angle"][2], other.state["crank_angle"])
+    assert (record["crank_angle"][0, 0] == [0.0, 1.0]).all()
 
 
 def test_a_run_that_fails_ends_its_record():
@@ -181,7 +181,7 @@ def test_a_run_that_fails_ends_its_record():
     record = e.run(steps=1000, every=20)
     assert record["result"].tolist() == [Result.DEAD_POINT, Result.OK]
     assert 2 < len(record["time"]) < 20
-    assert np.isfinite(record["theta"]).all()
+    assert np.isfinite(record["crank_angle"]).all()
     with pytest.raises(ParameterError, match="every: expected a whole number, 1 or more, got 0"):
         e.run(steps=10, every=0)
 
@@ -198,7 +198,7 @@ def test_a_state_cannot_point_outside_the_tables():
 def test_one_gait_and_one_command_are_for_all_legs():
     one, each = (TrunkEngine(LIMBS, FREE, num_envs=3) for _ in range(2))
     one.reset(RUN, 0.5)
-    each.reset([RUN, RUN], [[0.5] * 3] * 2, theta_rate=RUN.crank_speed, envs=[True] * 3)
+    each.reset([RUN, RUN], [[0.5] * 3] * 2, crank_angle_rate=RUN.crank_speed, envs=[True] * 3)
     one.advance(WALK.to_array(), 30)
     each.advance(np.tile(WALK.to_array()[:, None], (2, 1, 3)), 30)
     assert same(one.state, each.state)

@@ -29,13 +29,13 @@ def test_loops_stay_closed(geometry, kind, drive):
     for command in np.random.default_rng(2).uniform(LOW, HIGH, (30, 4)):
         assert not engine.advance(command, 1000).any()
         if kind == "free":  # caught and thrown up again
-            engine.reset(RUN, engine.state["theta"], pitch=0.3, vy=2.0)
+            engine.reset(RUN, engine.state["crank_angle"], pitch=0.3, vy=2.0)
             engine.advance(command, 3)
         r, s = engine.report, engine.state
         for i, hip in enumerate(hips):
             o = complex(r["x"][0], r["y"][0]) + np.exp(1j * s["pitch"][0]) * complex(*hip)
-            turn = r["phi"][i, 0] + geometry.travel * s["pitch"][0]
-            at = pose(geometry, s["theta"][i, 0], frame=FrameMotion(turn, position=(o.real, o.imag)))
+            turn = r["swing_angle"][i, 0] + geometry.travel * s["pitch"][0]
+            at = pose(geometry, s["crank_angle"][i, 0], frame=FrameMotion(turn, position=(o.real, o.imag)))
             links = [np.hypot(*(at.point(body.head) - at.point(body.tail))) for body in BODIES]
             np.testing.assert_allclose(links, geometry.body_lengths, rtol=0, atol=1e-12)
             toe, heel = (np.array([r[f"{p}_x"][i, 0], r[f"{p}_y"][i, 0]]) for p in ("toe", "heel"))
@@ -43,4 +43,4 @@ def test_loops_stay_closed(geometry, kind, drive):
             np.testing.assert_allclose(heel, at.point(geometry.heel), rtol=0, atol=1e-12 + 1e-14 * abs(o))
             assert np.hypot(*(toe - heel)) == pytest.approx(sole, rel=0, abs=1e-12)
     if kind == "fixed":
-        assert s["theta"].min() > 100
+        assert s["crank_angle"].min() > 100

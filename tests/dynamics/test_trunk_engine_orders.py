@@ -48,11 +48,11 @@ def end(kind, drives, scheme, steps):
     engine = TrunkEngine(limbs, trunk, FAR, sim_dt=SECONDS / steps, integrator=scheme, substeps=1)
     place, rates = MOVES[kind]
     start = dict(zip(("x", "y", "pitch", "vx", "vy", "pitch_rate"), place + rates, strict=True))
-    engine.reset(GAITS, THETA, theta_rate=spin(drives), **start)
+    engine.reset(GAITS, THETA, crank_angle_rate=spin(drives), **start)
     assert not engine.advance(steps=steps).any()
     r, s = engine.report, engine.state
     trunk = [r["x"], r["y"], s["pitch"], r["vx"], r["vy"], r["pitch_rate"]]
-    return np.concatenate([*trunk, s["theta"][:, 0], s["theta_rate"][:, 0]])
+    return np.concatenate([*trunk, s["crank_angle"][:, 0], s["crank_angle_rate"][:, 0]])
 
 
 @pytest.mark.parametrize(("kind", "drives"), CASES)
@@ -75,7 +75,7 @@ def test_what_is_prescribed_is_exact(scheme):
     engine.reset(GAITS, THETA)
     engine.advance(steps=100)
     speeds = np.array([gait.crank_speed for gait in GAITS])
-    assert engine.state["theta"][:, 0] == pytest.approx(THETA + 0.5 * speeds, rel=1e-14)
+    assert engine.state["crank_angle"][:, 0] == pytest.approx(THETA + 0.5 * speeds, rel=1e-14)
 
 
 def test_all_schemes_move_the_filters_alike():
@@ -87,7 +87,7 @@ def test_all_schemes_move_the_filters_alike():
         engine.reset(GaitParameters(3.0, 0.5, 0.0, 0.0), y=3.0)
         engine.advance([g.to_array() for g in GAITS], 150)
         state = engine.state
-        ends.append([state[k] for k in ("theta", "crank_speed", "swing_sin", "swing_cos_rate")])
+        ends.append([state[k] for k in ("crank_angle", "crank_speed", "swing_sin", "swing_cos_rate")])
     for other in ends[1:]:
         np.testing.assert_array_equal(ends[0], other)
 
@@ -95,11 +95,13 @@ def test_all_schemes_move_the_filters_alike():
 def test_semi_implicit_euler_moves_with_the_rates_of_the_end():
     limbs, trunk = horse("free", "motor")
     engine = TrunkEngine(limbs, trunk, FAR, sim_dt=1e-3, integrator="semi_implicit_euler", substeps=1)
-    engine.reset(GAITS, THETA, y=3.0, vx=1.0, pitch_rate=0.5, theta_rate=RATE)
+    engine.reset(GAITS, THETA, y=3.0, vx=1.0, pitch_rate=0.5, crank_angle_rate=RATE)
     before = engine.state
     engine.advance(steps=1)
     after = engine.state
-    assert (np.abs(after["theta_rate"] - before["theta_rate"]) > 1e-3).all()
-    np.testing.assert_allclose(after["theta"], before["theta"] + 1e-3 * after["theta_rate"], rtol=1e-15)
+    assert (np.abs(after["crank_angle_rate"] - before["crank_angle_rate"]) > 1e-3).all()
+    np.testing.assert_allclose(
+        after["crank_angle"], before["crank_angle"] + 1e-3 * after["crank_angle_rate"], rtol=1e-15
+    )
     speed = after["momentum_x"] / engine.total_mass
     np.testing.assert_allclose(after["centre_x"], before["centre_x"] + 1e-3 * speed, rtol=1e-14)

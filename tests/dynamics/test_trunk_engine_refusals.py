@@ -61,14 +61,22 @@ def test_an_engine_that_cannot_be(changes, message):
         ("free", {"gaits": [RUN] * 3}, "gaits: expected one or 2, got 3"),
         ("free", {"gaits": [RUN, "walk"]}, "gaits: expected GaitParameters, one or more, got .*'walk'"),
         ("free", {"gaits": RUN.to_array()}, "gaits: expected shape .2, 4, 3., got .4,."),
-        ("free", {"theta": np.nan}, "theta: expected finite numbers, got nan"),
-        ("free", {"theta": [0.0, np.inf]}, "theta: expected finite numbers, got .*inf"),
-        ("free", {"theta": None}, "theta: expected finite numbers, got None"),
-        ("free", {"theta": "front"}, "theta: expected finite numbers, got 'front'"),
-        ("free", {"theta": [0.0] * 3}, r"theta: expected numbers that fit shape \(2, 3\), got \[0.0"),
-        ("free", {"theta": np.zeros((2, 2))}, r"theta: expected numbers that fit shape \(2, 3\)"),
-        ("free", {"theta_rate": [9.0, WALK.crank_speed + 1]}, "theta_rate: leg 1 is prescribed to turn at"),
-        ("free", {"theta_rate": [np.nan, 1.0]}, "theta_rate: expected finite numbers"),
+        ("free", {"crank_angle": np.nan}, "crank_angle: expected finite numbers, got nan"),
+        ("free", {"crank_angle": [0.0, np.inf]}, "crank_angle: expected finite numbers, got .*inf"),
+        ("free", {"crank_angle": None}, "crank_angle: expected finite numbers, got None"),
+        ("free", {"crank_angle": "front"}, "crank_angle: expected finite numbers, got 'front'"),
+        (
+            "free",
+            {"crank_angle": [0.0] * 3},
+            r"crank_angle: expected numbers that fit shape \(2, 3\), got \[0.0",
+        ),
+        ("free", {"crank_angle": np.zeros((2, 2))}, r"crank_angle: expected numbers that fit shape \(2, 3\)"),
+        (
+            "free",
+            {"crank_angle_rate": [9.0, WALK.crank_speed + 1]},
+            "crank_angle_rate: leg 1 is prescribed to turn at",
+        ),
+        ("free", {"crank_angle_rate": [np.nan, 1.0]}, "crank_angle_rate: expected finite numbers"),
         ("free", {"x": np.inf}, "x: expected finite numbers, got inf"),
         ("free", {"x": [0.0, 1.0]}, r"x: expected numbers that fit shape \(3,\), got \[0.0, 1.0\]"),
         ("free", {"y": np.nan}, "y: expected finite numbers, got nan"),
@@ -83,8 +91,8 @@ def test_an_engine_that_cannot_be(changes, message):
         ("fixed", {"vx": 0.1}, "vx: expected 0 of a fixed trunk, got"),
         ("fixed", {"y": 1.7}, "y: a fixed trunk is at 1.6 m, got"),
         ("free", {"vx": 1e200}, r"vx: expected numbers within \+-1e\+09, got 1e\+200"),
-        ("free", {"theta_rate": [1e200, 1.0]}, r"theta_rate: expected numbers within \+-1e\+09"),
-        ("free", {"theta": 1e10}, r"theta: expected numbers within \+-1e\+09"),
+        ("free", {"crank_angle_rate": [1e200, 1.0]}, r"crank_angle_rate: expected numbers within \+-1e\+09"),
+        ("free", {"crank_angle": 1e10}, r"crank_angle: expected numbers within \+-1e\+09"),
         ("free", {"x": -1e10}, r"x: expected numbers within \+-1e\+09"),
         ("free", {"y": 1e300}, r"y: expected numbers within \+-1e\+09"),
         ("free", {"pitch": 1e300}, r"pitch: expected numbers within \+-1e\+09"),
@@ -118,7 +126,7 @@ def test_a_contact_law_that_lanes_cannot_run_is_refused_with_its_operation():
 def test_no_start_where_the_links_have_no_place():
     rocker = LEG.replace(lengths={"CF": 0.8 * LEG.lengths["CF"]}, full_turn=False)
     e = TrunkEngine(Limb(rocker), Trunk("fixed"), num_envs=2)
-    with pytest.raises(ParameterError, match="theta: the links of leg 0 have no place at some of"):
+    with pytest.raises(ParameterError, match="crank_angle: the links of leg 0 have no place at some of"):
         e.reset(WALK, np.array([[0.0, np.pi]]))
 
 
@@ -150,7 +158,7 @@ def test_before_a_reset_it_is_nowhere():
             move()
     assert e.messages() == ["this environment was never reset"] * 2
     e.reset([RUN, WALK], envs=[])
-    assert np.isnan(e.state["theta"]).all()
+    assert np.isnan(e.state["crank_angle"]).all()
     e.reset([RUN, WALK], envs=[1])
     assert e.advance(steps=10).tolist() == [Result.NOT_FINITE, Result.OK]
     assert e.messages()[1] == "ok"

@@ -124,7 +124,7 @@ def test_strides_are_those_of_the_record(kind, legs):
     slid = (toe * record["toe_slide"] + heel * record["heel_slide"]) / np.where(down, load, np.inf)
     assert total["travel"] == pytest.approx(-1e-3 * slid.sum(0), rel=1e-10)
     for leg in range(legs):
-        history = load[:, leg], record["theta"][:, leg], force[:, leg]
+        history = load[:, leg], record["crank_angle"][:, leg], force[:, leg]
         peaks, rates = peaks_and_rates(*history, 0.05 * made.weight / legs)
         assert total["stances"][leg] == len(peaks) > 2
         assert total["peak_grf_increase"][leg] == pytest.approx(sum(peaks), rel=1e-12)

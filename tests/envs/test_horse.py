@@ -59,7 +59,7 @@ def test_the_command_is_the_reference_with_the_offset_and_the_pull(seed):
     env, rng = make(HORSE, target_speed=1.85), np.random.default_rng(seed)
     gait, action = random_gaits(1, seed)[0], rng.uniform(-1, 1, 16).astype(np.float32)
     env.reset(seed=seed, options={"gait": gait})
-    theta = env.engine.state["theta"][:, 0]
+    theta = env.engine.state["crank_angle"][:, 0]
     measured = env.step(action)[4]["measured"]
     expected = commands(gait, theta, FOLLOWED * action.astype(float))
     names = ("crank_speed", "swing_offset", "swing_sin", "swing_cos", "swing_sin_2", "swing_cos_2")
@@ -92,7 +92,7 @@ def test_zeros_from_the_start_are_the_reference_gait():
     env, gait = make(HORSE, target_speed=1.85), reference_gaits(np.array([1.85]))[0]
     env.reset(seed=0)
     for _ in range(20):
-        theta = env.engine.state["theta"][:, 0]
+        theta = env.engine.state["crank_angle"][:, 0]
         measured = env.step(np.zeros(16, np.float32))[4]["measured"]
         expected = commands(gait, theta, np.zeros(16))[:, 0]
         found = [measured[f"{leg}_command_crank_speed"] for leg in LEGS]
@@ -112,10 +112,10 @@ def test_the_motors_of_a_horse_are_observed_beside_what_they_are_asked_for():
         for one in (plain, env):
             one.step(action)
         state = plain.engine.state
-        np.testing.assert_array_equal(state["theta_rate"], state["crank_speed"])
+        np.testing.assert_array_equal(state["crank_angle_rate"], state["crank_speed"])
         raw, state = env.raw_observation(), env.engine.state
-        np.testing.assert_array_equal([raw[name] for name in names], state["theta_rate"][:, 0])
-        apart = max(apart, np.abs(state["theta_rate"] - state["crank_speed"]).max())
+        np.testing.assert_array_equal([raw[name] for name in names], state["crank_angle_rate"][:, 0])
+        apart = max(apart, np.abs(state["crank_angle_rate"] - state["crank_speed"]).max())
     assert apart > 0.01
 
 
@@ -151,7 +151,7 @@ def test_cranks_that_are_out_of_step_come_back():
 
     def ahead():
         """Of the other legs' mean phase [rad], by the gait that the kernels follow."""
-        theta, gait = env.engine.state["theta"][:, 0], env.batch.episode_rows.gait[:, 0]
+        theta, gait = env.engine.state["crank_angle"][:, 0], env.batch.episode_rows.gait[:, 0]
         found = []
         for i in range(4):
             first = 2 + 7 * (i // 2)
@@ -407,7 +407,7 @@ def test_sums_of_the_legs_are_the_summary():
     figures = info["episode_summary"]
     assert figures["stances"] == stances > 3
     assert figures["slip_m"] == pytest.approx(slip / stances)
-    assert figures["drive_work_j"] == pytest.approx(work)
+    assert figures["positive_work_j"] == pytest.approx(work)
 
 
 def test_stable_baselines_takes_it():

@@ -37,9 +37,9 @@ def test_reset_options_set_the_start():
     gait = {"crank_speed": 5.0, "swing_offset": 0.5, "swing_sin": -0.1, "swing_cos": 0.1}
     _, info = env.reset(seed=0, options={"gait": gait, "crank_angle": 1.0, "speed": 0.5, "height": 2.0})
     row = {name: values.item() for name, values in env.unwrapped.record().items()}
-    assert (row["theta"], row["y"], info["gait"]["swing_offset"]) == (1.0, pytest.approx(2.0), 0.5)
+    assert (row["crank_angle"], row["y"], info["gait"]["swing_offset"]) == (1.0, pytest.approx(2.0), 0.5)
     assert row["vx"] == pytest.approx(0.5)
-    assert row["theta_rate"] == 5.0
+    assert row["crank_angle_rate"] == 5.0
     assert {name: info[name] for name in ("crank_angle", "speed", "height", "x")} == {
         "crank_angle": 1.0, "speed": 0.5, "height": 2.0, "x": 0.0
     }  # fmt: skip
@@ -72,7 +72,7 @@ def speed_and_peak(gait, **kwargs):
     info = {}
     while "episode_summary" not in info:
         info = env.step(np.zeros(4, np.float32))[4]
-    return info["episode_summary"]["speed_m_s"], info["episode_summary"]["peak_grf_n"]
+    return info["episode_summary"]["speed_m_s"], info["episode_summary"]["highest_grf_n"]
 
 
 @pytest.mark.parametrize("gait", [MIDDLE, [2 * np.pi, 0.7, 0.0, 0.0]], ids=["middle", "paper's"])

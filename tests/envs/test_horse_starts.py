@@ -45,7 +45,7 @@ def test_an_episode_starts_as_the_reference_gait_goes_on(size):
     measured, body = infos["measured"], envs.unwrapped.batch.body
     gait = reference_gaits(np.array([SPEEDS[0]]))
     angles = crank_angles(np.tile(gait, (1000, 1)), np.arange(1000) / 1000, np.zeros((4, 1000)))[2]
-    phase = np.interp(measured["left_hind_theta"] % (2 * np.pi), *sorted_pairs(angles))
+    phase = np.interp(measured["left_hind_crank_angle"] % (2 * np.pi), *sorted_pairs(angles))
     motion = trunk_motion(np.full(64, SPEEDS[0]), phase)
     off = {"y": measured["y"] / body.height - motion["y"], "pitch": measured["pitch"] - motion["pitch"]}
     assert np.median(np.abs(off["y"])) < 0.01
@@ -149,7 +149,7 @@ def test_starts_are_as_far_from_the_gait_as_they_should():
     gaits = np.tile(reference_gaits(np.array([SPEEDS[0]])), (n, 1))
     far = 1e-3
     ahead, here, behind = (crank_angles(gaits, np.full(n, phase), np.full((4, n), d)) for d in (far, 0, -far))
-    turned = np.array([infos["measured"][f"{leg}_theta"] for leg in LEGS])
+    turned = np.array([infos["measured"][f"{leg}_crank_angle"] for leg in LEGS])
     off = {
         SPEED_SPREAD: infos["speed"] / (SPEEDS[0] * motion["vx"]) - 1,
         PITCH_SPREAD: infos["pitch"] - motion["pitch"],

@@ -21,7 +21,8 @@ LEG, RAIL, FIXED = "hoof_env/HorseLeg-v0", "hoof_env/HorseLegRail-v0", "hoof_env
 PUBLISHED = hoof_env.load_geometry()
 GROUND = load_ground("identified")
 POWERS = {
-    "x": 1.0, "y": 1.0, "vx": 0.5, "vy": 0.5, "theta": 0.0, "crank_speed": -0.5, "crank_speed_rate": -1.0,
+    "x": 1.0, "y": 1.0, "vx": 0.5, "vy": 0.5, "crank_angle": 0.0, "crank_speed": -0.5,
+    "crank_speed_rate": -1.0,
     "swing_offset": 0.0, "swing_sin": 0.0, "swing_cos": 0.0, "swing_offset_rate": -0.5,
     "swing_sin_rate": -0.5, "swing_cos_rate": -0.5, "toe_penetration": 1.0, "load": 3.0, "running_peak": 3.0,
 }  # fmt: skip

@@ -179,7 +179,8 @@ def test_observations_are_scaled_as_the_table_says(page):
             "rate of crank speed": now["crank_speed_rate"], "rate of swing offset": now["swing_offset_rate"],
             "rate of swing sine coefficient": now["swing_sin_rate"],
             "rate of swing cosine coefficient": now["swing_cos_rate"],
-            "sin(crank angle)": math.sin(now["theta"]), "cos(crank angle)": math.cos(now["theta"]),
+            "sin(crank angle)": math.sin(now["crank_angle"]),
+            "cos(crank angle)": math.cos(now["crank_angle"]),
             "bearing allowance": allowance, "running peak force": measured["running_peak"],
             "steepest rise of the force": measured["steepest_rise"],
         }  # fmt: skip

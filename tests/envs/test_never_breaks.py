@@ -132,7 +132,7 @@ def test_impulse_over_a_stride_is_the_change_of_momentum(name):
         env.step(np.zeros(4, np.float32))
         records.append(env.record())
     trace = together(records)
-    turns = trace["theta"] / (2 * np.pi)
+    turns = trace["crank_angle"] / (2 * np.pi)
     first, last = (int(np.searchsorted(turns, turns[0] + turn)) for turn in (1, 2))
     stride = {key: values[first : last + 1] for key, values in trace.items()}
     change = {axis: np.ptp(stride[f"momentum_{axis}"][[0, -1]]) for axis in "xy"}
@@ -179,12 +179,12 @@ def test_a_record_is_what_the_step_did():
     env.reset(seed=1)
     env.record()
     for taken in actions(0, 200):
-        before = env.engine.state["theta"].item()
+        before = env.engine.state["crank_angle"].item()
         _, _, terminated, _, info = env.step(taken)
         trace = together([env.record()])
         work = np.sum(np.maximum(trace["crank_power"], 0) + np.maximum(trace["hip_power"], 0)) * 1e-3
         charge = env.batch.weights["energy"] * work / 1000
         assert info["reward_energy"] == pytest.approx(-charge, rel=1e-9, abs=1e-15)
-        assert trace["theta"][-1] == env.engine.state["theta"].item() >= before
+        assert trace["crank_angle"][-1] == env.engine.state["crank_angle"].item() >= before
         if terminated:
             break

@@ -220,7 +220,7 @@ def test_a_prescribed_crank_turns_at_the_filters_speed_and_is_observed_once():
     assert TRUE_RATE not in env.observation_names
     for action in actions(0, 50):
         env.step(action)
-        assert env.engine.state["theta_rate"].item() == env.engine.state["crank_speed"].item()
+        assert env.engine.state["crank_angle_rate"].item() == env.engine.state["crank_speed"].item()
 
 
 def test_the_crank_of_a_motor_is_observed_beside_what_it_is_asked_for():
@@ -232,7 +232,7 @@ def test_the_crank_of_a_motor_is_observed_beside_what_it_is_asked_for():
     apart = []
     for _ in range(100):
         seen, *_ = env.step(ZERO)
-        now = env.record()["theta_rate"].ravel()[-1]
+        now = env.record()["crank_angle_rate"].ravel()[-1]
         assert env.raw_observation()[TRUE_RATE] == now
         assert seen[place] == pytest.approx(
             np.clip((now - MIDDLE[0]) / (HIGH[0] - MIDDLE[0]), -1, 1), abs=1e-6

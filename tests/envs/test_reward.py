@@ -36,7 +36,7 @@ def stances(trace, threshold):
     """Peaks and loading rates of all stances, independently of the account: split where the load ends or
     after a turn; a rate is the steepest rise of the normal force among the substeps that raise the peak."""
     peaks, rates, opened, before = [], [], None, 0.0
-    for normal, theta, grf in zip(trace["normal"], trace["theta"], trace["grf"], strict=True):
+    for normal, theta, grf in zip(trace["normal"], trace["crank_angle"], trace["grf"], strict=True):
         if normal <= threshold:
             opened = None
         elif opened is None or theta - opened >= 2 * np.pi:
@@ -113,7 +113,7 @@ def test_terms_are_what_they_say_of_the_substeps(name, trunk):
     else:
         progress = np.diff(ends_of(trace["x"]), prepend=0.0)
     commanded = 2.5 * DT
-    pace = np.minimum(np.clip(progress / commanded, -1, 1), ends_of(trace["theta_rate"]) / STEPPING)
+    pace = np.minimum(np.clip(progress / commanded, -1, 1), ends_of(trace["crank_angle_rate"]) / STEPPING)
     bore = borne(impulses_of(trace, env.unwrapped.weight))
     expected = {
         "reward_progress": WEIGHTS["progress"] * np.minimum(progress, commanded),
@@ -128,7 +128,7 @@ def test_bearing_without_a_commanded_speed_pays_at_any():
     """But only a leg whose crank turns."""
     env = gym.make("hoof_env/HorseLegRail-v0", episode_seconds=4.0, reward_weights={"support": 2.0})
     infos, trace = rollout(env, make_policy("run", env), 4)
-    pace = np.minimum(1.0, ends_of(trace["theta_rate"]) / STEPPING)
+    pace = np.minimum(1.0, ends_of(trace["crank_angle_rate"]) / STEPPING)
     expected = pace * borne(impulses_of(trace, env.unwrapped.weight))
     found = [info["reward_support"] for info in infos]
     np.testing.assert_allclose(found, 2.0 * expected, rtol=1e-9, atol=1e-12)
@@ -202,8 +202,8 @@ def test_summary_agrees_with_the_substeps():
     infos, trace = rollout(env, make_policy("run", env), 1)
     summary = infos[-1]["episode_summary"]
     assert summary["seconds"] == pytest.approx(10.0)
-    assert summary["mean_grf_n"] == pytest.approx(trace["normal"].mean())
-    assert summary["peak_grf_n"] == pytest.approx(trace["grf"].max(), rel=1e-12)
+    assert summary["mean_normal_n"] == pytest.approx(trace["normal"].mean())
+    assert summary["highest_grf_n"] == pytest.approx(trace["grf"].max(), rel=1e-12)
     peaks, rates = stances(trace, 0.05 * env.unwrapped.weight)
     assert summary["stances"] == len(peaks)
     assert summary["stance_peak_sum_n"] == pytest.approx(sum(peaks), rel=1e-9)
@@ -211,4 +211,4 @@ def test_summary_agrees_with_the_substeps():
     assert summary["duty_factor"] == pytest.approx((trace["normal"] > 0).mean())
     assert summary["speed_m_s"] == pytest.approx(trace["x"][-1] / 10)
     work = summary["cost_of_transport"] * env.unwrapped.weight * summary["distance_m"]
-    assert work == pytest.approx(summary["drive_work_j"])
+    assert work == pytest.approx(summary["positive_work_j"])

@@ -40,7 +40,7 @@ class TrunkLegs:
         r = {name: value[..., 0] for name, value in self.engine.report.items()}
         body = np.array([r["x"], r["y"], s["pitch"], r["vx"], r["vy"], r["pitch_rate"]])
         return (
-            s["time"], s["theta"], s["theta_rate"], body, r["crank_torque"], r["hip_torque"],
+            s["time"], s["crank_angle"], s["crank_angle_rate"], body, r["crank_torque"], r["hip_torque"],
             self.engine.reactions().joints[..., 0],
             max(self._gap(i, s, r) for i in range(len(self.limbs))),
         )  # fmt: skip
@@ -49,8 +49,10 @@ class TrunkLegs:
         """From where the engine has toe and heel to where the closed linkage has them [m]."""
         limb = self.limbs[i]
         at = complex(r["x"], r["y"]) + complex(*limb.hip) * np.exp(1j * s["pitch"])
-        frame = FrameMotion(phi=r["phi"][i] + limb.geometry.travel * s["pitch"], position=(at.real, at.imag))
-        closed = pose(limb.geometry, s["theta"][i], frame=frame)
+        frame = FrameMotion(
+            phi=r["swing_angle"][i] + limb.geometry.travel * s["pitch"], position=(at.real, at.imag)
+        )
+        closed = pose(limb.geometry, s["crank_angle"][i], frame=frame)
         names = (limb.geometry.toe, limb.geometry.heel)
         return max(
             float(np.hypot(*(closed.point(name) - (r[f"{point}_x"][i], r[f"{point}_y"][i]))))

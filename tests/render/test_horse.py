@@ -48,7 +48,7 @@ def test_hips_stand_where_they_are_on_the_trunk(played):
     env, parts = played
     record = whole(parts)
     for leg, (x, _) in env.unwrapped.batch.body.hips.items():
-        arm = (record[f"{leg}_trunk_x"] - record["x"]) + 1j * (record[f"{leg}_trunk_y"] - record["y"])
+        arm = (record[f"{leg}_x"] - record["x"]) + 1j * (record[f"{leg}_y"] - record["y"])
         np.testing.assert_allclose(arm, x * np.exp(1j * record["pitch"]), atol=1e-12)
 
 

@@ -34,9 +34,9 @@ def test_a_record_becomes_instants():
     rows = instants(columns_of_engine(record, command=np.arange(4.0)))
     assert len(rows) == len(record["time"])
     for k, now in list(enumerate(rows))[::100]:
-        names = ("theta", "theta_rate", "phi", "swing_offset", "swing_cos")
+        names = ("crank_angle", "crank_angle_rate", "swing_angle", "swing_offset", "swing_cos")
         of_leg = [record[name][k, 0, 0] for name in names]
-        seen = (now.crank_angle, now.crank_speed, now.swing_angle, now.swing_offset, now.swing_cos)
+        seen = (now.crank_angle, now.crank_angle_rate, now.swing_angle, now.swing_offset, now.swing_cos)
         assert (now.time, *seen) == (record["time"][k, 0], *of_leg)
         assert (now.command_crank_speed, now.command_swing_cos) == (0.0, 3.0)
         assert now.normal == record["toe_normal"][k, 0, 0] + record["heel_normal"][k, 0, 0]
@@ -79,11 +79,11 @@ def test_a_pitching_trunk_carries_its_leg_where_the_engine_has_it():
     for now in instants(found)[::20]:
         points = pose(LEG, now.crank_angle, frame=FrameMotion(phi=now.swing_angle))
         for point, corner in (("toe", LEG.toe), ("heel", LEG.heel)):
-            z = complex(*points.point(corner)) * np.exp(1j * now.pitch) + complex(now.trunk_x, now.trunk_y)
+            z = complex(*points.point(corner)) * np.exp(1j * now.pitch) + complex(now.x, now.y)
             at = complex(getattr(now, f"{point}_x"), getattr(now, f"{point}_y"))
             assert abs(z - at) < 1e-9
-    speed = np.gradient(found["trunk_x"], found["time"])
-    np.testing.assert_allclose(found["trunk_vx"][1:-1], speed[1:-1], atol=2e-3)
+    speed = np.gradient(found["x"], found["time"])
+    np.testing.assert_allclose(found["vx"][1:-1], speed[1:-1], atol=2e-3)
 
 
 def test_forces_in_the_world_add_up_to_the_engine_s_impulse_on_hills():

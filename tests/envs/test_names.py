@@ -1,0 +1,144 @@
+"""One name for a quantity in kernels, engines, infos, records, summaries and files.
+
+`python tests/envs/test_names.py` prints the names by place.
+"""
+
+from __future__ import annotations
+
+import re
+
+import gymnasium as gym
+import numpy as np
+import pytest
+
+from hoof_env import records
+from hoof_env.dynamics import layout
+from hoof_env.dynamics.names import RENAMED, NamedColumns, present_name
+from hoof_env.envs.outcome import MOVED
+from hoof_env.gait import PARAMETERS
+from hoof_env.records import RECORD, substeps
+from hoof_env.render.instant import Instant
+
+LEG = "hoof_env/HorseLeg-v0"
+HORSE = "hoof_env/Horse-v0"
+
+OF_FILES = {
+    "depth": "depth of a hoof point, negative in the air; beyond the penetration by a spring's deflection",
+    "force_x": "normal and friction in the world's axes",
+    "force_y": "likewise",
+    "cop_x": "centre of pressure, of normals, frictions and places",
+    "cop_y": "likewise",
+    "free_moment": "0, which laboratories expect",
+}
+"""Quantities of files alone, with what they are made of."""
+
+OF_EPISODES = {
+    "seconds": "time",
+    "distance_m": "x, or travel on a fixed trunk",
+    "speed_m_s": "distance_m over seconds",
+    "mean_normal_n": "normal_impulse over seconds",
+    "stance_peak_sum_n": "sum of stance_peak at the ends of stances, which is that of peak_grf_increase",
+    "loading_rate_n_s": "loading_rate_increase over stances",
+    "duty_factor": "loaded_time over seconds",
+    "cost_of_transport": "positive_work over weight and distance_m",
+    "weight_share": "mean_normal_n over the weight",
+    "support_share": "1 less weight_share",
+    "failed": "1 after a failure",
+}
+"""Statistics of episodes, with what they are made of; the other figures are sums with their unit."""
+
+OF_STARTS = {"speed": "vx at the start", "height": "y at the start", "phase": "of a stride"}
+"""Values of a start, which are told and set in words that a horse has, too."""
+
+UNIT = re.compile(r"_(n|j|m|m_s|n_s)$")
+
+
+def places() -> dict[str, set[str]]:
+    """Return the names of quantities by place, of one leg."""
+    env = gym.make(LEG, episode_seconds=0.06).unwrapped
+    _, info = env.reset(seed=0)
+    while "episode_summary" not in info:
+        _, _, _, _, info = env.step(np.zeros(4, np.float32))
+    kernel = {
+        *layout.LegReport.names,
+        *layout.Strides.names,
+        *layout.StrideSums.names,
+        *layout.TrunkReport.names,
+    }
+    kernel |= {*layout.LegState.names, *layout.Moving.names}
+    return {
+        "kernel": kernel,
+        "engine": {*env.engine.state, *env.engine.report},
+        "info": {*info["measured"].keys()},
+        "start": {*env.batch.body.start_names},
+        "record": {*env.record()},
+        "summary": {*info["episode_summary"]},
+        "file": {*RECORD, *Instant._fields, *substeps(env)},
+    }
+
+
+def vector_parts(name: str) -> str:
+    """Return the name of a row of a planar vector by the names of its two numbers in records."""
+    for vector, letter in (("place", ""), ("velocity", "v"), ("acceleration", "a")):
+        name = re.sub(f"^{vector}_([xy])$", rf"{letter}\1", name)
+    return name
+
+
+def test_a_quantity_has_one_name():
+    named = places()
+    gait = {f"{part}_{k}" for part in ("gait", "gait_rate") for k in range(4)}
+    kernel = {vector_parts(name) for name in named["kernel"]} - gait
+    parameters = {*PARAMETERS, *(f"{name}_rate" for name in PARAMETERS)}
+    commands = {f"command_{name}" for name in PARAMETERS}
+    assert named["engine"] <= kernel | parameters | {"time"}
+    assert named["info"] <= kernel | parameters | commands | {"result"}
+    assert named["record"] == named["engine"]
+    assert named["start"] <= kernel | {*OF_STARTS}
+    for name in named["file"] - named["record"] - commands:
+        assert re.sub(r"^(toe|heel)_", "", name) in OF_FILES
+    for name in named["summary"] - {*OF_EPISODES}:
+        assert UNIT.sub("", name) in layout.StrideSums.names
+
+
+def test_no_place_has_an_old_name():
+    for place, names in places().items():
+        old = {name for name in names if present_name(name, names)}
+        assert old <= ({"crank_speed"} if place in ("info", "engine", "record") else set()), place
+
+
+def test_old_names_are_refused_with_the_present_ones():
+    env = gym.make(LEG, episode_seconds=0.02).unwrapped
+    env.reset(seed=0)
+    summary = env.step(np.zeros(4, np.float32))[4]["episode_summary"]
+    horse = gym.make(HORSE).unwrapped
+    horse.reset(seed=0)
+    run = env.engine.alone()
+    run.reset(env.gaits["run"])
+    for columns, old, new in (
+        (summary, "peak_grf_n", "highest_grf_n"),
+        (env.engine.state, "theta", "crank_angle"),
+        (env.engine.report, "pitch_acc", "pitch_acceleration"),
+        (run.run(steps=2), "phi", "swing_angle"),
+        (env.record(), "phi_rate", "swing_angle_rate"),
+        (substeps(env), "trunk_x", "x"),
+        (substeps(env), "crank_speed", "crank_angle_rate"),
+        (substeps(horse), "left_fore_crank_speed", "left_fore_crank_angle_rate"),
+        (env.step(np.zeros(4, np.float32))[4]["measured"], "theta_acc", "crank_angle_acceleration"),
+    ):
+        with pytest.raises(KeyError, match=f"'{old}' is called '{new}' now"):
+            columns[old]
+        assert columns[new] is not None
+    with pytest.raises(KeyError, match=r"^'thet'$"):
+        env.record()["thet"]
+    with pytest.raises(KeyError, match=r"^3$"):
+        NamedColumns(time=0.0)[3]
+    assert MOVED["theta"] == "crank_angle"
+    assert {*RENAMED.values()} <= set.union(
+        *places().values(), set(layout.leg_state(layout.Features(1, True)))
+    )
+    assert records.UNITS["crank_angle_rate"] == "rad/s"
+
+
+if __name__ == "__main__":
+    for place, names in places().items():
+        print(f"{place}: {', '.join(sorted(names))}")
