@@ -18,10 +18,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from hoof_env.constants import GRAVITY
 from hoof_env.dynamics.layout import Features, stride_sums
 from hoof_env.dynamics.memory import LIFT_OFF
 from hoof_env.dynamics.observables import stance_figures
-from hoof_env.dynamics.parts import GRAVITY
 from hoof_env.envs.policies import start_of
 from hoof_env.tasks.horse_gaits import LEGS, PAIRS
 

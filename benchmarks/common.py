@@ -1,4 +1,4 @@
-"""Parts that all engines share: links and pins of the leg, a pose to start from, ground forces from outside.
+"""Parts that all engines share: links of the paper's leg, a pose to start from, ground forces from outside.
 
 The other engines take this project's world: x forward, y up, angles counter-clockwise; planar vectors are
 complex.
@@ -9,7 +9,6 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -18,119 +17,14 @@ from numpy.typing import NDArray
 from hoof_env.dynamics.parts import Limb
 from hoof_env.ground.contact import Ground, new_contacts, touch
 from hoof_env.leg.kinematics import FrameMotion, Pose, pose
-from hoof_env.leg.mechanism import FRAME
+from hoof_env.leg.link_tree import link_tree
 from hoof_env.leg.mechanism_list import PAPER
 
-BODIES = PAPER.bodies
-JOINTS = PAPER.joints
+RIGID = link_tree(PAPER)
+"""Paper's leg with both triangles and the locked shank each as one link: 9 links, 13 pins, 4 loops."""
 
-Pins = dict[tuple[str, str, str], list[tuple[int, int]]]
-
-
-@dataclass(frozen=True)
-class Assembly:
-    """Leg as rigid links and the pins between them.
-
-    Attributes:
-        links: by name, the bodies of `linkage.BODIES` in each, zero-based.
-        tree: every link, the one (or "frame") that carries it and the pin between them, carriers first.
-    """
-
-    links: dict[str, tuple[int, ...]]
-    tree: tuple[tuple[str, str, str], ...]
-
-    @cached_property
-    def pins(self) -> Pins:
-        """Rows of `linkage.JOINTS` in each pin (point, link, other) and their signs: the force of `other` on
-        `link` is their signed sum."""
-        link_of = {FRAME: "frame"} | {body: link for link, bodies in self.links.items() for body in bodies}
-        pins: Pins = {}
-        for row, joint in enumerate(JOINTS):
-            one = link_of[joint.i]
-            two = link_of[joint.j]
-            if one == two:
-                continue  # the inside of a rigid link
-            # Seen from the other link the force has the other sign
-            if (joint.point, two, one) in pins:
-                pins[joint.point, two, one].append((row, -1))
-            else:
-                pins.setdefault((joint.point, one, two), []).append((row, 1))
-        return pins
-
-    @cached_property
-    def carrier(self) -> dict[str, tuple[str, str]]:
-        """Carrier and pin of each link."""
-        return {link: (parent, point) for link, parent, point in self.tree}
-
-    @cached_property
-    def loops(self) -> tuple[tuple[str, str, str], ...]:
-        """Pins that close loops, those outside the tree."""
-        carrier = self.carrier
-        return tuple(
-            (point, one, two)
-            # A pin of the tree is one between a link and its carrier, whichever way round
-            for point, one, two in self.pins
-            if carrier[one] != (two, point) and carrier.get(two) != (one, point)
-        )
-
-    def pin_forces(self, joints: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Return the forces at the pins [N], shape (..., pins, 2), from those at the joints, shape (..., 20,
-        2)."""
-        signed = [sum(sign * joints[..., row, :] for row, sign in rows) for rows in self.pins.values()]
-        return np.stack(signed, axis=-2)
-
-
-RIGID = Assembly(
-    {
-        "crank": (0,),
-        "coupler": (1,),
-        "triangle": (2, 3, 4),
-        "rod": (5,),
-        "shank": (6, 9),
-        "rocker": (7,),
-        "strut": (8,),
-        "hoof": (10, 12, 13),
-        "tie rod": (11,),
-    },
-    (
-        ("crank", "frame", "O"),
-        ("coupler", "crank", "P"),
-        ("strut", "crank", "P"),
-        ("triangle", "frame", "C"),
-        ("rod", "triangle", "D"),
-        ("rocker", "frame", "C"),
-        ("tie rod", "rocker", "A"),
-        ("shank", "rocker", "F"),
-        ("hoof", "shank", "G"),
-    ),
-)
-"""Assembly with both triangles and the locked shank each as one link: 9 links, 13 pins, 4 loops."""
-
-_NAMES = {0: "crank", 6: "shank", 10: "hoof"}  # which the peers look for
-
-ALL = Assembly(
-    {_NAMES.get(k, f"link {k + 1}"): (k,) for k in range(len(BODIES))},
-    (
-        ("crank", "frame", "O"),
-        ("link 2", "crank", "P"),
-        ("link 9", "crank", "P"),
-        ("link 3", "frame", "C"),
-        ("link 5", "frame", "C"),
-        ("link 4", "link 5", "D"),
-        ("link 6", "link 4", "D"),
-        ("link 8", "frame", "C"),
-        ("link 12", "link 8", "A"),
-        ("shank", "link 8", "F"),
-        ("link 10", "shank", "F"),
-        ("hoof", "link 10", "G"),
-        ("link 13", "link 10", "G"),
-        ("link 14", "link 13", "I"),
-    ),
-)
-"""Assembly of the paper: 14 links, 20 pins, 6 loops and a lock."""
-
-LOCKED = "link 10"
-"""Link of `ALL` that the lock holds to its carrier."""
+ALL = link_tree(PAPER, merge=False)
+"""Paper's leg body for body: 14 links, 20 pins, 6 loops and a lock."""
 
 
 @dataclass(frozen=True)

@@ -18,8 +18,10 @@ import exudyn.itemInterface
 import numpy as np
 from numpy.typing import NDArray
 
-from benchmarks.common import ALL, Assembly, Outside, Record, Start
-from hoof_env.dynamics.parts import GRAVITY, TRUNKS, Limb, Motor, Trunk
+from benchmarks.common import ALL, Outside, Record, Start
+from hoof_env.constants import GRAVITY
+from hoof_env.dynamics.parts import TRUNKS, Limb, Motor, Trunk
+from hoof_env.leg.link_tree import LinkTree
 from hoof_env.leg.mechanism import FRAME
 from hoof_env.leg.mechanism_list import PAPER
 
@@ -45,7 +47,7 @@ class ExudynLegs:
         outside: forces at toe and heel; none if None. Called without `commit` within a step, with it after.
     """
 
-    assembly: Assembly = ALL
+    assembly: LinkTree = ALL
 
     def __init__(
         self,

@@ -285,6 +285,47 @@ def manual(id: str = "hoof_env/HorseLeg-v0", out: Path | None = None, films: Pat
     _say(f"{written} files written; read {out / 'README.md'} first")
 
 
+def mjcf(
+    out: Path,
+    preset: str | None = None,
+    trunk: str = "fixed",
+    motor: bool = True,
+    ground: bool = True,
+    theta: float = 0.0,
+    swing: float = 0.0,
+    overwrite: bool = False,
+) -> None:
+    """Write a leg as a model of MuJoCo, with closed loops, a motor, a trunk and a floor.
+
+    Args:
+        out: the model; ends in .xml. Its folder is made if it is missing.
+        preset: the leg, a name or a JSON file; the package's default if left out.
+        trunk: what carries it: fixed, rail, suspended or free, with the package's default masses, as high as
+            the hip of the preset.
+        motor: drive the crank by the package's default motor; otherwise it turns freely.
+        ground: add a floor with the friction of the preset's ground, on which MuJoCo's own contact acts.
+        theta, swing: crank angle and swing of the pose in which the model begins [rad].
+        overwrite: replace an existing file.
+    """
+    from hoof_env._output import check_new
+    from hoof_env.dynamics.parts import Motor, Trunk
+    from hoof_env.ground.contact import load_ground
+    from hoof_env.leg.geometry import DEFAULT_PRESET, load_geometry
+
+    made = check_new(out, overwrite)
+    chosen = preset or DEFAULT_PRESET
+    leg = load_geometry(chosen)
+    leg.to_mjcf(
+        out,
+        theta=theta,
+        swing=swing,
+        trunk=Trunk(kind=trunk, height=leg.hip_height),
+        motor=Motor() if motor else None,
+        ground=load_ground(chosen) if ground else None,
+    )
+    _say(f"{out}: {_size(out)}{made}")
+
+
 def compile() -> None:
     """Compile the kernels of all environments now, for an image of a container or before workers begin.
 
@@ -298,7 +339,7 @@ def compile() -> None:
 
 COMMANDS: dict[str, Callable[..., None]] = {
     command.__name__: command
-    for command in (reproduce, render, play, export, compare, average, manual, compile)
+    for command in (reproduce, render, play, export, compare, average, manual, mjcf, compile)
 }
 """Functions by sub-command, in the order of the help."""
 

@@ -3,12 +3,34 @@
 import json
 from pathlib import Path
 
+from hoof_env.leg.mechanism_list import PAPER, read_mechanism
+
 DATA = Path(__file__).with_name("data")
 
 FIRST_FIT = str(DATA / "first_fit.json")
 """The leg that the search for `identified` set out from."""
 
 PRESETS = {"first_fit": FIRST_FIT, "identified": "identified"}
+
+
+FOUR_BAR = {
+    "fixed": ["O", "B"],
+    "crank": {"point": "A", "length": "OA"},
+    "points": [
+        {"point": "C", "dyad": ["B", "A"], "lengths": ["BC", "AC"]},
+        {"point": "D", "body": "AC", "from": "C", "along": "-CD"},
+    ],
+    "bodies": [
+        {"name": "OA", "tail": "O", "head": "A"},
+        {"name": "AC", "tail": "A", "head": "C", "points": ["D"]},
+        {"name": "BC", "tail": "B", "head": "C"},
+    ],
+    "joints": [["O", "OA", "frame"], ["A", "AC", "OA"], ["C", "BC", "AC"], ["B", "BC", "frame"]],
+    "feet": ["D"],
+}
+"""Mechanism of three bodies whose coupler goes on beyond its pin, to the only foot."""
+
+MECHANISMS = {"paper": PAPER, "four-bar": read_mechanism(FOUR_BAR)}
 
 
 def load_ensemble():

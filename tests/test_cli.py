@@ -127,6 +127,13 @@ BAD_REQUESTS = {
         (["--out", "{}/a/b/x.mp4", "--policy", "gallop"], "policy: expected"),
         (["--out", "{}/x.mp4", "--args", "render_mode=human"], "render_mode: expected"),
     ],
+    "mjcf": [
+        (["--out", "{}/x.urdf"], "expected a file that ends in .xml"),
+        (["--out", "{}/x.xml", "--trunk", "cloud"], "trunk: expected one of"),
+        (["--out", "{}/x.xml", "--preset", "nothing"], "preset: expected"),
+        (["--out", "{}/x.xml", "--theta", "nan"], "theta: expected"),
+        (["--out", "{}/taken/x.xml"], "cannot write to"),
+    ],
 }
 
 
@@ -143,21 +150,26 @@ def test_a_bad_request_is_one_line_and_leaves_nothing(command, options, words, t
 
 
 @pytest.mark.parametrize(
-    ("command", "name"), [(["export"], "x.csv"), (["render", "--size", "480", "270"], "x.mp4")]
+    ("command", "name", "change"),
+    [
+        (["export", "--seconds", "0.1"], "x.csv", "--seed"),
+        (["render", "--size", "480", "270", "--seconds", "0.1"], "x.mp4", "--seed"),
+        (["mjcf"], "x.xml", "--theta"),
+    ],
 )
-def test_a_file_is_replaced_on_demand_only_and_its_folder_is_told(command, name, tmp_path, capsys):
+def test_a_file_is_replaced_on_demand_only_and_its_folder_is_told(command, name, change, tmp_path, capsys):
     out = tmp_path / "new" / name
-    command = [*command, "--out", str(out), "--seconds", "0.1"]
+    command = [*command, "--out", str(out)]
     assert cli.main(command) == 0
     said = capsys.readouterr().out
     assert said.startswith(f"{out}: ")
     assert said.endswith(f"B; made the folder {out.parent}\n")
     first = out.read_bytes()
-    assert cli.main([*command, "--seed", "1"]) == 2
+    assert cli.main([*command, change, "1"]) == 2
     refusal = f"hoof-env: error: {str(out)!r} exists already; name another file, or add --overwrite\n"
     assert capsys.readouterr().err == refusal
     assert out.read_bytes() == first
-    assert cli.main([*command, "--seed", "1", "--overwrite"]) == 0
+    assert cli.main([*command, change, "1", "--overwrite"]) == 0
     assert out.read_bytes() != first
     assert "folder" not in capsys.readouterr().out
 

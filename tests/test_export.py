@@ -12,8 +12,8 @@ import numpy as np
 import pytest
 
 from hoof_env import __version__, cli, records
+from hoof_env.constants import GRAVITY
 from hoof_env.dynamics.layout import TRUNK_STATE
-from hoof_env.dynamics.parts import GRAVITY
 from hoof_env.envs.policies import GAITS, make_policy, open_loop_record
 from hoof_env.errors import MissingExtraError, OutputError, ParameterError, parse_pairs
 from hoof_env.gait import PARAMETERS, load_gait

@@ -11,7 +11,7 @@ import pytest
 ROOT = Path(__file__).parents[1]
 
 FLOORS = (
-    ("hoof_env/_version.py", "hoof_env/errors.py"),
+    ("hoof_env/_version.py", "hoof_env/constants.py", "hoof_env/errors.py"),
     ("hoof_env/_output.py", "hoof_env/_plotting.py"),
     ("hoof_env/simd",),
     ("hoof_env/leg",),

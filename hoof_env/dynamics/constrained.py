@@ -29,8 +29,9 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from hoof_env.constants import GRAVITY
 from hoof_env.dynamics.layout import LEG_REPORT, LEG_STATE, TRUNK_REPORT, TRUNK_STATE
-from hoof_env.dynamics.parts import GRAVITY, Reactions, Result, Trunk
+from hoof_env.dynamics.parts import Reactions, Result, Trunk
 from hoof_env.errors import ParameterError, check_choice, check_number
 from hoof_env.gait import (
     MOTION,

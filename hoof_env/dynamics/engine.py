@@ -17,6 +17,7 @@ import numpy as np
 from numba.core.errors import NumbaError
 from numpy.typing import ArrayLike, NDArray
 
+from hoof_env.constants import GRAVITY
 from hoof_env.dynamics import engine_states, layout, memory
 from hoof_env.dynamics.advance import BY_LEGS, LANES, RESET_REQUESTED, advance_kernels
 from hoof_env.dynamics.engine_memory import EngineMemory
@@ -24,7 +25,6 @@ from hoof_env.dynamics.layout import Features
 from hoof_env.dynamics.limits import CHECK_EVERY
 from hoof_env.dynamics.names import NamedColumns
 from hoof_env.dynamics.parts import (
-    GRAVITY,
     Limb,
     Limits,
     Trunk,

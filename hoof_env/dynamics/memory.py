@@ -9,6 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from hoof_env.constants import GRAVITY
 from hoof_env.dynamics import layout
 from hoof_env.dynamics.advance import LANES, MODEL
 from hoof_env.dynamics.form import engine_layout
@@ -23,7 +24,6 @@ from hoof_env.dynamics.layout import (
 )
 from hoof_env.dynamics.parts import (
     FREE,
-    GRAVITY,
     RAIL,
     SUSPENDED,
     TRUNKS,

@@ -22,9 +22,6 @@ from hoof_env.ground.terrain import Terrain
 from hoof_env.leg.geometry import Geometry
 from hoof_env.leg.profile import LegProfile
 
-GRAVITY = 9.81
-"""Acceleration of gravity [m/s^2], as in the paper's Table 1."""
-
 TRUNKS = ("fixed", "rail", "suspended", "free")
 """Kinds of trunk; the kernels take the position in this tuple."""
 

@@ -20,7 +20,8 @@ from functools import cached_property
 
 import numpy as np
 
-from hoof_env.dynamics.parts import GRAVITY, HoofSpring, Limb, Mechanics, Motor
+from hoof_env.constants import GRAVITY
+from hoof_env.dynamics.parts import HoofSpring, Limb, Mechanics, Motor
 from hoof_env.errors import Floats, ParameterError
 from hoof_env.ground.contact import Ground
 from hoof_env.ground.stiffness import LARGEST_ANGLE, SCHEME_LIMITS, ContactRates, contact_rates, spring_rates

@@ -5,8 +5,9 @@ from __future__ import annotations
 
 import numpy as np
 
+from hoof_env.constants import GRAVITY
 from hoof_env.dynamics.engine import TrunkEngine
-from hoof_env.dynamics.parts import GRAVITY, Motor, Tally
+from hoof_env.dynamics.parts import Motor, Tally
 from hoof_env.leg.profile import by_name, cross
 
 

@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from hoof_env.constants import GRAVITY
 from hoof_env.dynamics.advance import LANES
-from hoof_env.dynamics.parts import GRAVITY
 from hoof_env.envs.addresses import BEGIN, END
 from hoof_env.envs.batch_build import substeps_under
 from hoof_env.errors import ParameterError

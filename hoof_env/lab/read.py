@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from hoof_env.dynamics.parts import GRAVITY
+from hoof_env.constants import GRAVITY
 from hoof_env.errors import (
     DataFileError,
     HoofEnvError,

@@ -9,7 +9,6 @@ from __future__ import annotations
 import json
 from collections.abc import Mapping
 from dataclasses import MISSING, dataclass, field, fields, replace
-from functools import cached_property
 from importlib import resources
 from pathlib import Path
 from types import MappingProxyType
@@ -20,7 +19,7 @@ from numpy.typing import NDArray
 
 from hoof_env._output import staged
 from hoof_env.errors import DataFileError, ParameterError, check_choice, check_number, flag
-from hoof_env.leg.assembly import check_full_revolution, transmission_margin
+from hoof_env.leg.assembly import check_full_revolution
 from hoof_env.leg.checks import (
     check_feet,
     check_keys,
@@ -38,6 +37,7 @@ from hoof_env.leg.mechanism_list import PAPER, read_mechanism
 
 if TYPE_CHECKING:
     from hoof_env.leg.kinematics import Pose
+    from hoof_env.leg.mjcf import GroundLike, MotorLike, TrunkLike
 
 DEFAULT_PRESET = "identified"
 """The leg of the paper's reproduction."""
@@ -180,11 +180,6 @@ class Geometry:
         """Mass of the whole leg [kg]."""
         return float(self.body_masses.sum())
 
-    @cached_property
-    def transmission_margin(self) -> float:
-        """Smallest |sine| of the angle between a dyad's two links over a revolution (0: a dead point) [-]."""
-        return transmission_margin(self)
-
     def pose(
         self,
         theta: float,
@@ -209,6 +204,35 @@ class Geometry:
         from hoof_env.leg.kinematics import FrameMotion, pose
 
         return pose(self, theta, theta_rate, theta_acc, FrameMotion(swing, swing_rate, swing_acc))
+
+    def to_mjcf(
+        self,
+        path: str | Path | None = None,
+        *,
+        theta: float = 0.0,
+        swing: float = 0.0,
+        trunk: TrunkLike | None = None,
+        motor: MotorLike | None = None,
+        ground: GroundLike | None = None,
+        timestep: float = 1e-3,
+    ) -> str:
+        """Return this leg as a model of MuJoCo and write it, if there is a path; see `hoof_env.leg.mjcf`.
+
+        Args:
+            path: of the file, which ends in .xml.
+            theta, swing: crank angle and swing of the pose in which the model begins [rad].
+            trunk: a `Trunk` that carries the leg, at its height; without one, O is held at `hip_height`.
+            motor: a `Motor` that drives the crank; without one, the crank turns freely.
+            ground: a `Ground`, of which the friction alone is taken; none if None.
+            timestep: of the simulation [s].
+
+        Raises:
+            ParameterError: a number, type or suffix that cannot be, or no leg at this `theta`.
+            OutputError: the file cannot be written.
+        """
+        from hoof_env.leg.mjcf import leg_to_mjcf
+
+        return leg_to_mjcf(self, path, (theta, swing), trunk, motor, ground, timestep)
 
     def to_dict(self) -> dict[str, Any]:
         """Everything that `from_dict` needs, JSON-serialisable."""
@@ -254,12 +278,7 @@ class Geometry:
             ParameterError: another suffix, or gaits or a ground that are not numbers by name.
             OutputError: the file cannot be written.
         """
-        path = Path(path)
-        if path.suffix != ".json":
-            raise ParameterError(f"path: expected a file that ends in .json, got {str(path)!r}")
-        content = _preset_content(self, gaits, ground)
-        with staged(path.parent) as stage:
-            (stage / path.name).write_text(json.dumps(content, indent=1) + "\n", encoding="utf-8")
+        _write_preset(self, Path(path), gaits, ground)
 
     def scaled(self, factor: float, mass_per_metre: float | None = None) -> Geometry:
         """A similar leg: lengths, pivot and hip height times `factor`, angles and gaits as before.
@@ -278,22 +297,7 @@ class Geometry:
         Raises:
             ParameterError: a number is not finite or not above 0, or a length leaves the limits of the class.
         """
-        factor = check_number("factor", factor, low=0, exclusive_low=True)
-        masses, density = self.masses, self.linear_density
-        if mass_per_metre is not None:
-            masses = None
-            density = check_number("mass_per_metre", mass_per_metre, low=0, exclusive_low=True)
-        changed: Any = 1.0 if mass_per_metre is None else density * self.body_lengths / self.body_masses
-        return replace(
-            self,
-            lengths={name: factor * length for name, length in self.lengths.items()},
-            pivot={name: (factor * at.real, factor * at.imag) for name, at in list(self.fixed.items())[1:]},
-            hip_height=factor * self.hip_height,
-            linear_density=density,
-            masses=None if masses is None else tuple(factor * mass for mass in masses),
-            solids=scaled_solids(self.solids, factor, factor * changed, self.mechanism),
-            provenance=f"{self.provenance} Scaled by {factor:g}.".lstrip(),
-        )
+        return _scaled(self, factor, mass_per_metre)
 
     def replace(self, **changes: Any) -> Geometry:
         """A copy with some attributes changed; `lengths` and `assembly` may be partial mappings."""
@@ -317,6 +321,40 @@ def _preset_content(
             raise ParameterError(f"gaits: expected a mapping of gaits by name, got {gaits!r}")
         content["gaits"] = {name: numbers_of(f"gaits[{name!r}]", gait) for name, gait in gaits.items()}
     return content
+
+
+def _write_preset(
+    geometry: Geometry,
+    path: Path,
+    gaits: Mapping[str, Any] | None,
+    ground: Mapping[str, float] | None,
+) -> None:
+    """Write the file of `Geometry.save`."""
+    if path.suffix != ".json":
+        raise ParameterError(f"path: expected a file that ends in .json, got {str(path)!r}")
+    content = _preset_content(geometry, gaits, ground)
+    with staged(path.parent) as stage:
+        (stage / path.name).write_text(json.dumps(content, indent=1) + "\n", encoding="utf-8")
+
+
+def _scaled(geometry: Geometry, factor: float, mass_per_metre: float | None) -> Geometry:
+    """Return the leg of `Geometry.scaled`."""
+    factor = check_number("factor", factor, low=0, exclusive_low=True)
+    masses, density = geometry.masses, geometry.linear_density
+    if mass_per_metre is not None:
+        masses = None
+        density = check_number("mass_per_metre", mass_per_metre, low=0, exclusive_low=True)
+    changed: Any = 1.0 if mass_per_metre is None else density * geometry.body_lengths / geometry.body_masses
+    return replace(
+        geometry,
+        lengths={name: factor * length for name, length in geometry.lengths.items()},
+        pivot={name: (factor * at.real, factor * at.imag) for name, at in list(geometry.fixed.items())[1:]},
+        hip_height=factor * geometry.hip_height,
+        linear_density=density,
+        masses=None if masses is None else tuple(factor * mass for mass in masses),
+        solids=scaled_solids(geometry.solids, factor, factor * changed, geometry.mechanism),
+        provenance=f"{geometry.provenance} Scaled by {factor:g}.".lstrip(),
+    )
 
 
 def _check_entries(data: Any) -> None:

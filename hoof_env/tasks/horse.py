@@ -23,8 +23,9 @@ from typing import Annotated, Any, NoReturn
 import numpy as np
 from numpy.typing import NDArray
 
+from hoof_env.constants import GRAVITY
 from hoof_env.dynamics.engine import TrunkEngine
-from hoof_env.dynamics.parts import FREE, GRAVITY, TRUNKS, Drive, HoofSpring, Limb, Limits, Motor, Trunk
+from hoof_env.dynamics.parts import FREE, TRUNKS, Drive, HoofSpring, Limb, Limits, Motor, Trunk
 from hoof_env.errors import ParameterError, check_choice, check_number, count
 from hoof_env.gait import PARAMETERS, QUICK, WIDEST, FilterSettings
 from hoof_env.ground.contact import Ground

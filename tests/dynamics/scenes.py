@@ -2,8 +2,9 @@
 
 import numpy as np
 
+from hoof_env.constants import GRAVITY
 from hoof_env.dynamics.engine import TrunkEngine
-from hoof_env.dynamics.parts import GRAVITY, Limb, Motor, Trunk
+from hoof_env.dynamics.parts import Limb, Motor, Trunk
 from hoof_env.dynamics.tally import tally_of
 from hoof_env.gait import load_gait
 from hoof_env.ground.contact import Ground

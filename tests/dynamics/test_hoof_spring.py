@@ -8,8 +8,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from hoof_env.constants import GRAVITY
 from hoof_env.dynamics.engine import TrunkEngine
-from hoof_env.dynamics.parts import GRAVITY, HoofSpring, Limb, Limits, Prescribed, Trunk
+from hoof_env.dynamics.parts import HoofSpring, Limb, Limits, Prescribed, Trunk
 from hoof_env.gait import GaitParameters
 from hoof_env.ground.contact import Ground
 from hoof_env.ground.terrain import Terrain

@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 
-from hoof_env.dynamics.parts import GRAVITY, TRUNKS, Limb, Motor, Prescribed, Trunk
+from hoof_env.constants import GRAVITY
+from hoof_env.dynamics.parts import TRUNKS, Limb, Motor, Prescribed, Trunk
 from hoof_env.ground.contact import Ground
 from hoof_env.ground.terrain import Terrain
 from hoof_env.leg.kinematics import FrameMotion, pose

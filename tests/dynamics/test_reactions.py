@@ -3,9 +3,10 @@
 import numpy as np
 import pytest
 
+from hoof_env.constants import GRAVITY
 from hoof_env.dynamics.constrained import ConstrainedLeg
 from hoof_env.dynamics.engine import TrunkEngine
-from hoof_env.dynamics.parts import GRAVITY, Limb, Motor, Prescribed, Trunk
+from hoof_env.dynamics.parts import Limb, Motor, Prescribed, Trunk
 from hoof_env.errors import ParameterError
 from hoof_env.gait import load_gait
 from hoof_env.ground.terrain import Terrain

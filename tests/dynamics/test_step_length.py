@@ -7,8 +7,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from hoof_env.constants import GRAVITY
 from hoof_env.dynamics.engine import TrunkEngine
-from hoof_env.dynamics.parts import GRAVITY, TRUNKS, HoofSpring, Limb, Motor, Prescribed, Trunk
+from hoof_env.dynamics.parts import TRUNKS, HoofSpring, Limb, Motor, Prescribed, Trunk
 from hoof_env.dynamics.step_length import MOST_SUBSTEPS, StepWarning
 from hoof_env.dynamics.stepping import SCHEMES
 from hoof_env.gait import GaitParameters

@@ -7,8 +7,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from hoof_env.constants import GRAVITY
 from hoof_env.dynamics.engine import TrunkEngine
-from hoof_env.dynamics.parts import GRAVITY, Limb, Prescribed, Trunk
+from hoof_env.dynamics.parts import Limb, Prescribed, Trunk
 from hoof_env.gait import QUICK, HarmonicGait
 from hoof_env.leg.geometry import load_geometry
 from tests.legs import FIRST_FIT

@@ -3,8 +3,9 @@
 import numpy as np
 import pytest
 
+from hoof_env.constants import GRAVITY
 from hoof_env.dynamics.engine import TrunkEngine
-from hoof_env.dynamics.parts import GRAVITY, Limb, Prescribed, Trunk
+from hoof_env.dynamics.parts import Limb, Prescribed, Trunk
 from hoof_env.errors import ParameterError
 from hoof_env.gait import GaitParameters
 from tests.dynamics.scenes import LEG

@@ -3,8 +3,9 @@
 import numpy as np
 import pytest
 
+from hoof_env.constants import GRAVITY
 from hoof_env.dynamics.engine import TrunkEngine
-from hoof_env.dynamics.parts import GRAVITY, TRUNKS, Limb, Prescribed, Trunk
+from hoof_env.dynamics.parts import TRUNKS, Limb, Prescribed, Trunk
 from hoof_env.dynamics.stepping import SCHEMES
 from hoof_env.dynamics.tally import tally_of
 from hoof_env.gait import GaitParameters, load_gait

@@ -7,7 +7,7 @@ from family import HORSE, actions, make, same
 from horses import SEEDS, played
 
 from hoof_env import register
-from hoof_env.dynamics.parts import GRAVITY
+from hoof_env.constants import GRAVITY
 from hoof_env.errors import ParameterError
 from hoof_env.tasks.horse_gaits import FASTEST, LEGS, HorseGait, horse_gaits, reference_gaits
 from hoof_env.tasks.registry import _OWN

@@ -12,7 +12,7 @@ from family import IDS, actions, effective, same, together
 from hypothesis import Phase, given, settings
 from hypothesis import strategies as st
 
-from hoof_env.dynamics.parts import GRAVITY
+from hoof_env.constants import GRAVITY
 from hoof_env.dynamics.stepping import SCHEMES
 from hoof_env.ground.laws import FRICTION_LAWS, NORMAL_LAWS
 from hoof_env.tasks.settings import PER_EPISODE

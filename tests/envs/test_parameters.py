@@ -13,7 +13,7 @@ from family import IDS, OTHER, actions, effective, roll, same, substeps
 
 import hoof_env
 from hoof_env import RandomizeParameters
-from hoof_env.dynamics.parts import GRAVITY
+from hoof_env.constants import GRAVITY
 from hoof_env.dynamics.step_length import StepWarning
 from hoof_env.errors import ParameterError
 from hoof_env.tasks.settings import PER_EPISODE

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
-from hoof_env.dynamics.parts import GRAVITY
+from hoof_env.constants import GRAVITY
 from hoof_env.errors import DataFileError, ParameterError
 from hoof_env.lab.compare import THRESHOLD, compare
 from hoof_env.lab.picture import draw, report

@@ -11,7 +11,7 @@ from hypothesis import example, given
 from hypothesis import strategies as st
 
 from hoof_env import Terrain, records
-from hoof_env.dynamics.parts import GRAVITY
+from hoof_env.constants import GRAVITY
 from hoof_env.envs.policies import make_policy
 from hoof_env.errors import ParameterError
 from hoof_env.lab.forces import above_threshold, in_units, limbs_of, loaded, onto_surface

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from hoof_env import records
-from hoof_env.dynamics.parts import GRAVITY
+from hoof_env.constants import GRAVITY
 from hoof_env.envs.policies import make_policy
 from hoof_env.errors import ParameterError
 from hoof_env.lab.reactions import joint_columns, reaction_units

@@ -10,6 +10,7 @@ import pytest
 from hoof_env.dynamics.constrained import ConstrainedLeg
 from hoof_env.errors import GeometryError, ParameterError
 from hoof_env.ground.contact import Ground
+from hoof_env.leg.assembly import transmission_margin
 from hoof_env.leg.geometry import Geometry, load_geometry
 from hoof_env.leg.profile import DERIVATIVE_ERROR, FUNCTIONS, SLOPED, LegProfile, functions, leg_profile
 from tests.legs import FIRST_FIT, PRESETS
@@ -67,7 +68,7 @@ def test_a_leg_that_cannot_turn_may_be_asked_for():
     assert Geometry.from_dict(json.loads(json.dumps(ROCKER.to_dict()))) == ROCKER
     assert pickle.loads(pickle.dumps(ROCKER)) == ROCKER
     assert "full_turn" not in LEG.to_dict()
-    assert ROCKER.transmission_margin == 0.0
+    assert transmission_margin(ROCKER) == 0.0
     with pytest.raises(ParameterError, match="full_turn: expected True or False, got 1"):
         LEG.replace(full_turn=1)
 

@@ -17,7 +17,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from hoof_env.dynamics.parts import GRAVITY, TRUNKS, Motor
+from hoof_env.constants import GRAVITY
+from hoof_env.dynamics.parts import TRUNKS, Motor
 from hoof_env.gait import SPEED
 from tests.oracle.bodies import PlainBodies
 from tests.oracle.ground import PlainGround

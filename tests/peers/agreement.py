@@ -84,7 +84,7 @@ def compare(preset, case, steps=None):
         found = []
         for k, constant in zip((1, 2), SPRING, strict=True):
             dt = k * steps[name]
-            settings = {"solref": (constant * dt, 1.0)} if name == "MuJoCo" else {}
+            settings = {"loop_seconds": constant * dt} if name == "MuJoCo" else {}
             found.append(horse.peer(engine, dt, **settings))
         runs[name] = (found[0][0], found[1][0], found[0][1])
     rows = []

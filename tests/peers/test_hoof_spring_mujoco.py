@@ -7,8 +7,9 @@ on the hoof is applied here at each of MuJoCo's steps.
 import numpy as np
 import pytest
 
+from hoof_env.constants import GRAVITY
 from hoof_env.dynamics.engine import TrunkEngine
-from hoof_env.dynamics.parts import GRAVITY, HoofSpring, Limb, Prescribed, Trunk
+from hoof_env.dynamics.parts import HoofSpring, Limb, Prescribed, Trunk
 from hoof_env.gait import GaitParameters
 from hoof_env.ground.contact import Ground
 from hoof_env.leg.geometry import load_geometry

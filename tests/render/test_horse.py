@@ -10,7 +10,7 @@ import pygame
 import pytest
 
 from hoof_env import records
-from hoof_env.dynamics.parts import GRAVITY
+from hoof_env.constants import GRAVITY
 from hoof_env.envs.policies import make_policy
 from hoof_env.film import frames
 from hoof_env.play import Game

@@ -1,0 +1,110 @@
+"""A leg as MJCF: what the file says of places, masses and loops, read back without MuJoCo."""
+
+import xml.etree.ElementTree as ET
+
+import numpy as np
+import pytest
+
+from hoof_env.constants import GRAVITY
+from hoof_env.dynamics.parts import Motor, Trunk
+from hoof_env.errors import ParameterError
+from hoof_env.ground.contact import Ground
+from hoof_env.leg.geometry import load_geometry
+from hoof_env.leg.link_tree import link_tree
+from tests.legs import PRESETS
+
+THETA, SWING = 0.7, -0.3
+
+
+def numbers(text):
+    return np.array(text.split(), float)
+
+
+def placed(element, at=(0.0, 0.0, 0.0)):
+    """Bodies by name with their places in the world, in the pose that is written."""
+    for body in element.findall("body"):
+        here = at + numbers(body.get("pos"))
+        yield body.get("name"), body, here
+        yield from placed(body, here)
+
+
+@pytest.mark.parametrize("preset", PRESETS.values(), ids=PRESETS)
+def test_the_pose_and_the_solids_are_those_of_the_leg(preset):
+    leg = load_geometry(preset)
+    text = leg.to_mjcf(theta=THETA, swing=SWING, trunk=Trunk(height=1.5))
+    root = ET.fromstring(text)
+    pose = leg.pose(THETA, SWING)
+    seen = set()
+    mass, moment = 0.0, np.zeros(2)
+    for name, body, here in placed(root.find("worldbody")):
+        for site in body.findall("site"):
+            place = (here + numbers(site.get("pos")))[[0, 2]] - (0, 1.5)
+            point = site.get("name").split(" of ")[0]
+            assert place == pytest.approx(pose.point(point), abs=1e-12)
+            seen.add(point)
+        if name not in ("trunk", "frame"):
+            solid = body.find("inertial")
+            mass += float(solid.get("mass"))
+            moment += float(solid.get("mass")) * ((here + numbers(solid.get("pos")))[[0, 2]] - (0, 1.5))
+    assert seen == set(leg.mechanism.points)
+    assert mass == pytest.approx(leg.mass)
+    assert moment == pytest.approx(leg.body_masses @ pose.centres)
+
+
+def test_a_loop_closes_at_one_place_of_both_links():
+    leg = load_geometry()
+    root = ET.fromstring(leg.to_mjcf(theta=THETA))
+    places = {name: here for name, _, here in placed(root.find("worldbody"))}
+    pose = leg.pose(THETA)
+    loops = root.findall("equality/connect")
+    assert len(loops) == len(link_tree(leg.mechanism).loops) == 4
+    for loop, (point, _, _) in zip(loops, link_tree(leg.mechanism).loops, strict=True):
+        at = (places[loop.get("body1")] + numbers(loop.get("anchor")))[[0, 2]] - (0, leg.hip_height)
+        assert at == pytest.approx(pose.point(point), abs=1e-12)
+
+
+def test_trunk_motor_and_ground_are_written_where_they_are_given():
+    leg = load_geometry()
+    bare = ET.fromstring(leg.to_mjcf())
+    assert {joint.get("name") for joint in bare.iter("joint")} == {"swing", *link_tree(leg.mechanism).links}
+    assert [motor.get("name") for motor in bare.find("actuator")] == ["swing"]
+    assert not [geom for geom in bare.iter("geom") if geom.get("name") == "floor"]
+    trunk, motor = Trunk(mass=70, share=0.6), Motor(speed_gain=33, torque_limit=44)
+    whole = ET.fromstring(leg.to_mjcf(trunk=trunk, motor=motor, ground=Ground(friction=0.55)))
+    joints = {joint.get("name"): joint for joint in whole.iter("joint")}
+    assert float(joints["z"].get("stiffness")) == trunk.stiffness
+    assert float(joints["x"].get("damping")) == trunk.drag
+    body = whole.find("worldbody/body")
+    carried = float(body.get("gravcomp")) * trunk.mass * GRAVITY
+    assert carried == pytest.approx((1 - trunk.share) * (trunk.mass + leg.mass) * GRAVITY)
+    servo = whole.find("actuator/velocity")
+    assert servo.get("kv") == "33"
+    assert numbers(servo.get("forcerange")) == pytest.approx([-44, 44])
+    (floor,) = (geom for geom in whole.iter("geom") if geom.get("name") == "floor")
+    assert numbers(floor.get("friction"))[0] == 0.55
+
+
+def test_the_file_is_the_text(tmp_path):
+    leg = load_geometry()
+    text = leg.to_mjcf(tmp_path / "leg.xml")
+    assert (tmp_path / "leg.xml").read_text(encoding="utf-8") == text
+
+
+@pytest.mark.parametrize(
+    ("given", "words"),
+    [
+        ({"theta": np.nan}, "theta: expected"),
+        ({"swing": "far"}, "swing: expected"),
+        ({"timestep": 0}, "timestep: expected"),
+        ({"timestep": 1}, "timestep: expected"),
+        ({"trunk": "suspended"}, "trunk: expected a Trunk"),
+        ({"motor": True}, "motor: expected a Motor"),
+        ({"ground": 0.4}, "ground: expected a Ground"),
+        ({"path": "leg.urdf"}, "path: expected a file that ends in .xml"),
+    ],
+)
+def test_what_is_no_model_is_refused(given, words, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    with pytest.raises(ParameterError, match=words):
+        load_geometry().to_mjcf(**given)
+    assert not list(tmp_path.iterdir())
