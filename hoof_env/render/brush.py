@@ -1,4 +1,4 @@
-"""Brush of the picture: colours, lettering, smooth shapes."""
+"""Brush of the picture: lettering, smooth shapes."""
 
 from __future__ import annotations
 
@@ -9,14 +9,10 @@ from typing import Any
 import numpy as np
 import pygame
 
-INK, GREY, FAINT, PAPER = (34, 43, 53), (88, 99, 111), (216, 222, 228), (255, 255, 255)
-FORCE, TOE, HEEL, CRANK = (213, 94, 0), (0, 114, 178), (204, 121, 167), (0, 158, 115)
-"""Vermilion, blue, reddish purple and bluish green of Okabe and Ito's palette, which any colour vision tells
-apart."""
+from hoof_env.render.colours import Colour
 
 FINE = 2  # resolution of smooth painting over that of the picture
 
-Colour = tuple[int, int, int]
 Position = tuple[float, float]
 
 
@@ -91,12 +87,6 @@ class Brush:
             pygame.draw.circle(fine, colour, place(complex(*at)), radius * FINE)
 
         self.smooth(canvas, [complex(*at)], radius + 1, paint)
-
-
-def mix(one: Colour, two: Colour, part: float) -> Colour:
-    """The colour `part` of the way from `one` to `two`."""
-    red, green, blue = (round(a + part * (b - a)) for a, b in zip(one, two, strict=True))
-    return red, green, blue
 
 
 def bar(surface: Any, colour: Colour, a: Position, b: Position, radius_a: float, radius_b: float) -> None:

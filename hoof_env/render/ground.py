@@ -4,37 +4,23 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from itertools import pairwise
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 import pygame
 from numpy.typing import NDArray
 
 from hoof_env.ground.terrain import Terrain
-from hoof_env.render.brush import PAPER, Brush, Colour, mix
+from hoof_env.render.brush import Brush
+from hoof_env.render.colours import ROUGHER, SLIPPERY, SOFTER, SOIL_LINE, STIFFER, Colour
 from hoof_env.render.instant import Instant
+from hoof_env.render.kinds import ALIKE, BODY, SKIN, find_patches, shade
 
-SOIL, SOIL_LINE = (214, 200, 174), (112, 95, 66)
-STIFFER, SOFTER = (150, 152, 158), (238, 226, 170)
-SLIPPERY, ROUGHER = (86, 180, 233), (90, 50, 20)
-"""Body of the soil where it is stiffer or softer; its skin where it is more slippery or rougher."""
-
-STRONG = 4.0  # a factor of stiffness or friction of this, or its inverse, has the full colour [-]
-ALIKE = 0.02  # relative difference of a factor from 1 below which the ground counts as usual [-]
 FLANK_M = 0.09  # how far from the hoof the footprint draws the ground down; the model has no width [m]
 COLUMN = 6  # distance of the places where the surface is drawn [pixels of the usual picture]
 LABEL = 90  # least width of a patch that is labelled [pixels of the usual picture]
 
 Point = tuple[float, float]
-
-
-class Patch(NamedTuple):
-    """A stretch of ground of one kind: from and to [m], factors of stiffness and friction [-]."""
-
-    start: float
-    end: float
-    stiffness: float
-    friction: float
 
 
 class GroundPainter:
@@ -149,38 +135,3 @@ def footprint(now: Instant, x: NDArray[np.float64]) -> NDArray[np.float64]:
     outside = np.maximum(a - x, x - b)
     fall = np.exp(-np.square(np.maximum(outside, 0.0) / FLANK_M))
     return np.maximum(inside, 0.0) * np.where(outside > 0, fall, 1.0)
-
-
-def find_patches(terrain: Terrain) -> list[Patch]:
-    """Stretches of one kind, all but the usual; a change over one spacing counts half to either side."""
-    factors = np.array([terrain.stiffness, terrain.friction])
-    differs = (np.diff(np.round(factors / ALIKE), axis=1) != 0).any(axis=0)
-    changes = [0, *(np.flatnonzero(differs) + 1).tolist(), factors.shape[1]]
-    patches = []
-    for first, end in pairwise(changes):
-        stiffness, friction = factors[:, (first + end) // 2].tolist()
-        if max(abs(stiffness - 1), abs(friction - 1)) > ALIKE:
-            left = -np.inf if first == 0 else terrain.start + (first - 0.5) * terrain.spacing
-            right = np.inf if end == factors.shape[1] else terrain.start + (end - 0.5) * terrain.spacing
-            patches.append(Patch(left, right, stiffness, friction))
-    return patches
-
-
-def shade(factor: Any) -> Any:
-    """Index of the colour for a factor of stiffness or friction: `SHADES` where it is 1."""
-    strength = np.log(np.maximum(factor, 1e-3)) / np.log(STRONG)
-    usual = np.abs(np.asarray(factor) - 1) <= ALIKE
-    steps = np.sign(strength) * np.maximum(np.ceil(np.minimum(np.abs(strength), 1) * SHADES - 1e-9), 1)
-    return np.where(usual, 0, steps).astype(int) + SHADES
-
-
-SHADES = 5  # of a colour between the usual and the full one
-
-BODY: tuple[Colour | None, ...] = tuple(
-    mix(SOIL, SOFTER if k < 0 else STIFFER, abs(k) / SHADES) for k in range(-SHADES, SHADES + 1)
-)
-SKIN: tuple[Colour | None, ...] = tuple(
-    mix(PAPER, SLIPPERY if k < 0 else ROUGHER, 0.35 + 0.65 * abs(k) / SHADES) if k else None
-    for k in range(-SHADES, SHADES + 1)
-)
-"""Colours by `shade`: of the soil for stiffness, of its surface for friction."""

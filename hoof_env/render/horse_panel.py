@@ -9,7 +9,8 @@ from typing import Any
 
 import pygame
 
-from hoof_env.render.brush import FAINT, FINE, FORCE, GREY, HEEL, INK, PAPER, TOE, Brush, Colour
+from hoof_env.render.brush import FINE, Brush
+from hoof_env.render.colours import FAINT, FORCE, GREY, INK, OF_LEGS, PAPER, Colour
 from hoof_env.render.instant import HorseInstant
 from hoof_env.render.panel import SECONDS, Stances, interval_of, nice
 
@@ -19,8 +20,6 @@ NUMBERS = (
     ("pitch", "deg", INK),
     ("highest force", "kN", FORCE),
 )
-COLOURS: tuple[Colour, ...] = (TOE, (86, 180, 233), HEEL, (230, 159, 0))
-"""Colours of the legs: blue and sky blue for fore, reddish purple and orange for hind."""
 ROW = 13  # height of a row of the footfall diagram [pixels of the usual picture]
 
 
@@ -96,7 +95,7 @@ class HorsePanel:
             self._brush.write(
                 canvas, f"{round(value, 2) + 0.0:.2f}", self._line(k, 210), 24, colour, "midright"
             )
-        for k, colour in enumerate(COLOURS[: len(self._legs)]):
+        for k, colour in enumerate(OF_LEGS[: len(self._legs)]):
             self._draw_curve(canvas, k, now.time, colour)
             row = self._rows[k]
             for start, end in self._stances[k]:
@@ -140,7 +139,7 @@ class HorsePanel:
             write(name, *self._line(k, 0), 20)
             write(unit_name, *self._line(k, 217), 20)
         write("force on each hoof, kN", *self._line(len(NUMBERS) + 0.2, 0), 20)
-        for plot, leg, colour in zip(self._plots, self._legs, COLOURS, strict=False):
+        for plot, leg, colour in zip(self._plots, self._legs, OF_LEGS, strict=False):
             for part in (0.0, 1.0):
                 y = plot.bottom - part * plot.height
                 whole.fill(FAINT, (plot.left, round(y), plot.width, 1))

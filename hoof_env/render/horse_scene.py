@@ -14,24 +14,17 @@ import pygame
 
 from hoof_env.ground.terrain import Terrain
 from hoof_env.leg.geometry import Geometry
-from hoof_env.render.brush import CRANK, FINE, FORCE, GREY, HEEL, TOE, Brush, arrow, bar
+from hoof_env.render.brush import FINE, Brush, arrow, bar
+from hoof_env.render.colours import COAT, COAT_EDGE, CRANK, FORCE, GREY, HEEL, TOE
 from hoof_env.render.ground import GroundPainter
 from hoof_env.render.instant import HorseInstant
-from hoof_env.render.scene import AROUND_M, ARROW_M, COAT, COAT_EDGE, Scene
+from hoof_env.render.outline import BODY, EAR, HORSE_HIP_M, TAIL, LegOutline
+from hoof_env.render.scene import AROUND_M, ARROW_M, Scene
 
 NEAR = (0, 2)  # the left legs
 FAR_COAT = 0.45  # how far the colour of far legs is from the sky's [-]
 WIDE_M, SOIL_M = (1.75, 2.25), 0.45  # seen behind and before the trunk's centre, and below the ground [m]
 ARROW_SHARE = 0.75  # length of a full-scale arrow over that of one leg's scene, at the usual hips [-]
-
-BODY = (
-    ((-0.62, 0.10), (-0.05, 0.02), 0.34, 0.33), ((-0.05, 0.02), (0.72, 0.02), 0.33, 0.36),
-    ((0.80, 0.16), (1.38, 0.74), 0.28, 0.15), ((1.40, 0.78), (1.78, 0.46), 0.15, 0.085),
-)  # fmt: skip
-"""Barrel, neck and head about the trunk's centre of mass, of a horse with hips 1.4 m high: from, to, radius
-at both ends [m]."""
-EAR, TAIL = ((1.36, 0.86), (1.38, 1.06), 0.05, 0.015), ((-0.93, 0.22), (-1.15, -0.42), 0.05, 0.025)
-USUAL_HIP_M = 1.4
 
 
 class HorseScene(Scene):
@@ -41,7 +34,7 @@ class HorseScene(Scene):
         self, brush: Brush, geometry: Geometry, terrain: Terrain, size: tuple[int, int], right: int
     ) -> None:
         self._brush, self._geometry, self._size = brush, geometry, size
-        self._animal = geometry.hip_height / USUAL_HIP_M
+        self._animal = geometry.hip_height / HORSE_HIP_M
         self._centre = (size[0] - right) * WIDE_M[0] / sum(WIDE_M)
         self._scale = (size[0] - right) / sum(WIDE_M) / self._animal
         self._girth = self._animal
@@ -49,6 +42,7 @@ class HorseScene(Scene):
         self._level = size[1] - SOIL_M * self._animal * self._scale
         self._camera = 0j
         self._ground = GroundPainter(brush, terrain, size, self._scale, size[0] - right)
+        self._leg = LegOutline(geometry)
         self._sky = self._paint_sky()
         self._key = lru_cache(maxsize=8)(self._paint_key)
 

@@ -12,7 +12,8 @@ import numpy as np
 import pygame
 
 from hoof_env.dynamics.observables import StanceCounter
-from hoof_env.render.brush import CRANK, FAINT, FINE, FORCE, GREY, INK, PAPER, Brush
+from hoof_env.render.brush import FINE, Brush
+from hoof_env.render.colours import CRANK, FAINT, FORCE, GREY, INK, PAPER
 from hoof_env.render.instant import Instant
 
 SECONDS = 3  # time shown [s]

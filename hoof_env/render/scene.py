@@ -10,31 +10,37 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Sequence
 from functools import lru_cache
-from itertools import product
 from typing import Any
 
 import numpy as np
 import pygame
 
-from hoof_env.gait import LIMITS
 from hoof_env.ground.terrain import Terrain
-from hoof_env.leg.assembly import solve
 from hoof_env.leg.geometry import Geometry
-from hoof_env.leg.kinematics import pose
-from hoof_env.render.brush import CRANK, FINE, FORCE, GREY, HEEL, INK, PAPER, TOE, Brush, arrow, bar, mix
-from hoof_env.render.ground import SOIL_LINE, GroundPainter
+from hoof_env.render.brush import FINE, Brush, arrow, bar
+from hoof_env.render.colours import (
+    COAT,
+    COAT_EDGE,
+    CRANK,
+    FORCE,
+    GREY,
+    HEEL,
+    HOOF,
+    INK,
+    LINK,
+    PAPER,
+    PASTERN,
+    PLATE,
+    SKY_BOTTOM,
+    SKY_TOP,
+    SOIL_LINE,
+    TOE,
+    mix,
+)
+from hoof_env.render.ground import GroundPainter
 from hoof_env.render.instant import Instant
+from hoof_env.render.outline import FLESH_M, HOLD_M, HORN_SHARE, TRUNK_M, LegOutline, reach
 from hoof_env.render.panel import KILONEWTONS, Unit
-
-SKY_TOP, SKY_BOTTOM = (219, 231, 242), (249, 250, 252)
-COAT, COAT_EDGE, PASTERN, HOOF = (226, 210, 194), (186, 163, 141), (196, 170, 146), (104, 74, 54)
-LINK, PLATE = (64, 78, 92), (186, 195, 205)
-
-TRUNK_M = (1.05, 0.42, 0.16)  # the trunk about O: half its length, its height above and below [m]
-HOLD_M = 0.1  # height above the trunk of the rail or plate that holds it [m]
-FLESH_M = (("O", "C", 0.13, 0.15), ("C", "F", 0.15, 0.095), ("F", "G", 0.085, 0.055))
-"""Flesh around the rigid links where a horse's leg has its bones: from, to, radius at both ends [m]."""
-HORN_SHARE = 0.45  # part of the hoof triangle, from the sole up, that is horn; above it is the pastern [-]
 
 HEIGHT_SLACK_M = 0.2  # how far O may rise or sink from the paper's hip height before the camera follows [m]
 SOIL_M = 0.4  # least depth of soil in the picture [m]
@@ -72,7 +78,7 @@ class Scene:
         self._unit, self._newtons, self._digits = forces
         self._brush, self._geometry, self._size = brush, geometry, size
         self.small = min(1.0, geometry.hip_height / USUAL_HIP_M)
-        out, up = _reach(geometry)
+        out, up = reach(geometry)
         spare = (HEIGHT_SLACK_M + MARGIN_M) * self.small
         soil = max(out + spare - geometry.hip_height, SOIL_M * self.small)
         sky = geometry.hip_height + up + spare
@@ -82,6 +88,7 @@ class Scene:
         self._camera = 0j
         self._paths: deque[tuple[float, complex, complex]] = deque()  # time [s], heel, toe [m]
         self._ground = GroundPainter(brush, terrain, size, self._scale, 2 * self._centre)
+        self._leg = LegOutline(geometry)
         self._kind, self._girth = trunk, self.small
         self._trunk = self._paint_trunk()
         self._sky = self._paint_sky()
@@ -133,12 +140,8 @@ class Scene:
 
     def points_of(self, now: Instant) -> dict[str, complex]:
         """Return the place of each named point of a leg [pixels]."""
-        hip = complex(now.x, now.y)
-        z = solve(self._geometry, [now.crank_angle])[0][0]
-        z *= np.exp(1j * now.swing_angle)
-        z.real *= self._geometry.travel
-        points = hip + z * np.exp(1j * now.pitch)
-        return dict(zip(self._geometry.mechanism.points, self._pixels(points).tolist(), strict=True))
+        points = self._pixels(self._leg.points(now)).tolist()
+        return dict(zip(self._geometry.mechanism.points, points, strict=True))
 
     def _pixels(self, z: Any) -> Any:
         """World position, complex [m], to position in the picture, complex with y down [pixels]."""
@@ -312,15 +315,3 @@ class Scene:
             write_at = at + length + 12 * unit
             self._brush.write(image, text, (write_at.real, write_at.imag), 19, GREY)
         return image
-
-
-def _reach(geometry: Geometry) -> tuple[float, float]:
-    """Return how far from O, and how far above it, the leg reaches within its limits [m]."""
-    out, up = 0.0, 0.0
-    bounds = [LIMITS[name] for name in ("swing_offset", "swing_sin", "swing_cos")]
-    for theta in np.linspace(0, 2 * np.pi, 72, endpoint=False):
-        z = pose(geometry, theta).points @ (1, 1j)
-        phi = [offset + a * np.sin(theta) + b * np.cos(theta) for offset, a, b in product(*bounds)]
-        turns = np.exp(1j * geometry.travel * np.linspace(min(phi), max(phi), 72))
-        out, up = max(out, np.abs(z).max()), max(up, np.outer(z, turns).imag.max())
-    return out, up

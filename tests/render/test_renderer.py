@@ -23,11 +23,12 @@ from hoof_env.ground.contact import Ground
 from hoof_env.ground.terrain import Terrain
 from hoof_env.leg.geometry import load_geometry
 from hoof_env.render.brush import Brush
-from hoof_env.render.ground import find_patches, footprint
+from hoof_env.render.ground import footprint
 from hoof_env.render.instant import Instant, columns_of_engine, instants
+from hoof_env.render.kinds import find_patches
+from hoof_env.render.outline import TRUNK_M
 from hoof_env.render.panel import Stances
 from hoof_env.render.renderer import Renderer, open_window
-from hoof_env.render.scene import TRUNK_M
 from tests.legs import FIRST_FIT
 
 pygame = pytest.importorskip("pygame")
