@@ -77,25 +77,31 @@ def render(
     _say(f"{out}: {count} frames, {count / fps:.1f} s, {_size(out)}{made}")
 
 
-def play(
+def view(
     id: str = "hoof_env/HorseLeg-v0",
+    policy: str | None = None,
     args: tuple[str, ...] = (),
     seed: int = 0,
-    slow: float = 1.0,
-    size: tuple[int, int] = (960, 540),
+    port: int = 5006,
+    address: str = "127.0.0.1",
+    open: bool = True,
+    out: Path = Path(),
 ) -> None:
-    """Drive the crank and the swing by keyboard in a window (needs 'render').
+    """See and touch a leg or a horse in the browser: scene, forces, settings, recordings (needs 'view').
 
     Args:
         id: id of the environment.
+        policy: the policy, as in `hoof-env render`.
         args: arguments of the environment: key=value ..., or one JSON object.
-        seed: seed of the first episode; the next ones follow it.
-        slow: factor by which it runs slower than life.
-        size: width and height of the picture above the keys [pixels].
+        seed: seed of the first episode and of "random"; the next episodes follow it.
+        port: port of the page; 0 takes any that is free.
+        address: address on which the page is served; any other than this machine's own lets others use it.
+        open: open the page in the browser, where there is a display.
+        out: folder of recordings; made if it is missing.
     """
-    from hoof_env.play import play
+    from hoof_env.view.server import view
 
-    play(id, args, seed, slow, size)
+    view(id, args, policy, seed, address, port, open, out)
 
 
 def export(
@@ -339,7 +345,7 @@ def compile() -> None:
 
 COMMANDS: dict[str, Callable[..., None]] = {
     command.__name__: command
-    for command in (reproduce, render, play, export, compare, average, manual, mjcf, compile)
+    for command in (reproduce, render, view, export, compare, average, manual, mjcf, compile)
 }
 """Functions by sub-command, in the order of the help."""
 

@@ -75,12 +75,12 @@ def surroundings(env: Any) -> Surroundings:
         ) from None
 
 
-def substeps(env: Any) -> Columns:
+def substeps(env: Any, record: Columns | None = None) -> Columns:
     """Return the columns of the last control step of an environment of this package, commands included: one
-    row for each substep, or one row after a reset."""
+    row for each substep, or one row after a reset. `record` is that of the environment, if it is known."""
     leg = env.unwrapped
     command = leg.engine.command_in(leg.engine.column(0))
-    return columns_of(leg.record(), leg.batch.body.hips, leg.terrain, command)
+    return columns_of(leg.record() if record is None else record, leg.batch.body.hips, leg.terrain, command)
 
 
 def instants_of(env: Any, columns: Columns) -> list[Any]:

@@ -28,7 +28,7 @@ from pathlib import Path
 ROOT = Path(__file__).resolve().parent.parent
 OLDEST, NEWEST = (3, 11), (3, 14)
 EXTRAS = {"demo": ("train", "render", "video", "plot")}
-EXTRAS["all"] = (*EXTRAS["demo"], "export", "identify", "tune", "onnx", "docs", "dev")
+EXTRAS["all"] = (*EXTRAS["demo"], "export", "view", "identify", "tune", "onnx", "docs", "dev")
 TOOLS = {
     "pip": ("pip", "install", "--disable-pip-version-check", "--no-input"),
     "uv": ("uv", "pip", "install", "--python", ".venv/bin/python"),

@@ -166,7 +166,7 @@ class Renderer:
             return
         display = self._pygame.display
         if display.get_surface() is None:  # at the first frame, or after a pygame.quit() elsewhere
-            open_window(self.size, "hoof-env", may_be_unseen=True)
+            open_window(self.size, "hoof-env")
             self._window_open = True
         if any(event.type == self._pygame.QUIT for event in self._pygame.event.get()):
             self.close()
@@ -176,11 +176,14 @@ class Renderer:
         self._clock.tick(self.fps)
 
 
-def open_window(size: tuple[int, int], title: str, *, may_be_unseen: bool = False) -> Any:
-    """Open pygame's window; returns its surface. `HoofEnvError` where there is no display.
+def open_window(size: tuple[int, int], title: str) -> Any:
+    """Open pygame's window; return its surface.
 
-    Without one SDL falls back to a driver that shows nothing. That counts as a window if SDL_VIDEODRIVER asks
-    for it; otherwise it is warned of where the window `may_be_unseen`, and refused elsewhere.
+    Without a display SDL falls back to a driver that shows nothing: it is warned of, unless SDL_VIDEODRIVER
+    asks for it.
+
+    Raises:
+        HoofEnvError: no driver can be started.
     """
     import pygame
 
@@ -193,9 +196,6 @@ def open_window(size: tuple[int, int], title: str, *, may_be_unseen: bool = Fals
         driver = pygame.display.get_driver()
         asked_for = os.environ.get("SDL_VIDEODRIVER", "").split(",")
         if driver in ("dummy", "offscreen") and driver not in asked_for:
-            if not may_be_unseen:
-                pygame.display.quit()
-                raise pygame.error("neither DISPLAY nor WAYLAND_DISPLAY leads to one")
             logger.warn(f"a window needs a display, and there is none: nobody sees this one; {advice}")
         window = pygame.display.set_mode(size)
     except pygame.error as error:

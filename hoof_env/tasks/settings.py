@@ -29,6 +29,7 @@ class About(NamedTuple):
         of_horse: meaning for a horse, if it differs.
         per_episode: True if `reset(options={"parameters": ...})` and `randomize` can change the setting.
         needs: another setting, and the values of it with which this one has an effect; () for any range.
+        span: values that a slider offers; None for a setting without one.
     """
 
     unit: str
@@ -36,6 +37,7 @@ class About(NamedTuple):
     of_horse: str = ""
     per_episode: bool = False
     needs: tuple[str, tuple[str, ...]] | None = None
+    span: tuple[float, float] | None = None
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -90,6 +92,7 @@ class Settings:
             "of the trunk that goes with this leg",
             of_horse="of the trunk without the limbs; at `size` 1",
             per_episode=True,
+            span=(10.0, 200.0),
         ),
     ] = 50.0
     trunk_share: Annotated[
@@ -99,6 +102,7 @@ class Settings:
             "part of the weight of trunk and leg that the leg must bear; suspended",
             per_episode=True,
             needs=("trunk", ("suspended",)),
+            span=(0.1, 1.0),
         ),
     ] = 0.8
     trunk_stiffness: Annotated[
@@ -135,19 +139,17 @@ class Settings:
             "N/m^n",
             "K of the contact law (Eq. 14); None for the preset's",
             per_episode=True,
+            span=(2e3, 1e6),
         ),
     ] = None
     exponent: Annotated[
-        float | None, About("-", "n of the contact law, 1 to 3 in steps of 1/8; None for the preset's")
+        float | None,
+        About("-", "n of the contact law, 1 to 3 in steps of 1/8; None for the preset's", span=(1.0, 3.0)),
     ] = None
     normal_law: Annotated[str, About("", "$normal_laws")] = "lankarani-nikravesh"
     restitution: Annotated[
         float,
-        About(
-            "-",
-            "nominal coefficient of restitution, 0 to 1",
-            per_episode=True,
-        ),
+        About("-", "nominal coefficient of restitution, 0 to 1", per_episode=True, span=(0.0, 1.0)),
     ] = 0.5
     approach_floor: Annotated[
         float,
@@ -166,14 +168,7 @@ class Settings:
             of_horse="$friction_laws; of a rigid hoof",
         ),
     ] = "ambrosio"
-    friction: Annotated[
-        float,
-        About(
-            "-",
-            "mu_k",
-            per_episode=True,
-        ),
-    ] = 0.4
+    friction: Annotated[float, About("-", "mu_k", per_episode=True, span=(0.0, 1.2))] = 0.4
     friction_slow: Annotated[
         float,
         About(
@@ -267,6 +262,7 @@ class Settings:
             of_horse="torque of the motor per difference of crank speed; at `size` 1",
             per_episode=True,
             needs=("drive", ("motor",)),
+            span=(10.0, 500.0),
         ),
     ] = 100.0
     motor_torque: Annotated[
@@ -277,6 +273,7 @@ class Settings:
             of_horse="largest torque of the motor, at the crank; at `size` 1",
             per_episode=True,
             needs=("drive", ("motor",)),
+            span=(50.0, 2000.0),
         ),
     ] = 600.0
     motor_inertia: Annotated[
@@ -286,6 +283,7 @@ class Settings:
             "of its rotor, at the crank",
             of_horse="of its rotor, at the crank; at `size` 1",
             needs=("drive", ("motor",)),
+            span=(0.05, 5.0),
         ),
     ] = 0.5
     # Solver and time steps
@@ -349,6 +347,7 @@ class Settings:
                 "lowest and highest commanded speed; one that never changes where both are the same; None "
                 "for the default times the root of `size`"
             ),
+            span=(0.5, 5.0),
         ),
     ] = (2.5, 2.5)
     target_seconds: Annotated[

@@ -13,7 +13,6 @@ from hoof_env import records
 from hoof_env.constants import GRAVITY
 from hoof_env.envs.policies import make_policy
 from hoof_env.film import frames
-from hoof_env.play import Game
 from hoof_env.render.instant import HorseInstant
 from hoof_env.render.renderer import new_renderer
 from hoof_env.tasks.horse_gaits import LEGS
@@ -145,19 +144,3 @@ def test_exports_name_every_limb(tmp_path, played):
     assert set(record) == set(about["units"]) | {"free_moment"} & set(record)
     lines = (tmp_path / "horse.mot").read_text().splitlines()
     assert f"nColumns={1 + 9 * 4}" in lines
-
-
-def test_a_player_moves_all_legs_alike_and_takes_a_gait():
-    game = Game(gym.make(HORSE))
-    for _ in range(5):
-        game.tick(["up", "left"])
-        assert (game.action[0::4] == 1).all()
-        assert (game.action[1::4] == -1).all()
-        assert not game.action[2::4].any()
-    game.press("0")  # its cranks cannot be stopped
-    game.tick()
-    assert not game.action.any()
-    assert not game.ended
-    game.press("1")
-    assert not game.action.any()
-    assert game.news[0].time == 0.0

@@ -1,0 +1,170 @@
+"""Controls of a page as data: groups of sliders and buttons, with units, ranges and the paper's values."""
+
+from __future__ import annotations
+
+import json
+import math
+from pathlib import Path
+from typing import Any, NamedTuple
+from urllib.parse import quote
+
+import gymnasium as gym
+
+from hoof_env.envs.policies import STANDS_FOR, policy_names
+from hoof_env.errors import HoofEnvError
+from hoof_env.gait import PARAMETERS
+from hoof_env.leg.geometry import preset_names
+from hoof_env.paper.rows import load_published
+from hoof_env.tasks.effects import check_effect
+from hoof_env.tasks.settings import ABOUT, PER_EPISODE
+from hoof_env.view.simulation import Simulation, unit_of
+
+LABELS = {
+    "stiffness": "stiffness K",
+    "exponent": "exponent n",
+    "restitution": "restitution",
+    "friction": "friction",
+    "trunk_mass": "trunk mass",
+    "trunk_share": "share of the weight",
+    "motor_gain": "motor gain",
+    "motor_torque": "largest torque",
+    "motor_inertia": "rotor inertia",
+    "target_speed": "commanded speed",
+}
+"""Names of the settings that have sliders, in their order."""
+
+GROUPS = {
+    "Ground": ("stiffness", "exponent", "restitution", "friction"),
+    "Trunk and speed": ("trunk_mass", "trunk_share", "target_speed"),
+    "Motor": ("motor_torque", "motor_gain", "motor_inertia"),
+}
+
+CONDITIONS = {
+    f"{gait}, {condition}": {"gait": gait, "restitution": restitution}
+    for gait in ("walk", "run")
+    for condition, restitution in (("elastic", 1.0), ("inelastic", 0.0))
+}
+"""The paper's four conditions: arguments of `HorseLegFixed-v0`, with which the leg turns on and on."""
+PAPER_ID = "hoof_env/HorseLegFixed-v0"
+TURNS_ON = 600.0  # `episode_seconds` of these conditions [s]
+
+LOGARITHMIC = 50.0
+"""Ratio of the ends of a range from which a slider moves by the logarithm."""
+NOTCHES = 200  # of a slider
+
+
+class Slider(NamedTuple):
+    """A slider.
+
+    Attributes:
+        ask: what the page asks when it moves, "touch" or "drive".
+        name, label, unit: name of the quantity, and words for it.
+        low, high, step, value: as the slider has them; logarithms to base ten where `is_log`.
+        is_log: True for a logarithmic slider.
+        marks: the paper's values, as positions and texts.
+    """
+
+    ask: str
+    name: str
+    label: str
+    unit: str
+    low: float
+    high: float
+    step: float
+    value: float
+    is_log: bool
+    marks: tuple[tuple[float, str], ...] = ()
+
+
+def paper_values() -> dict[str, tuple[float, ...]]:
+    """Return the values that the paper prints, by setting."""
+    printed = load_published().parameters
+    return {
+        "stiffness": (printed["stiffness"],),
+        "restitution": (printed["restitution_inelastic"], printed["restitution_elastic"]),
+        "friction": (printed["friction_kinetic"],),
+        "crank_speed": (printed["crank_speed_rad_s"],),
+    }
+
+
+def slider(
+    ask: str, name: str, label: str, value: float, span: tuple[float, float], step: float | None = None
+) -> Slider:
+    """Make a slider over a span that also holds the present value."""
+    low = min(span[0], value)
+    high = max(span[1], value)
+    is_log = low > 0 and high / low >= LOGARITHMIC
+    place = math.log10 if is_log else float
+    low, high = place(low), place(high)
+    step = step or 10.0 ** math.floor(math.log10((high - low) / NOTCHES))
+    marks = tuple(
+        ((place(number) - low) / (high - low), f"{number:.4g}")
+        for number in paper_values().get(name, ())
+        if span[0] <= number <= span[1]
+    )
+    return Slider(ask, name, label, unit_of(name), low, high, step, place(value), is_log, marks)
+
+
+def setting_sliders(simulation: Simulation) -> dict[str, list[Slider]]:
+    """Return the sliders of the settings that have an effect, by group."""
+    settings = simulation.env.unwrapped.settings  # type: ignore[attr-defined]
+    found: dict[str, list[Slider]] = {}
+    for group, names in GROUPS.items():
+        for name in names:
+            value = simulation.commanded_speed if name == "target_speed" else simulation.value_of(name)
+            span = ABOUT[name].span
+            try:
+                check_effect(name, settings)
+            except HoofEnvError:
+                continue
+            if value is None or span is None or not math.isfinite(value):
+                continue
+            step = 0.125 if name == "exponent" else None
+            found.setdefault(group, []).append(slider("touch", name, LABELS[name], value, span, step))
+    return found
+
+
+def gait_sliders(simulation: Simulation) -> list[Slider]:
+    """Return the sliders that drive one leg by hand."""
+    now = simulation.gait_now()
+    labels = dict(zip(PARAMETERS, ("crank speed", "swing offset", "swing sine", "swing cosine"), strict=True))
+    return [
+        slider("drive", name, labels[name], now[name], limits)
+        for name, limits in simulation.gait_limits.items()
+    ]
+
+
+def needs_new_environment(name: str) -> bool:
+    """True if a setting is an argument of the environment alone."""
+    return name not in PER_EPISODE and name != "target_speed"
+
+
+def known_ids() -> list[str]:
+    """Return the registered ids that the page offers."""
+    tasks = (id for id, spec in gym.registry.items() if "hoof_env" in str(spec.entry_point))
+    return sorted(tasks)
+
+
+def known_policies(simulation: Simulation) -> list[str]:
+    """Return the policies that the page offers: scripted ones, the open loop, and those of a checkout."""
+    names = policy_names(simulation.env)
+    name = STANDS_FOR.get(simulation.env_id, simulation.env_id).rpartition("/")[2]
+    if simulation.is_driven:
+        names = [*names, "open-loop"]
+    shipped = Path("agents/policies") / name
+    return [*names, *([shipped.as_posix()] if (shipped / "policy.onnx").is_file() else [])]
+
+
+def known_presets() -> list[str]:
+    """Return the presets that the page offers."""
+    return preset_names()
+
+
+def as_text(arguments: Any) -> str:
+    """Return arguments of an environment as key=value pairs."""
+    return " ".join(f"{key}={json.dumps(value, separators=(',', ':'))}" for key, value in arguments.items())
+
+
+def address_of(token: str) -> str:
+    """Return the address of a set-up that the server keeps."""
+    return f"?setup={quote(token)}"

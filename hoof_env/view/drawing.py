@@ -1,0 +1,283 @@
+"""Drawing data of an instant: one row of numbers, and the places in it from which glyphs take theirs.
+
+A row begins with time, the place that the camera looks at, and the numbers of the page; outlines follow, in
+metres of the world. The script of a page hands the parts of a row to the glyphs by `Drawing.places`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hoof_env.render.instant import HorseInstant, Instant, Surroundings
+from hoof_env.render.outline import (
+    BODY,
+    EAR,
+    FLESH_M,
+    HORN_SHARE,
+    HORSE_HIP_M,
+    TAIL,
+    TRUNK_M,
+    LegOutline,
+    reach,
+)
+
+Floats = NDArray[np.float64]
+Points = NDArray[np.complex128]
+
+HEAD = 3
+"""Numbers at the front of a row: time [s], x and level of the ground that the camera looks at [m]."""
+
+FAR = (1, 3)  # the right legs of a horse, which are drawn behind its trunk
+ARC = 9  # vertices of the round end of a part
+ARROW_M = 1.3  # length of an arrow for the full scale [m]
+ARROW_WIDTH_M = 0.035  # of the arrow of a whole hoof [m]; those of toe and heel are half as wide
+LEAST_FORCE = 0.004  # part of the full scale below which a force is not drawn [-]
+AROUND_M = np.linspace(-1.5, 1.5, 31)  # where the ground is looked at for the camera's level [m]
+COIL = np.linspace(0.0, 1.0, 17)
+USUAL_HIP_M = 1.5  # height of a hip with which a leg is drawn in full size [m]
+
+
+class Place(NamedTuple):
+    """Place in a row of the numbers of one column of a glyph's source.
+
+    Attributes:
+        source, column: names.
+        start, pieces, length: first number, how many lists there are, and the length of each; 0 pieces for
+            one plain column.
+    """
+
+    source: str
+    column: str
+    start: int
+    pieces: int
+    length: int
+
+
+def capsules(tails: Points, heads: Points, first: Floats, last: Floats) -> Points:
+    """Return the outlines of parts with round ends, shape (n, 2 `ARC`) [m].
+
+    Args:
+        tails, heads: ends of the axes, shape (n,) [m].
+        first, last: radii there, shape (n,) [m].
+    """
+    along = heads - tails
+    along = along / np.maximum(np.abs(along), 1e-9)
+    turn = np.exp(1j * np.linspace(-np.pi / 2, np.pi / 2, ARC))
+    ahead = heads[:, None] + last[:, None] * along[:, None] * turn
+    behind = tails[:, None] - first[:, None] * along[:, None] * turn
+    return np.concatenate([ahead, behind], axis=1)
+
+
+def arrows(tails: Points, forces: Points, widths: Floats) -> Points:
+    """Return the outlines of arrows from points, shape (n, 7) [m]; those without length are points."""
+    size = np.abs(forces)
+    along = forces / np.maximum(size, 1e-9)
+    head = np.minimum(3.0 * widths, size)
+    side = 0.5j * widths * along * (size > 0)
+    wing = 0.5j * head * along
+    tips = tails + forces
+    necks = tips - head * along
+    shape = (tails + side, necks + side, necks + wing, tips, necks - wing, necks - side, tails - side)
+    return np.stack(shape, axis=1)
+
+
+class Drawing:
+    """Rows of the instants of one leg.
+
+    Args:
+        setting: surroundings of the environment.
+        numbers: how many numbers of the page follow the head of a row.
+
+    Attributes:
+        places: where glyphs find their numbers.
+        full_scale: force of an arrow of `ARROW_M` at a leg of a horse's size [N].
+        low, high, half_width: what the camera shows around its place [m].
+        size, girth: size of trunk and arrows, and of legs, over that of their usual drawing [-].
+        weights, far, trunk_parts: full scale over the weight [-], legs behind the trunk, parts of the trunk.
+    """
+
+    weights = 4.0
+    far: tuple[int, ...] = ()
+    trunk_parts = 1
+    low: float
+    high: float
+    half_width: float
+
+    def __init__(self, setting: Surroundings, numbers: int) -> None:
+        self._setting = setting
+        self._leg = LegOutline(setting.geometry)
+        self._geometry = setting.geometry
+        self._find_points()
+        self.size = self.girth = 1.0
+        self._measure()
+        self.full_scale = nice(max(self.weights * setting.weight_n, 10.0))
+        self.places: list[Place] = []
+        self._used = HEAD + numbers
+        legs = range(len(setting.hips) or 1)
+        self._groups = {
+            "far": [i for i in legs if i in self.far],
+            "near": [i for i in legs if i not in self.far],
+        }
+        for group in self._groups:
+            self._claim_legs(group)
+        self._claim("trunk", self.trunk_parts, 2 * ARC)
+        self._claim("support", 0, len(COIL))
+        self._claim("arrows", 3 * len(legs), 7)
+
+    def _measure(self) -> None:
+        """Set the sizes and what the camera shows."""
+        hip = self._geometry.hip_height
+        self.size = self.girth = min(1.0, hip / USUAL_HIP_M)
+        out, up = reach(self._geometry)
+        self.low = -max(out + 0.3 * self.size - hip, 0.4 * self.size)
+        self.high = hip + up + 0.3 * self.size
+        self.half_width = out + 0.1 * self.size
+
+    def _find_points(self) -> None:
+        """Find the points of flesh and hooves, of legs that have them."""
+        points = self._geometry.mechanism.points
+        self._number = {name: k for k, name in enumerate(points)}
+        self._flesh = [part for part in FLESH_M if set(part[:2]) <= set(points)]
+        self._corners = [self._number[name] for name in self._geometry.corners]
+        self._ankle = self._number.get("G", self._corners[0])
+
+    def _claim(self, source: str, pieces: int, length: int) -> None:
+        """Give the outlines of a source their places."""
+        for column in ("xs", "ys") if pieces else ("x", "y"):
+            self.places.append(Place(source, column, self._used, pieces, length))
+            self._used += max(pieces, 1) * length
+
+    def _claim_legs(self, group: str) -> None:
+        legs = len(self._groups[group])
+        if not legs:
+            return
+        self._claim(f"{group}_flesh", legs * max(len(self._flesh), 1), 2 * ARC)
+        self._claim(f"{group}_hoof", 2 * legs, 4)
+        self._claim(f"{group}_links", legs * len(self._geometry.mechanism.tails), 2)
+        self._claim(f"{group}_joints", 0, legs * len(self._number))
+
+    @property
+    def length(self) -> int:
+        """Length of a row."""
+        return self._used
+
+    def row(self, now: Instant | HorseInstant, numbers: Sequence[float]) -> Floats:
+        """Return the row of an instant, shape (`length`,), with the numbers of the page."""
+        terrain = self._setting.terrain
+        legs = legs_of(now)
+        level = float(terrain.height_at(now.x + self.size * AROUND_M).mean())
+        parts: list[Any] = [(now.time, now.x, level), numbers]
+        points = [self._leg.points(leg) for leg in legs]
+        for group in self._groups.values():
+            if group:
+                parts += self._legs([points[i] for i in group])
+        trunk, support = self._trunk(now)
+        for outline in (trunk, support, self._arrows(legs)):
+            parts += [outline.real.ravel(), outline.imag.ravel()]
+        return np.concatenate(parts)
+
+    def _legs(self, points: list[Points]) -> list[Floats]:
+        """Return the numbers of some legs: flesh, hooves, links and joints."""
+        whole = np.stack(points)
+        n = len(points)
+        # A leg without these points has no flesh: a part without extent stands for it.
+        parts = self._flesh or [(self._geometry.toe, self._geometry.toe, 0.0, 0.0)]
+        first, last, one, other = zip(*parts, strict=True)
+        flesh = capsules(
+            whole[:, [self._number[name] for name in first]].ravel(),
+            whole[:, [self._number[name] for name in last]].ravel(),
+            self.girth * np.tile(one, n),
+            self.girth * np.tile(other, n),
+        )
+        ankle = whole[:, self._ankle]
+        sole, back = (whole[:, corner] for corner in self._corners)
+        pastern = np.stack([ankle, sole, back, ankle], axis=1)
+        horn = np.stack(
+            [sole, back, back + HORN_SHARE * (ankle - back), sole + HORN_SHARE * (ankle - sole)], axis=1
+        )
+        hooves = np.stack([pastern, horn], axis=1)
+        mechanism = self._geometry.mechanism
+        links = np.stack([whole[:, mechanism.tails], whole[:, mechanism.heads]], axis=-1)
+        outlines = (flesh, hooves, links, whole)
+        return [part.ravel() for outline in outlines for part in (outline.real, outline.imag)]
+
+    def _trunk(self, now: Any) -> tuple[Points, Points]:
+        """Return the outlines of the trunk and of what holds it."""
+        hip = complex(now.x, now.y)
+        turn = np.exp(1j * now.pitch)
+        half, above, below = (self.size * length for length in TRUNK_M)
+        radius = (above + below) / 2
+        middle = hip + turn * 0.5j * (above - below)
+        way = turn * (half - radius)
+        barrel = capsules(*(np.array([z]) for z in (middle - way, middle + way)), *np.full((2, 1), radius))
+        top = hip + turn * 1j * above
+        sky = complex(top.real, self.high + 10.0)
+        coil = top + (sky - top) * np.where(COIL < 1, COIL * 0.08 * self.size, 1.0)
+        if self._setting.trunk == "suspended":
+            coil[2:-2] += 0.06 * self.size * np.resize([1, -1], len(COIL) - 4)
+        else:  # a rail or a plate
+            coil = top + 0.1j * self.size + np.linspace(-9.0, 9.0, len(COIL))
+        return barrel, coil
+
+    def _arrows(self, legs: Sequence[Instant]) -> Points:
+        """Return the arrows of toe, heel and whole hoof of each leg."""
+        tails: list[complex] = []
+        forces: list[complex] = []
+        for now in legs:
+            tails += [complex(now.toe_x, now.toe_y), complex(now.heel_x, now.heel_y)]
+            tails.append(complex(now.cop_x, now.cop_y))
+            forces += [complex(now.toe_force_x, now.toe_force_y), complex(now.heel_force_x, now.heel_force_y)]
+            forces.append(complex(now.force_x, now.force_y))
+        lengths = np.array(forces) / self.full_scale
+        hoof = np.abs(lengths[2::3])
+        drawn = np.repeat(hoof >= LEAST_FORCE, 3)
+        shown: Any = ARROW_M * self.size * np.where(drawn, lengths, 0j)
+        # An arrow that is not drawn is a point at the toe: a centre of pressure without load is at 0, 0.
+        start = np.where(drawn, np.array(tails), np.repeat(np.array(tails)[::3], 3))
+        widths = ARROW_WIDTH_M * self.size * np.tile([0.5, 0.5, 1.0], len(legs))
+        return arrows(start, shown, widths)
+
+
+class HorseDrawing(Drawing):
+    """Rows of the instants of a horse."""
+
+    weights = 1.0
+    far = FAR
+    trunk_parts = len(BODY) + 2
+
+    def _measure(self) -> None:
+        """Set the sizes and what the camera shows."""
+        self.size = self.girth = self._geometry.hip_height / HORSE_HIP_M
+        self.low = -0.35 * self.size
+        self.high = 2.75 * self.size
+        self.half_width = 2.05 * self.size
+
+    def _trunk(self, now: Any) -> tuple[Points, Points]:
+        """Return the outlines of tail, ear, barrel, neck and head; nothing holds a horse."""
+        centre = complex(now.x, now.y)
+        turn = np.exp(1j * now.pitch)
+        parts = (TAIL, EAR, *BODY)
+        ends = np.array([[complex(*a), complex(*b)] for a, b, _, _ in parts])
+        radii = self.size * np.array([[one, other] for _, _, one, other in parts])
+        at = centre + self.size * turn * ends
+        return capsules(at[:, 0], at[:, 1], *radii.T), np.full(len(COIL), np.nan + 0j)
+
+
+def drawing_of(setting: Surroundings, numbers: int) -> Drawing:
+    """Return the drawing of a leg, or of a horse, see `Drawing`."""
+    return {True: HorseDrawing, False: Drawing}[bool(setting.hips)](setting, numbers)
+
+
+def legs_of(now: Instant | HorseInstant) -> tuple[Instant, ...]:
+    """Return the instants of all legs, of one leg its own."""
+    return now.legs if isinstance(now, HorseInstant) else (now,)
+
+
+def nice(force: float) -> float:
+    """Return the smallest 1, 2 or 5 times a power of ten that is at least `force` [N]."""
+    power = 10.0 ** np.floor(np.log10(force))
+    return float(next(power * m for m in (1, 2, 5, 10) if power * m >= force * (1 - 1e-12)))

@@ -1,0 +1,319 @@
+"""Figures of a page: the scene, and curves of forces, angles, drives and rewards against time."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+from bokeh.models import ColumnDataSource, CustomJSTickFormatter, FixedTicker, Range1d, Span
+from bokeh.plotting import figure
+
+from hoof_env.ground.terrain import Terrain
+from hoof_env.render import colours, kinds
+from hoof_env.render.colours import Colour
+from hoof_env.view.drawing import Drawing
+from hoof_env.view.history import PATHS
+
+SECONDS = 3.0  # time that curves show [s]
+DEEP = 9.0  # how far below the surface the soil is drawn [m]
+SKIN_M = 0.04  # depth to which slippery or rough ground is drawn [m]
+FAR_ALPHA = 0.4  # opacity of a horse's far legs
+LEG_WIDTH = 3.0  # of links [pixels]
+REWARDS = (
+    colours.TOE,
+    colours.FORCE,
+    colours.CRANK,
+    colours.HEEL,
+    (230, 159, 0),
+    (86, 180, 233),
+    colours.INK,
+    colours.GREY,
+    colours.HOOF,
+)
+"""Colours of the reward's terms, in their order."""
+
+
+def hex_of(colour: Colour) -> str:
+    """Return a colour as #rrggbb."""
+    return "#" + "".join(f"{part:02x}" for part in colour)
+
+
+INK = hex_of(colours.INK)
+GREY = hex_of(colours.GREY)
+FAINT = hex_of(colours.FAINT)
+
+
+def leg_name(prefix: str) -> str:
+    """Return the name of a leg from the prefix of its columns."""
+    return prefix.rstrip("_").replace("_", " ") or "leg"
+
+
+class Line(NamedTuple):
+    """A curve: its column, its name in the legend, colour and dash."""
+
+    column: str
+    label: str
+    colour: Colour
+    dash: str = "solid"
+
+
+class Scene:
+    """Figure of the scene, whose glyphs the script of the page fills from rows.
+
+    Args:
+        drawing: drawing data.
+        terrain: ground.
+        name: name of the figure in the page.
+
+    Attributes:
+        figure: the figure.
+        sources: sources of the glyphs by name.
+    """
+
+    def __init__(self, drawing: Drawing, terrain: Terrain, name: str = "scene") -> None:
+        self.drawing = drawing
+        places: dict[str, dict[str, Any]] = {}
+        for place in drawing.places:
+            columns = places.setdefault(place.source, {})
+            empty = np.full(place.length, np.nan)
+            columns[place.column] = [empty] * place.pieces if place.pieces else empty
+        self.sources = {source: ColumnDataSource(columns) for source, columns in places.items()}
+        self.figure = self._frame(name)
+        self._paint_ground(terrain)
+        self._patches("support", None)
+        if "far_flesh" in self.sources:
+            self._paint_legs("far", FAR_ALPHA)
+        self._patches("trunk", colours.COAT, colours.COAT_EDGE)
+        self._paint_legs("near", 1.0)
+        self._paint_arrows()
+
+    def _frame(self, name: str) -> Any:
+        """Make the empty figure."""
+        drawing = self.drawing
+        low, high, wide = drawing.low, drawing.high, drawing.half_width
+        f = figure(
+            name=name,
+            x_range=Range1d(-wide, wide),
+            y_range=Range1d(low, high),
+            sizing_mode="stretch_both",
+            min_height=200,
+            toolbar_location=None,
+            tools="",
+            background_fill_color=hex_of(colours.SKY_BOTTOM),
+            border_fill_color=None,
+            outline_line_color=None,
+            lod_threshold=None,
+        )
+        f.grid.visible = False
+        f.yaxis.visible = False
+        f.xaxis.axis_label = "way forward [m]"
+        dress(f)
+        f.min_border_left = 0
+        return f
+
+    def _paint_ground(self, terrain: Terrain) -> None:
+        """Draw the soil, stretches of another kind, and the surface."""
+        x = np.concatenate([[terrain.x[0] - 1e4], terrain.x, [terrain.x[-1] + 1e4]])
+        height = terrain.height_at(x)
+        soil = hex_of(colours.SOIL)
+        self.figure.varea(x=x, y1=height - DEEP, y2=height, fill_color=soil, level="underlay")
+        # In one glyph: hills have hundreds of stretches, of which a browser paints those that are seen.
+        shapes: dict[str, list[Any]] = {"xs": [], "ys": [], "fill_color": []}
+        for patch in kinds.find_patches(terrain):
+            inside = np.clip([patch.start, patch.end], x[0], x[-1])
+            knots = terrain.x[(terrain.x > inside[0]) & (terrain.x < inside[1])]
+            along = np.unique(np.concatenate([inside, knots]))
+            top = terrain.height_at(along)
+            body = kinds.BODY[int(kinds.shade(patch.stiffness))]
+            skin = kinds.SKIN[int(kinds.shade(patch.friction))]
+            for shade, depth in ((body, DEEP), (skin, SKIN_M)):
+                if shade:
+                    shapes["xs"].append(np.concatenate([along, along[::-1]]))
+                    shapes["ys"].append(np.concatenate([top, top[::-1] - depth]))
+                    shapes["fill_color"].append(hex_of(shade))
+        source = ColumnDataSource(shapes)
+        self.figure.patches("xs", "ys", fill_color="fill_color", line_color=None, source=source)
+        self.figure.line(x=x, y=height, line_color=hex_of(colours.SOIL_LINE), line_width=2)
+
+    def _patches(
+        self, name: str, fill: Colour | None, edge: Colour = colours.GREY, alpha: float = 1.0
+    ) -> None:
+        """Draw outlines with their edges behind all of them, or a line where there is nothing to fill."""
+        source = self.sources[name]
+        if fill is None:
+            self.figure.line("x", "y", source=source, line_color=hex_of(edge), line_width=2)
+            return
+        rim = {"line_color": hex_of(edge), "line_width": 3.0, "line_join": "round", "line_alpha": alpha}
+        self.figure.patches("xs", "ys", source=source, fill_color=None, **rim)
+        look = {"fill_color": hex_of(fill), "line_color": None, "fill_alpha": alpha}
+        self.figure.patches("xs", "ys", source=source, **look)
+
+    def _paint_legs(self, group: str, alpha: float) -> None:
+        """Draw flesh, hooves, links and joints of some legs."""
+        self._patches(f"{group}_flesh", colours.COAT, colours.COAT_EDGE, alpha)
+        hoof = self.sources[f"{group}_hoof"]
+        hooves = len(hoof.data["xs"]) // 2
+        hoof.data["fill"] = [hex_of(colours.PASTERN), hex_of(colours.HOOF)] * hooves
+        self.figure.patches("xs", "ys", source=hoof, fill_color="fill", line_color=None, fill_alpha=alpha)
+        links = self.sources[f"{group}_links"]
+        each = len(links.data["xs"]) // (hooves or 1)
+        links.data["line"] = ([hex_of(colours.CRANK)] + [hex_of(colours.LINK)] * (each - 1)) * hooves
+        look: dict[str, Any] = {"line_width": LEG_WIDTH, "line_cap": "round", "line_alpha": alpha}
+        self.figure.multi_line("xs", "ys", source=links, line_color="line", **look)
+        dots: dict[str, Any] = {"fill_color": "white", "line_color": INK, "line_width": 1.2}
+        joints = self.sources[f"{group}_joints"]
+        self.figure.scatter("x", "y", source=joints, size=5.5, fill_alpha=alpha, line_alpha=alpha, **dots)
+
+    def _paint_arrows(self) -> None:
+        """Draw the forces on toe, heel and whole hoof."""
+        source = self.sources["arrows"]
+        count = len(source.data["xs"]) // 3
+        source.data["fill"] = [hex_of(c) for c in (colours.TOE, colours.HEEL, colours.FORCE)] * count
+        look: dict[str, Any] = {"line_color": "white", "line_width": 1.0, "line_join": "round"}
+        self.figure.patches("xs", "ys", source=source, fill_color="fill", **look)
+
+    def paint_paths(self) -> ColumnDataSource:
+        """Draw the paths of toe and heel; return their source, whose columns are some of the curves'."""
+        source = ColumnDataSource({name: [] for name in PATHS})
+        for point, colour in (("toe", colours.TOE), ("heel", colours.HEEL)):
+            look: dict[str, Any] = {"line_color": hex_of(colour), "line_width": 1.4, "line_alpha": 0.8}
+            self.figure.line(f"{point}_x", f"{point}_y", source=source, **look)
+        return source
+
+
+def dress(f: Any) -> None:
+    """Give a figure the lettering and lines of all figures."""
+    f.axis.axis_label_text_font_style = "normal"
+    f.axis.axis_label_text_font_size = "12px"
+    f.axis.major_label_text_font_size = "12px"
+    f.axis.axis_label_text_color = GREY
+    f.axis.major_label_text_color = GREY
+    f.axis.axis_line_color = FAINT
+    f.axis.major_tick_line_color = FAINT
+    f.axis.minor_tick_line_color = None
+    f.grid.grid_line_color = "#eef1f4"
+    f.outline_line_color = None
+    f.min_border_left = 58
+
+
+class Curves(NamedTuple):
+    """A figure of curves against time.
+
+    Attributes:
+        title: title with the unit, which the page writes above it.
+        lines: curves, which the page names above it where there are several.
+        figure: the figure.
+        source: columns of its lines, with the time; the script of the page fills it.
+        window: times that are shown.
+        master: name of the source from which the script takes the columns, "curves" or "steps".
+    """
+
+    title: str
+    lines: Sequence[Line]
+    figure: Any
+    source: ColumnDataSource
+    window: Range1d
+    master: str
+
+
+def curve_figure(
+    name: str, title: str, lines: Sequence[Line], master: str = "curves", height: int = 200
+) -> Curves:
+    """Return a figure of curves against time.
+
+    Args:
+        name, title: name in the page, and title with the unit.
+        lines: curves.
+        master: see `Curves`.
+        height: height [pixels].
+    """
+    # Not empty: a browser warns of axes without data.
+    source = ColumnDataSource({column: [0.0] for column in ("time", *(line.column for line in lines))})
+    window = Range1d(0.0, SECONDS)
+    f = figure(
+        name=name,
+        x_range=window,
+        height=height,
+        sizing_mode="stretch_width",
+        toolbar_location=None,
+        tools="",
+        border_fill_color=None,
+        lod_threshold=None,
+    )
+    dress(f)
+    f.xaxis.axis_label = "time [s]"
+    f.yaxis.formatter = CustomJSTickFormatter(code="return Math.abs(tick) >= 1e4 ? tick / 1e3 + 'k' : tick")
+    for line in lines:
+        look: dict[str, Any] = {"line_color": hex_of(line.colour), "line_dash": line.dash, "line_width": 1.7}
+        f.line("time", line.column, source=source, **look)
+    return Curves(title, lines, f, source, window, master)
+
+
+def footfall_figure(legs: Sequence[str]) -> Curves:
+    """Return the footfall diagram: a bar for each leg while its hoof stands."""
+    lines = [Line(f"{leg}stance", leg_name(leg), colours.OF_LEGS[k]) for k, leg in enumerate(legs)]
+    made = curve_figure("footfall", "footfall", lines)
+    f = made.figure
+    for renderer in f.renderers:
+        renderer.glyph.line_width = 13
+    f.y_range = Range1d(0.4, len(legs) + 0.6)
+    f.yaxis.ticker = FixedTicker(ticks=[*range(1, len(legs) + 1)])
+    labels = {len(legs) - k: leg_name(leg) for k, leg in enumerate(legs)}
+    f.yaxis.major_label_overrides = labels
+    f.min_border_left = 78
+    return made
+
+
+def bars_figure(source: ColumnDataSource, terms: Sequence[str]) -> Any:
+    """Return bars of the reward's terms, summed over the episode."""
+    names = [name.removeprefix("reward_") for name in terms]
+    f = figure(
+        name="terms",
+        y_range=names[::-1],
+        height=200,
+        sizing_mode="stretch_width",
+        toolbar_location=None,
+        tools="",
+        border_fill_color=None,
+    )
+    dress(f)
+    f.min_border_left = 78
+    f.hbar(y="term", right="total", left=0, height=0.7, source=source, fill_color="colour", line_color=None)
+    f.add_layout(Span(location=0, dimension="height", line_color=GREY, line_width=1))
+    f.ygrid.visible = False
+    return f
+
+
+def line_sets(legs: Sequence[str], overlaid: bool) -> Mapping[str, tuple[str, list[Line]]]:
+    """Return the figures of curves by name: title with unit, and lines.
+
+    Args:
+        legs: prefixes of the legs.
+        overlaid: True if elastic and inelastic ground are shown for the same motion.
+    """
+
+    def each(column: str) -> list[Line]:
+        if len(legs) == 1:
+            return [Line(column, column, colours.INK)]
+        return [Line(f"{leg}{column}", leg_name(leg), colours.OF_LEGS[k]) for k, leg in enumerate(legs)]
+
+    normal = each("normal")
+    if overlaid:
+        normal = [
+            Line("elastic", "elastic ground", colours.TOE, "dashed"),
+            Line("inelastic", "inelastic ground", colours.CRANK, "dotted"),
+            Line("normal", "this ground", colours.FORCE),
+        ]
+    if len(legs) == 1:
+        forces = [Line("grf", "resultant", colours.FORCE), Line("friction", "friction", colours.TOE)]
+    else:
+        forces = each("friction")
+    return {
+        "normal": ("normal force [N]", normal),
+        "forces": ("ground reaction force [N]" if len(legs) == 1 else "friction [N]", forces),
+        "hoof_angle": ("hoof angle, heel up [deg]", each("hoof_angle")),
+        "crank_speed": ("crank speed [rad/s]", each("crank_speed")),
+        "torque": ("crank torque [N m]", each("torque")),
+        "power": ("crank power [W]", each("power")),
+    }

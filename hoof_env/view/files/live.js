@@ -1,0 +1,194 @@
+// The live page: shows what the server sends, and sends what the controls ask.
+
+const view = new SceneView(parts)
+const hidden = {sync: false}
+let asks = 0
+let going = true
+
+function ask(name, more = {}) {
+  asks += 1
+  asked.data = {message: [JSON.stringify({name, ...more, count: asks})]}
+}
+
+const find = (what) => document.querySelector(what)
+const all = (what) => [...document.querySelectorAll(what)]
+
+// States
+
+function show_frame() {
+  const {row} = frame.data
+  view.show(row)
+  const scrub = find("[data-ask=back]")
+  if (going) {
+    scrub.max = row[0].toFixed(2)
+    scrub.min = Math.max(0, row[0] - 30).toFixed(2)
+    scrub.value = scrub.max
+  }
+  find("#at").textContent = `${row[0].toFixed(2)} s`
+  document.body.dataset.states = String(Number(document.body.dataset.states ?? 0) + 1)
+}
+
+frame.connect(frame.properties.data.change, show_frame)
+
+// Figures take their turns, one in each frame of the browser: to paint all at once would make it stutter.
+const turns = []
+
+function refresh({source, window: range, master}) {
+  const {data} = masters[master]
+  const end = Math.max(masters.curves.data.time.at(-1) ?? 0, seconds)
+  const columns = Object.keys(source.data).map((name) => [name, data[name]])
+  // A full column is shifted in place, which would look the same.
+  source.setv({data: Object.fromEntries(columns)}, {sync: false, check_eq: false})
+  range.setv({start: end - seconds, end}, hidden)
+}
+
+function queue_curves() {
+  view.trace(masters.curves.data)
+  for (const figure of shown) {
+    if (!turns.includes(figure)) {
+      turns.push(figure)
+    }
+  }
+}
+
+for (const master of Object.values(masters)) {
+  master.connect(master.streaming, queue_curves)
+  master.connect(master.properties.data.change, queue_curves)
+}
+
+// Messages
+
+function hear() {
+  const message = JSON.parse(told.data.message[0])
+  if (message.go != null) {
+    window.location.assign(message.go)
+    return
+  }
+  if (message.status != null) {
+    const status = find("#status")
+    status.textContent = message.status
+    status.dataset.kind = message.kind
+  }
+  if (message.playing != null) {
+    going = message.playing
+    const button = find("[data-ask=play]")
+    button.textContent = going ? "Pause" : "Play"
+    button.setAttribute("aria-pressed", String(going))
+  }
+  if (message.span != null) {
+    const scrub = find("[data-ask=back]")
+    scrub.min = message.span[0].toFixed(2)
+    scrub.max = message.span[1].toFixed(2)
+  }
+  if (message.recording != null) {
+    const button = find("[data-ask=record]")
+    button.textContent = message.recording ? "Stop and write" : "Record"
+    button.setAttribute("aria-pressed", String(message.recording))
+  }
+  if (message.hand != null) {
+    find("[data-ask=release]").disabled = !message.hand
+  }
+}
+
+told.connect(told.properties.data.change, hear)
+
+// Controls
+
+const value_of = (input) => (input.dataset.log != null ? 10 ** Number(input.value) : Number(input.value))
+
+function write_output(input) {
+  const output = input.closest(".slider")?.querySelector("output")
+  if (output != null) {
+    const text = String(Number(value_of(input).toPrecision(4)))
+    output.textContent = `${text} ${input.dataset.unit ?? ""}`.trim()
+    input.setAttribute("aria-valuetext", output.textContent)
+  }
+}
+
+function throttled(act, wait = 60) {
+  let last = 0
+  let timer = null
+  return () => {
+    clearTimeout(timer)
+    const late = performance.now() - last - wait
+    const go = () => {
+      last = performance.now()
+      act()
+    }
+    if (late >= 0) {
+      go()
+    } else {
+      timer = setTimeout(go, -late)
+    }
+  }
+}
+
+for (const input of all("input[type=range][data-ask]")) {
+  const more = input.dataset.name != null ? {setting: input.dataset.name} : {}
+  const send = throttled(() => ask(input.dataset.ask, {...more, value: value_of(input)}))
+  input.addEventListener("input", () => {
+    write_output(input)
+    if (input.dataset.late == null) {
+      send()
+    }
+  })
+  input.addEventListener("change", send)
+  write_output(input)
+}
+
+for (const button of all("button[data-ask]")) {
+  button.addEventListener("click", () => {
+    const name = button.dataset.ask
+    if (name == "record") {
+      ask(name, {suffix: find("#format").value})
+    } else if (name == "reset") {
+      ask(name, {seed: find("#seed").value, policy: find("#policy").value})
+    } else if (name == "push") {
+      ask(name, {value: Number(find("#impulse").value)})
+    } else {
+      ask(name, button.dataset.value != null ? {value: button.dataset.value} : {})
+    }
+  })
+}
+
+find("#setup").addEventListener("submit", (event) => {
+  event.preventDefault()
+  const given = Object.fromEntries(new FormData(event.target).entries())
+  ask("setup", given)
+})
+
+bind_camera([view])
+
+document.addEventListener("keydown", (event) => {
+  if (types(event.target) || event.ctrlKey || event.metaKey || event.altKey) {
+    return
+  }
+  const on_button = event.target.tagName == "BUTTON" || event.target.tagName == "SUMMARY"
+  if (event.key == " " && !on_button && event.target.type != "range") {
+    event.preventDefault()
+    ask("play")
+  } else if (event.key == ".") {
+    ask("step")
+  } else if (event.key == "r") {
+    ask("reset")
+  }
+})
+
+if (window.matchMedia("(max-width: 760px)").matches) {
+  for (const group of all("aside details")) {
+    group.open = false
+  }
+}
+
+// Frames of the browser; their number is there to be measured.
+const count = () => {
+  document.body.dataset.frames = String(Number(document.body.dataset.frames ?? 0) + 1)
+  if (turns.length > 0) {
+    refresh(turns.shift())
+  }
+  requestAnimationFrame(count)
+}
+requestAnimationFrame(count)
+show_frame()
+queue_curves()
+document.body.dataset.ready = "true"

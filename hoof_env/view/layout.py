@@ -1,0 +1,149 @@
+"""Document of a tab: figures, controls and script."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from bokeh.models import ColumnDataSource, CustomJS
+from jinja2 import Environment, FileSystemLoader, Template
+
+from hoof_env.view import controls, figures
+from hoof_env.view.drawing import ARROW_M, HEAD
+from hoof_env.view.history import STANCE
+from hoof_env.view.player import Player
+from hoof_env.view.recording import FORMATS
+
+FOLDER = Path(__file__).parent / "files"
+SPEEDS = (0.05, 2.0)  # slowest and fastest play, over real time [-]
+
+
+class Look(NamedTuple):
+    """Player of a page and the sources of its figures: present row, curves, rewards of steps, and totals."""
+
+    player: Player
+    frame: ColumnDataSource
+    curves: ColumnDataSource
+    steps: ColumnDataSource
+    bars: ColumnDataSource
+
+
+def new_look(player: Player) -> Look:
+    """Return the sources of a player, with what it shows at present."""
+    terms = player.simulation.terms
+    shades = [figures.hex_of(line.colour) for line in reward_lines(terms)]
+    names = [name.removeprefix("reward_") for name in terms]
+    return Look(
+        player,
+        ColumnDataSource({"row": player.row()}),
+        ColumnDataSource(player.curves()),
+        ColumnDataSource(player.steps()),
+        ColumnDataSource({"term": names, "total": [0.0] * len(terms), "colour": shades}),
+    )
+
+
+def template(name: str) -> Template:
+    """Return a template of the room, which extends Bokeh's own."""
+    files = Environment(loader=FileSystemLoader(FOLDER), trim_blocks=True, lstrip_blocks=True)
+    return files.get_template(name)
+
+
+def script(*names: str) -> str:
+    """Return the scripts of some files, one after the other."""
+    return "\n".join((FOLDER / name).read_text(encoding="utf-8") for name in names)
+
+
+def scene_arguments(scene: figures.Scene, player: Player) -> dict[str, Any]:
+    """Return what the script needs to draw rows into a scene."""
+    drawing = scene.drawing
+    return {
+        "paths": scene.paint_paths() if len(player.legs) == 1 else None,
+        "figure": scene.figure,
+        "sources": scene.sources,
+        "places": [list(place) for place in drawing.places],
+        "camera": {"low": drawing.low, "high": drawing.high, "wide": drawing.half_width},
+        "head": HEAD,
+        "numbers": [list(number) for number in player.numbers],
+    }
+
+
+def legend_of(curves: figures.Curves) -> dict[str, Any]:
+    """Return what a page writes above a figure of curves: its name, title, and the names of its lines."""
+    keys = [(line.label, figures.hex_of(line.colour), line.dash) for line in curves.lines]
+    is_plain = len(keys) == 1 or curves.figure.name == "footfall"
+    return {"name": curves.figure.name, "title": curves.title, "keys": [] if is_plain else keys}
+
+
+def reward_lines(terms: tuple[str, ...]) -> list[figures.Line]:
+    """Return the curves of the reward's terms."""
+    shades = figures.REWARDS
+    return [
+        figures.Line(name, name.removeprefix("reward_"), shades[k % len(shades)])
+        for k, name in enumerate(terms)
+    ]
+
+
+def fill(doc: Any, look: Look, told: ColumnDataSource, asked: ColumnDataSource) -> None:
+    """Fill the document of a tab.
+
+    Args:
+        doc: document.
+        look: player and sources.
+        told, asked: sources of the messages to the page and from it.
+    """
+    player = look.player
+    simulation = player.simulation
+    scene = figures.Scene(player.drawing, simulation.setting.terrain)
+    sets = figures.line_sets(player.legs, "elastic" in look.curves.data)
+    curves = [figures.curve_figure(name, title, lines) for name, (title, lines) in sets.items()]
+    if len(player.legs) > 1:
+        curves.append(figures.footfall_figure(player.legs))
+    lines = reward_lines(simulation.terms)
+    curves.append(figures.curve_figure("rewards", "reward of a step, by term [-]", lines, "steps"))
+    bars = figures.bars_figure(look.bars, simulation.terms)
+    shown = [scene.figure, *(each.figure for each in curves), bars]
+    # Models that only the script knows belong to the document by this list alone.
+    scene.figure.tags = [look.frame, look.curves, look.steps, told, asked]
+    for each in shown:
+        doc.add_root(each)
+    doc.title = f"{simulation.env_id.rpartition('/')[2]} - hoof-env view"
+    doc.template = template("live.html")
+    doc.template_variables.update(variables(player, curves))
+    arguments = {
+        "parts": scene_arguments(scene, player),
+        "frame": look.frame,
+        "masters": {"curves": look.curves, "steps": look.steps},
+        "shown": [{"source": c.source, "window": c.window, "master": c.master} for c in curves],
+        "told": told,
+        "asked": asked,
+        "seconds": figures.SECONDS,
+    }
+    doc.js_on_event("document_ready", CustomJS(args=arguments, code=script("scene.js", "live.js")))
+
+
+def variables(player: Player, shown: list[figures.Curves]) -> dict[str, Any]:
+    """Return what the template of a tab says."""
+    simulation = player.simulation
+    drawing = player.drawing
+    env: Any = simulation.env.unwrapped
+    arguments = {name: value for name, value in simulation.arguments.items() if name != "preset"}
+    return {
+        "style": script("style.css"),
+        "simulation": simulation,
+        "summary": env.task.summary,
+        "figures": [legend_of(each) for each in shown],
+        "legs": [figures.leg_name(leg) for leg in player.legs],
+        "stance": STANCE,
+        "ids": controls.known_ids(),
+        "presets": controls.known_presets(),
+        "preset": env.settings.preset,
+        "policies": controls.known_policies(simulation),
+        "policy": simulation.policy or ("reference" if len(player.legs) > 1 else "run"),
+        "arguments": controls.as_text(arguments),
+        "groups": controls.setting_sliders(simulation),
+        "gait": controls.gait_sliders(simulation),
+        "conditions": [*controls.CONDITIONS],
+        "formats": FORMATS,
+        "speeds": SPEEDS,
+        "arrow": f"{drawing.full_scale / (ARROW_M * drawing.size) / 1000:.3g}",
+    }

@@ -1,0 +1,200 @@
+"""Clock of a page: how far the simulation is shown, at any speed, and what is new since the last look."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hoof_env import records
+from hoof_env.render.instant import Columns
+from hoof_env.view.drawing import drawing_of, legs_of
+from hoof_env.view.history import PATHS, STANCE, History, StanceNumbers, curves_of, thinned
+from hoof_env.view.recording import Recording
+from hoof_env.view.simulation import Chunk, Simulation
+
+FIRST_NUMBERS = {"time": 2, "speed": 2, "target": 2, "return": 2}
+"""Digits of the numbers of a page that belong to the whole body."""
+LEG_NUMBERS = {"grf": 0, **dict(zip(STANCE, (0, 0, 1, 2, 1), strict=True))}
+"""Digits of the numbers of each leg."""
+
+
+class Player:
+    """Simulation with the clock of a page.
+
+    The page's time goes on from one episode to the next: an episode that follows another begins where the
+    last one ended. It is 0 at the start of an episode that was asked for.
+
+    Args:
+        simulation: simulation; `reset` or `take` begins to show it.
+
+    Attributes:
+        history: what was shown.
+        drawing: drawing data.
+        clock, shown: time up to which the page may show and shows substeps [s].
+        totals: terms of the reward, summed over the episode.
+        recording: recording that runs, or None.
+    """
+
+    def __init__(self, simulation: Simulation) -> None:
+        self.simulation = simulation
+        self.history = History()
+        self.legs = simulation.legs
+        self.drawing = drawing_of(simulation.setting, len(self.numbers))
+        self.recording: Recording | None = None
+        self.clock = 0.0
+        self.shown = 0.0
+
+    def take(self, chunk: Chunk, is_first: bool = False) -> None:
+        """Show all substeps of a chunk that was simulated before; the first one begins anew."""
+        if is_first:
+            self.reset(chunk)
+        else:
+            self._take(chunk)
+        self._reveal(math.inf)
+
+    @property
+    def numbers(self) -> list[tuple[str, int]]:
+        """Names and digits of the numbers in a row, those of a leg with its index behind them."""
+        of_legs = [(f"{name} {k}", n) for k in range(len(self.legs)) for name, n in LEG_NUMBERS.items()]
+        return [*FIRST_NUMBERS.items(), *of_legs]
+
+    def reset(self, chunk: Chunk) -> None:
+        """Show the start of an episode that was asked for: the page begins anew."""
+        self.history.clear()
+        self.clock = 0.0
+        self.shown = 0.0
+        self._begin(chunk)
+
+    def _begin(self, chunk: Chunk) -> None:
+        """Show the start of an episode."""
+        self._base = self.shown
+        lift_off = self.simulation.setting.lift_off_n
+        self._stances = [StanceNumbers(lift_off) for _ in self.legs]
+        self.totals = dict.fromkeys(self.simulation.terms, 0.0)
+        self._waiting: list[tuple[Columns, Columns]] = []
+        self._fresh: list[Columns] = []
+        self._steps: list[dict[str, float]] = []
+        if self.recording is not None:
+            self.recording.is_over = True
+        self._take(chunk)
+        self._reveal(self.shown)
+
+    def go(self, seconds: float) -> str:
+        """Let the clock go on, and simulate and show what happens.
+
+        Args:
+            seconds: time of the page [s].
+
+        Returns:
+            How an episode ended meanwhile, "" if none did; the next one has begun then.
+
+        Raises:
+            HoofEnvError: the policy or the environment cannot go on; the clock has not moved.
+        """
+        until = self.clock + seconds
+        simulation = self.simulation
+        while self._simulated < until - 1e-9 and not simulation.ended:
+            chunk = simulation.step()
+            if chunk is not None:
+                self._take(chunk)
+        self.clock = until
+        self._reveal(until)
+        ended = simulation.ended
+        if not ended or self._waiting:
+            return ""
+        kept = self._fresh
+        steps = self._steps
+        self._begin(simulation.reset(simulation.seed + 1))
+        self._fresh = kept + self._fresh
+        self._steps = steps + self._steps
+        return ended
+
+    def step(self) -> str:
+        """Go on by one control step; see `go`."""
+        self.clock = self.shown
+        return self.go(self.simulation.setting.dt)
+
+    @property
+    def _simulated(self) -> float:
+        """Time of the page up to which there are substeps [s]."""
+        return float(self._waiting[-1][1]["time"][-1]) if self._waiting else self.shown
+
+    def _take(self, chunk: Chunk) -> None:
+        """Queue a chunk until the clock reaches it."""
+        lift_off = self.simulation.setting.lift_off_n
+        curves = curves_of(chunk, self.legs, lift_off, self._base)
+        if not chunk.terms and self._base:
+            # The start of a further episode is not joined to the end of the last one.
+            curves |= {name: np.full(len(curves["time"]), np.nan) for name in PATHS if name in curves}
+        self._waiting.append((chunk.columns, curves))
+        if self.recording is not None:
+            self.recording.add(chunk)
+        if chunk.terms:
+            for name, value in chunk.terms.items():
+                self.totals[name] += value
+            self._steps.append({"time": float(curves["time"][-1])} | chunk.terms)
+
+    def _reveal(self, until: float) -> None:
+        """Show the substeps up to a time of the page [s]."""
+        while self._waiting:
+            both = self._waiting.pop(0)
+            count = int(np.searchsorted(both[1]["time"], until + 1e-9, side="right"))
+            if count:
+                self._show(*(first(part, count) for part in both))
+            if count < len(both[1]["time"]):
+                self._waiting.insert(0, (rest(both[0], count), rest(both[1], count)))
+                return
+
+    def _show(self, columns: Columns, curves: Columns) -> None:
+        """Count substeps among those that are shown."""
+        time = columns["time"].tolist()
+        for leg, stance in zip(self.legs, self._stances, strict=True):
+            series = (columns[f"{leg}crank_angle"], curves[f"{leg}normal"], curves[f"{leg}grf"])
+            stance.add(time, *(values.tolist() for values in series))
+        self._fresh.append(curves)
+        self.shown = float(curves["time"][-1])
+        self._now = rest(columns, len(time) - 1)
+
+    # News
+
+    def curves(self) -> Columns:
+        """Return the rows of the curves that are drawn and are new since the last call, and keep them."""
+        if not self._fresh:
+            return {}
+        whole = {name: np.concatenate([part[name] for part in self._fresh]) for name in self._fresh[0]}
+        self._fresh = []
+        rows = thinned(whole, self.legs)
+        drawn = {name: values[rows] for name, values in whole.items()}
+        self.history.add_curves(drawn)
+        return drawn
+
+    def steps(self) -> dict[str, list[float]]:
+        """Return times and terms of the control steps that are new since the last call, by name."""
+        steps = self._steps
+        self._steps = []
+        return {name: [step[name] for step in steps] for name in ("time", *self.simulation.terms)}
+
+    def row(self) -> NDArray[np.float64]:
+        """Return the row of the present instant, and keep it."""
+        simulation = self.simulation
+        (now,) = records.instants_of(simulation.env, self._now)
+        target = simulation.commanded_speed
+        numbers = [now.time, now.vx, np.nan if target is None else target, sum(self.totals.values())]
+        for leg, stance in zip(legs_of(now), self._stances, strict=True):
+            numbers += [leg.grf, *stance.numbers.values()]
+        row = self.drawing.row(now, numbers)
+        row[0] = self.shown
+        self.history.add_row(row)
+        return row
+
+
+def first(columns: Columns, count: int) -> Columns:
+    """Return the first rows of columns."""
+    return {name: values[:count] for name, values in columns.items()}
+
+
+def rest(columns: Columns, count: int) -> Columns:
+    """Return columns without their first rows."""
+    return {name: values[count:] for name, values in columns.items()}

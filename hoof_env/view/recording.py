@@ -1,0 +1,130 @@
+"""Recording of a page: substeps from one press of a button to the next, written as `hoof-env export` and
+`hoof-env render` write them, or as a page that stands alone."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Callable
+from datetime import datetime
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from hoof_env import film, records
+from hoof_env.errors import HoofEnvError, check_choice
+from hoof_env.lab.forces import THRESHOLD
+from hoof_env.render.instant import Columns
+
+if TYPE_CHECKING:
+    from hoof_env.view.simulation import Chunk, Simulation
+
+FORMATS = (".html", ".mp4", ".gif", ".csv", ".mot")
+"""Formats by suffix."""
+
+LONGEST = 120.0
+"""Longest recording [s]."""
+
+FPS = 25.0  # of films [1/s]
+
+
+class Recording:
+    """Recording of a simulation.
+
+    Args:
+        simulation: simulation.
+        out: folder of the file; made if it is missing.
+        suffix: one of `FORMATS`.
+        tell: function of a text and its kind, "note" or "error", that is called when the file is written, in
+            the thread that writes it.
+
+    Attributes:
+        path: the file.
+        is_over: True after the end of the episode: what follows is not recorded.
+
+    Raises:
+        ParameterError: another format.
+        HoofEnvError: a library for the format is missing, or the folder cannot be written.
+    """
+
+    def __init__(
+        self, simulation: Simulation, out: Path, suffix: str, tell: Callable[[str, str], None]
+    ) -> None:
+        check_choice("format", suffix, FORMATS)
+        name = simulation.env_id.rpartition("/")[2].lower()
+        self.path = out / f"{name}-{datetime.now():%Y%m%d-%H%M%S-%f}{suffix}"
+        if suffix in film.FFMPEG:
+            records.check_place(self.path, film.FFMPEG)
+            film.check_film(self.path, FPS)
+        elif suffix != ".html":
+            records.check_export(self.path)
+        else:
+            records.check_place(self.path, FORMATS)
+        self._simulation = simulation
+        self.tell = tell
+        self._chunks: list[Chunk] = []
+        self._seconds = 0.0
+        self.is_over = False
+
+    def add(self, chunk: Chunk) -> None:
+        """Take the substeps of a control step."""
+        if not self.is_over and not self.is_full:
+            self._chunks.append(chunk)
+            self._seconds += self._simulation.setting.dt
+
+    @property
+    def is_full(self) -> bool:
+        """True if nothing more is taken."""
+        return self._seconds > LONGEST
+
+    def columns(self) -> Columns:
+        """Return the record, with the columns of `hoof-env export`."""
+        units = records.units_of(self._simulation.env)
+        parts = [chunk.columns for chunk in self._chunks]
+        # In the order of `records.record_episode`: free moments, which no episode has, come last.
+        whole = {name: np.concatenate([part[name] for part in parts]) for name in units if name in parts[0]}
+        return whole | {name: np.zeros(len(whole["time"])) for name in units if name not in whole}
+
+    def write(self) -> threading.Thread:
+        """Write the file in a thread of its own, and tell; return the thread."""
+        thread = threading.Thread(target=self._write_and_tell)
+        thread.start()
+        return thread
+
+    def _write_and_tell(self) -> None:
+        try:
+            if not self._chunks:
+                self.tell("Nothing was recorded: the page was paused.", "error")
+                return
+            self._write()
+        except HoofEnvError as error:
+            self.tell(f"{self.path}: {error}", "error")
+            return
+        seconds = self._chunks[-1].columns["time"][-1] - self._chunks[0].columns["time"][0]
+        self.tell(f"Wrote {self.path}: {seconds:.2f} s.", "note")
+
+    def _write(self) -> None:
+        simulation = self._simulation
+        suffix = self.path.suffix
+        if suffix == ".html":
+            from hoof_env.view.playback import Playback
+
+            Playback.of_chunks(simulation, self._chunks).write(self.path)
+        elif suffix in film.FFMPEG:
+            from hoof_env.render.renderer import new_renderer
+
+            renderer = new_renderer(simulation.setting, FPS)
+            read = partial(records.instants_of, simulation.env)
+            moved = [_from_zero(chunk.columns, self._chunks[0].columns["time"][0]) for chunk in self._chunks]
+            film.write_film(film.frames(renderer, moved, FPS, 1.0, read), self.path, FPS)
+        else:
+            about = simulation.about(
+                threshold_n=THRESHOLD, bodies={}, reactions=[], parameters=simulation.parameters
+            )
+            records.write(self.columns(), about, self.path)
+
+
+def _from_zero(columns: Columns, begin: Any) -> Columns:
+    """Return columns whose times count from the first one of a film."""
+    return columns | {"time": columns["time"] - begin}

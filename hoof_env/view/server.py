@@ -1,0 +1,172 @@
+"""Server of the live page, on this machine: `hoof-env view`."""
+
+from __future__ import annotations
+
+import errno
+import os
+import secrets
+import sys
+import webbrowser
+from collections import OrderedDict
+from collections.abc import Sequence
+from importlib.util import find_spec
+from pathlib import Path
+from typing import Any
+
+from hoof_env._output import check_folder
+from hoof_env.errors import HoofEnvError, MissingExtraError, ParameterError, count, parse_pairs
+
+MOST_TABS = 8
+"""Largest number of tabs, each with a simulation of its own."""
+
+KEPT_SETUPS = 64
+"""Number of set-ups to which tabs may go back."""
+
+HERE = ("127.0.0.1", "localhost", "::1")
+"""Addresses that only this machine reaches."""
+
+
+def check_bokeh() -> None:
+    """Raise `MissingExtraError` if Bokeh is not installed."""
+    if find_spec("bokeh") is None:
+        raise MissingExtraError('the page needs Bokeh: pip install "hoof-env[view]"')
+
+
+class Pages:
+    """Pages of a server: one simulation for each tab.
+
+    Args:
+        setup: arguments of `Simulation` of the first page.
+        out: folder of recordings.
+    """
+
+    def __init__(self, setup: dict[str, Any], out: Path) -> None:
+        self._first = setup
+        self._out = out
+        self._kept: OrderedDict[str, dict[str, Any]] = OrderedDict()
+        self.server: Any = None
+
+    def keep(self, setup: dict[str, Any]) -> str:
+        """Keep a set-up; return the address of its page, which cannot be guessed: a set-up may name files."""
+        from hoof_env.view.controls import address_of
+
+        token = secrets.token_urlsafe(16)
+        self._kept[token] = setup
+        while len(self._kept) > KEPT_SETUPS:
+            self._kept.popitem(last=False)
+        return address_of(token)
+
+    @property
+    def tabs(self) -> int:
+        """Number of tabs that are open."""
+        return sum(session.connection_count > 0 for session in self.server.get_sessions())
+
+    def open(self, doc: Any) -> None:
+        """Fill the document of a new tab."""
+        from hoof_env.view.layout import template
+        from hoof_env.view.tab import Tab
+
+        asked = doc.session_context.request.arguments.get("setup", [b""])[0].decode("ascii", "replace")
+        try:
+            if self.tabs >= MOST_TABS:
+                raise ParameterError(f"{MOST_TABS} tabs are open, each with a simulation; close one first")
+            if asked and asked not in self._kept:
+                raise ParameterError("this page is too old; open the first one again")
+            Tab(doc, self._kept.get(asked, self._first), self.keep, self._out)
+        except HoofEnvError as error:
+            doc.clear()
+            doc.title = "hoof-env view"
+            doc.template = template("refused.html")
+            doc.template_variables["reason"] = str(error)
+
+
+def start(
+    setup: dict[str, Any], address: str = HERE[0], port: int = 5006, out: Path = Path()
+) -> tuple[Any, str]:
+    """Start the server of a set-up.
+
+    Args:
+        setup: arguments of `Simulation`.
+        address: address of this machine on which the server listens.
+        port: port, 0 for any that is free.
+        out: folder of recordings.
+
+    Returns:
+        Bokeh's server, whose `io_loop` is not running yet, and the URL of the page.
+
+    Raises:
+        MissingExtraError: Bokeh is not installed.
+        HoofEnvError: the set-up is refused, the port is taken, or the address is not one of this machine.
+    """
+    check_bokeh()
+    from bokeh.application import Application
+    from bokeh.application.handlers.function import FunctionHandler
+    from bokeh.server.server import Server
+
+    from hoof_env.view.tab import checked_simulation
+
+    count("port", port, low=0, most=65535)
+    check_folder(out)
+    simulation, _ = checked_simulation(setup)
+    simulation.reset()
+    simulation.env.close()
+    pages = Pages(setup, out)
+    try:
+        server = Server(
+            {"/": Application(FunctionHandler(pages.open))},
+            address=address,
+            port=port,
+            allow_websocket_origin=[f"{name}:{port or '*'}" for name in {address, "localhost"}],
+            check_unused_sessions_milliseconds=500,
+            unused_session_lifetime_milliseconds=1000,
+        )
+    except OSError as error:
+        if error.errno == errno.EADDRINUSE:
+            raise ParameterError(f"port: expected a free one, {port} is taken; 0 takes any") from None
+        raise ParameterError(f"address: expected one of this machine, got {address!r} ({error})") from None
+    pages.server = server
+    server.start()
+    return server, f"http://{address}:{server.port}/"
+
+
+def view(
+    env_id: str,
+    arguments: Sequence[str],
+    policy: str | None,
+    seed: int,
+    address: str,
+    port: int,
+    open_browser: bool,
+    out: Path,
+) -> None:
+    """Serve the page until Ctrl-C, as `hoof-env view` does with the same options.
+
+    Raises:
+        HoofEnvError: as in `start`.
+    """
+    setup = {
+        "env_id": env_id,
+        "arguments": parse_pairs("--args", arguments),
+        "policy": policy,
+        "seed": seed,
+    }
+    server, url = start(setup, address, port, out)
+    if address not in HERE:
+        print(
+            f"hoof-env view: warning: all who reach {address} can use this page, load files and write"
+            " recordings",
+            file=sys.stderr,
+            flush=True,
+        )
+    print(f"{url}  (Ctrl-C stops)", flush=True)
+    if open_browser and has_display():
+        server.io_loop.add_callback(webbrowser.open, url)
+    try:
+        server.io_loop.start()
+    finally:
+        server.stop()
+
+
+def has_display() -> bool:
+    """True if a browser can show a window here."""
+    return sys.platform in ("win32", "darwin") or any(map(os.environ.get, ("DISPLAY", "WAYLAND_DISPLAY")))

@@ -1,0 +1,277 @@
+"""Simulation of a page: one episode after the other, step by step, which can be touched while it runs."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hoof_env import records
+from hoof_env.envs.batch_build import substeps_under
+from hoof_env.envs.batch_starts import vary
+from hoof_env.envs.policies import constant_gait, start_of
+from hoof_env.errors import ParameterError, check_number, count
+from hoof_env.gait import PARAMETERS, GaitParameters, limits_of
+from hoof_env.lab.forces import THRESHOLD, above_threshold, onto_surface
+from hoof_env.render.instant import Columns
+from hoof_env.tasks.settings import ABOUT, PER_EPISODE
+from hoof_env.view.same_motion import elastic_and_inelastic
+
+DRIVES = {"crank_torque": "N m", "crank_power": "W"}
+"""Unit of each measurement of a leg's drive that a page shows next to the columns of a record."""
+
+
+class Chunk(NamedTuple):
+    """Substeps of a control step, or the start of an episode.
+
+    Attributes:
+        columns: what `hoof-env export` writes at each substep, with all fields of instants; shape (n,).
+        drives: measurements of `DRIVES` by column, behind the names of a horse's legs, shape (n,).
+        normals: normal force of elastic and of inelastic ground for the same motion, by "elastic" and
+            "inelastic", shape (n,) [N]; empty where the contact has none, see `elastic_and_inelastic`.
+        terms: terms of the reward of this step by name; empty at a start.
+    """
+
+    columns: Columns
+    drives: Columns
+    normals: Columns
+    terms: dict[str, float]
+
+
+class Simulation:
+    """Episodes of one environment under a policy.
+
+    A request that is refused raises an error and changes nothing.
+
+    Args:
+        env_id: id of an environment of this package.
+        arguments: arguments of `gymnasium.make`.
+        policy: policy as `records.find_policy` takes it.
+        seed: seed of the first episode; the next ones follow it.
+
+    Attributes:
+        env_id, arguments, policy, seed: arguments; they change with the calls below.
+        env: environment.
+        setting: its surroundings, see `instant.Surroundings`.
+        terms: names of the reward's terms.
+        parameters: physical parameters that were touched, by name.
+        hand: gait that drives the leg instead of the policy, None for the policy.
+        ended: how the episode ended, "" while it runs.
+
+    Raises:
+        HoofEnvError: as in `records.make_env` and `records.find_policy`.
+    """
+
+    def __init__(
+        self,
+        env_id: str,
+        arguments: Mapping[str, Any] | None = None,
+        policy: str | None = None,
+        seed: int = 0,
+    ) -> None:
+        self.env_id = env_id
+        self.arguments = dict(arguments or {})
+        self.policy = policy
+        self.seed = count("seed", seed, low=0)
+        self.env = records.make_env(env_id, self.arguments)
+        self._leg: Any = self.env.unwrapped
+        self.setting = records.surroundings(self.env)
+        self._player = records.find_policy(policy, self.env, env_id, self.seed)
+        self.parameters: dict[str, float] = {}
+        self.hand: dict[str, float] | None = None
+        self.ended = ""
+        self._observation: Any = None
+        self._starts = True
+        self.terms: tuple[str, ...] = self._leg.batch.terms
+
+    @property
+    def legs(self) -> tuple[str, ...]:
+        """Prefixes of the columns of each leg, ("",) of a single one."""
+        return tuple(f"{name}_" for name in self.setting.hips) or ("",)
+
+    @property
+    def is_driven(self) -> bool:
+        """True if actions are rates of one gait, which can be driven by hand."""
+        return bool(self._leg.action_form == "rates")
+
+    @property
+    def gait_limits(self) -> dict[str, tuple[float, float]]:
+        """Limits of the gait parameters that `drive` takes, empty for a horse."""
+        return limits_of(self.setting.geometry) if self.is_driven else {}
+
+    def value_of(self, name: str) -> Any:
+        """Return the present value of a setting."""
+        if name in self.parameters:
+            return self.parameters[name]
+        return getattr(self._leg.batch.settings, name)
+
+    # Episodes
+
+    def reset(self, seed: int | None = None, policy: str | None = None) -> Chunk:
+        """Start an episode; return its first instant.
+
+        Args:
+            seed: seed; None takes the present one.
+            policy: another policy, by name; None keeps the present one.
+        """
+        chosen = self.seed if seed is None else count("seed", seed, low=0)
+        player = self._player
+        if policy is not None:
+            player = records.find_policy(policy, self.env, self.env_id, chosen)
+        options = start_of(player)
+        if self.parameters:
+            options = options | {"parameters": dict(self.parameters)}
+        self._observation, _ = self.env.reset(seed=chosen, options=options)
+        self.seed = chosen
+        self._player = player
+        if policy is not None:
+            self.policy = policy
+            self.hand = None
+        self.ended = ""
+        self._starts = True
+        return self._chunk({})
+
+    def step(self) -> Chunk | None:
+        """Take a control step; return its substeps, None if the episode is over or could not go on."""
+        if self.ended:
+            return None
+        start = np.full(1, self._starts)
+        if self.hand is not None:
+            action = self._leg.action_for(np.array([*self.hand.values()]))
+        else:
+            action, _ = self._player.predict(self._observation, episode_start=start, deterministic=True)
+        if not np.isfinite(np.asarray(action, float)).all():
+            raise ParameterError(
+                f"policy {self.policy!r}: expected finite actions, got {np.asarray(action).tolist()}"
+            )
+        before = self._leg.engine.state["time"][0]
+        self._observation, _, failed, truncated, info = self.env.step(action)
+        self._starts = False
+        if failed or truncated:
+            self.ended = str(info.get("failure", "time is up"))
+        # A step in which the simulation failed has no new substeps.
+        if self._leg.engine.state["time"][0] <= before:
+            return None
+        return self._chunk({name: float(info[name]) for name in self.terms})
+
+    def _chunk(self, terms: dict[str, float]) -> Chunk:
+        """Return the last substeps as they are shown and written."""
+        leg = self._leg
+        record = leg.record()
+        columns = records.substeps(self.env, record)
+        terrain = self.setting.terrain
+        shown = above_threshold(onto_surface(columns, terrain), THRESHOLD, terrain)
+        drives = {}
+        for i, prefix in enumerate(self.legs):
+            for name in DRIVES:
+                drives[prefix + name] = np.array(record[name][:, i, 0], float)
+        normals = elastic_and_inelastic(record, leg.batch, self.value_of("stiffness"))
+        return Chunk(shown, drives, normals, terms)
+
+    # Touching
+
+    def touch(self, name: str, value: Any) -> bool:
+        """Give a physical parameter another value at once.
+
+        Args:
+            name: one of `settings.PER_EPISODE`.
+            value: the value, in the setting's unit.
+
+        Returns:
+            False if the parameter needs shorter substeps than the environment has: nothing has changed then,
+            and an environment with this argument takes it.
+
+        Raises:
+            ParameterError: the parameter is unknown, has no effect, or is out of range.
+        """
+        number = check_number(name, value)
+        if name not in PER_EPISODE:
+            raise ParameterError(f"{name}: expected one of {', '.join(PER_EPISODE)}")
+        changed = self.parameters | {name: number}
+        batch = self._leg.batch
+        batch.body.check_options({"parameters": changed}, batch.engine.trunk, batch.settings)
+        if substeps_under(batch, changed, None) > batch.engine.substeps or batch.paper:
+            return False
+        vary(batch, 0, changed)
+        batch.has_overrides[0] = True
+        self.parameters = changed
+        if self._observation is not None:
+            # The last instant with the new parameters: from it the next substeps are recorded.
+            self._leg.set_state(self._leg.get_state())
+        return True
+
+    def drive(self, name: str, value: Any) -> None:
+        """Drive the leg by hand towards a gait of which one parameter changes.
+
+        Args:
+            name: one of `gait.PARAMETERS`.
+            value: the parameter [rad/s or rad].
+
+        Raises:
+            ParameterError: an unknown name, a value beyond the limits, or a horse.
+        """
+        limits = self.gait_limits
+        if name not in limits:
+            raise ParameterError(f"gait: expected one of {', '.join(limits) or 'no parameter'}, got {name!r}")
+        low, high = limits[name]
+        wanted = (self.hand or self.gait_now()) | {name: check_number(name, value, low=low, high=high)}
+        constant_gait(GaitParameters(*wanted.values()), self.env)  # refuses what cannot be commanded
+        self.hand = wanted
+
+    def gait_now(self) -> dict[str, float]:
+        """Return the present gait parameters of one leg, within the limits."""
+        state = self._leg.engine.state
+        now = {}
+        for name, (low, high) in self.gait_limits.items():
+            now[name] = float(np.clip(state[name][0, 0], low, high))
+        return now
+
+    def command_speed(self, value: Any) -> None:
+        """Command a speed [m/s] from now on.
+
+        Raises:
+            ParameterError: the environment has no commanded speed, or the value is out of range.
+        """
+        batch = self._leg.batch
+        if not batch.target_speed:
+            raise ParameterError(f"target_speed: expected an id with a commanded speed, got {self.env_id}")
+        number = check_number("target_speed", value, low=0.1, high=20.0)
+        batch.episode_rows.target[0] = number
+        batch.episode_rows.switch[0] = np.inf
+
+    @property
+    def commanded_speed(self) -> float | None:
+        """Commanded speed [m/s], None where there is none."""
+        batch = self._leg.batch
+        return float(batch.episode_rows.target[0]) if batch.target_speed else None
+
+    def push(self, impulse: Any) -> None:
+        """Push the trunk forward.
+
+        Args:
+            impulse: impulse at the trunk [N s].
+
+        Raises:
+            ParameterError: the environment cannot be pushed.
+        """
+        raise ParameterError(f"push: expected an environment that can be pushed, got {self.env_id}")
+
+    def about(self, **more: Any) -> dict[str, Any]:
+        """Return the description of a record of this simulation, see `records.describe`."""
+        settings = {"environment": self.env_id, "arguments": self.arguments, "policy": self.policy}
+        return records.describe(self.env, **settings, seed=self.seed, **more)
+
+
+def unit_of(name: str) -> str:
+    """Return the unit of a gait parameter or a setting, "" for none."""
+    if name in PARAMETERS:
+        return "rad/s" if name == "crank_speed" else "rad"
+    unit = ABOUT[name].unit
+    return "" if unit == "-" else unit
+
+
+def kept(columns: Mapping[str, NDArray[np.float64]], names: Any) -> Columns:
+    """Return some columns."""
+    return {name: columns[name] for name in names}

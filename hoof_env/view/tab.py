@@ -1,0 +1,306 @@
+"""One tab of the page: its simulation, what it draws, and what it does when it is asked."""
+
+from __future__ import annotations
+
+import json
+import time
+import warnings
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+from bokeh.models import ColumnDataSource
+
+from hoof_env.errors import HoofEnvError, ParameterError, check_number, parse_pairs
+from hoof_env.view import controls, figures, layout
+from hoof_env.view.layout import SPEEDS
+from hoof_env.view.player import Player
+from hoof_env.view.recording import Recording
+from hoof_env.view.simulation import Simulation
+
+TICK = 0.04  # time between two states that are sent [s]
+CURVES_EVERY = 2  # states between two pieces of the curves
+LONGEST_TICK = 0.1  # time of which a late tick makes up [s]
+POINTS = round(1.15 * figures.SECONDS / 0.002)  # of a curve that the browser keeps
+STEPS = 2000  # of the reward that the browser keeps
+
+Setup = dict[str, Any]
+"""Arguments of `Simulation`, by name."""
+
+
+class Tab:
+    """The page of one tab.
+
+    Args:
+        doc: Bokeh's document of the tab.
+        setup: arguments of the simulation.
+        keep: function that keeps another set-up and returns the address of its page.
+        out: folder of recordings.
+
+    Attributes:
+        player: simulation and clock.
+        playing, speed: True while the clock goes on, and its speed over real time.
+
+    Raises:
+        HoofEnvError: the set-up is refused.
+    """
+
+    def __init__(self, doc: Any, setup: Setup, keep: Callable[[Setup], str], out: Path) -> None:
+        self._doc = doc
+        self._keep = keep
+        self._out = out
+        simulation, self._warned = checked_simulation(setup)
+        self.player = Player(simulation)
+        self.player.reset(simulation.reset())
+        self.playing = True
+        self.speed = 1.0
+        self._ticks = 0
+        self._last = time.monotonic()
+        self.told = ColumnDataSource({"message": ["{}"]})
+        self.asked = ColumnDataSource({"message": ["{}"]})
+        self.look = layout.new_look(self.player)
+        layout.fill(doc, self.look, self.told, self.asked)
+        self.asked.on_change("data", self._on_asked)
+        doc.on_session_destroyed(lambda _: self.close())
+        doc.add_periodic_callback(self._tick, round(1000 * TICK))
+
+    # Playing
+
+    def _tick(self) -> None:
+        """Send the next state."""
+        now = time.monotonic()
+        passed = min(now - self._last, LONGEST_TICK)
+        self._last = now
+        if self._warned:
+            self._tell(status=" ".join(self._warned), kind="warning")
+            self._warned = []
+        if not self.playing:
+            return
+        try:
+            ended = self.player.go(self.speed * passed)
+        except HoofEnvError as error:
+            self.playing = False
+            self._refuse(error)
+            return
+        self._say_end(ended)
+        self._send()
+
+    def _say_end(self, ended: str) -> None:
+        """Say that an episode ended."""
+        if ended:
+            self._tell(
+                status=f"The episode ended: {ended}. The next one has seed {self.player.simulation.seed}."
+            )
+            if self.player.recording is not None:
+                self._stop_recording()
+
+    def _send(self, is_last: bool = False) -> None:
+        """Send row, curves and totals of the present instant; curves with every other state and the last."""
+        self._ticks += 1
+        self.look.frame.data = {"row": self.player.row()}
+        if not is_last and self._ticks % CURVES_EVERY:
+            return
+        drawn = self.player.curves()
+        if drawn:
+            self.look.curves.stream(drawn, POINTS)
+        steps = self.player.steps()
+        if steps["time"]:
+            self.look.steps.stream(steps, STEPS)
+        self.look.bars.patch({"total": [(slice(None), [*self.player.totals.values()])]})
+        if self.player.recording is not None and self.player.recording.is_full:
+            self._stop_recording()
+
+    def _send_anew(self) -> None:
+        """Send all that is shown at present, after a jump in time."""
+        self.player.curves()
+        shown = self.player.shown
+        drawn = self.player.history.curves_between(shown - figures.SECONDS, shown)
+        if drawn:
+            self.look.curves.data = drawn
+
+    # Requests
+
+    def _on_asked(self, attr: str, old: Any, new: Any) -> None:
+        """Do what the page asks; a refusal is told and changes nothing."""
+        try:
+            request = json.loads(new["message"][0])
+            name = request.pop("name")
+            request.pop("count", None)  # two requests in a row are never equal
+            handler = HANDLERS.get(name)
+            if handler is None:
+                raise ParameterError(f"request: expected one of {', '.join(HANDLERS)}, got {name!r}")
+            handler(self, **request)
+        except HoofEnvError as error:
+            self._refuse(error)
+        except (KeyError, TypeError, ValueError) as error:
+            self._refuse(ParameterError(f"request: {error}"))
+
+    def _refuse(self, error: Exception) -> None:
+        """Say why something is refused."""
+        self._tell(status=str(error), kind="error", playing=self.playing)
+
+    def _tell(self, **message: Any) -> None:
+        """Send a message to the page."""
+        self.told.data = {"message": [json.dumps({"kind": "note"} | message | {"at": time.monotonic()})]}
+
+    def play(self, value: bool | None = None) -> None:
+        """Play or pause; None for the other of both."""
+        self.playing = not self.playing if value is None else bool(value)
+        self._last = time.monotonic()
+        self._send_anew()
+        self._tell(playing=self.playing, span=self.player.history.span)
+
+    def step(self) -> None:
+        """Take one control step, and pause."""
+        self.playing = False
+        self._send_anew()
+        self._say_end(self.player.step())
+        self._send(is_last=True)
+        self._tell(playing=False, span=self.player.history.span)
+
+    def reset(self, seed: Any = None, policy: str | None = None) -> None:
+        """Start an episode anew."""
+        number = None if seed in (None, "") else int(check_number("seed", float(seed), low=0))
+        with warnings.catch_warnings(record=True) as said:
+            warnings.simplefilter("always")
+            chunk = self.player.simulation.reset(number, policy or None)
+        if self.player.recording is not None:
+            self._stop_recording()
+        self.player.reset(chunk)
+        self.look.steps.data = self.player.steps()
+        self._send_anew()
+        self._send(is_last=True)
+        text = " ".join(str(one.message) for one in said)
+        self._tell(status=text or f"Seed {self.player.simulation.seed}.", hand=False, playing=self.playing)
+
+    def set_speed(self, value: Any) -> None:
+        """Play slower or faster."""
+        self.speed = check_number("speed", value, low=SPEEDS[0], high=SPEEDS[1])
+
+    def back(self, value: Any) -> None:
+        """Pause and show an earlier time [s]."""
+        first, last = self.player.history.span
+        row = self.player.history.row_at(min(max(check_number("time", value), first), last))
+        self.playing = False
+        if row is not None:
+            at = float(row[0])
+            drawn = self.player.history.curves_between(at - figures.SECONDS, at + 1e-6)
+            if drawn:
+                self.look.curves.data = drawn
+            self.look.frame.data = {"row": row.astype(float)}
+        self._tell(playing=False, span=(first, last))
+
+    def touch(self, setting: str, value: Any) -> None:
+        """Give a setting another value, at once where it can change within an episode."""
+        if setting == "target_speed":
+            self.player.simulation.command_speed(value)
+        elif controls.needs_new_environment(setting) or not self.player.simulation.touch(setting, value):
+            self._go({"arguments": self.player.simulation.arguments | {setting: value}})
+
+    def drive(self, setting: str, value: Any) -> None:
+        """Drive the leg by hand."""
+        self.player.simulation.drive(setting, value)
+        self._tell(hand=True, status="You drive. The policy drives again when you choose it.")
+
+    def release(self) -> None:
+        """Give the leg back to the policy."""
+        self.player.simulation.hand = None
+        self._tell(hand=False, status="The policy drives.")
+
+    def push(self, value: Any) -> None:
+        """Push the trunk [N s]."""
+        self.player.simulation.push(value)
+
+    def condition(self, value: str) -> None:
+        """Go to one of the paper's four conditions."""
+        arguments = {"episode_seconds": controls.TURNS_ON} | controls.CONDITIONS[value]
+        self._go(
+            {
+                "env_id": controls.PAPER_ID,
+                "arguments": arguments,
+                "policy": controls.CONDITIONS[value]["gait"],
+                "seed": 0,
+            }
+        )
+
+    def setup(self, env_id: str, arguments: str, preset: str, policy: str, seed: Any) -> None:
+        """Go to another environment, preset, policy or seed."""
+        pairs = parse_pairs("arguments", arguments.split())
+        if preset:
+            pairs["preset"] = preset
+        number = int(check_number("seed", float(seed or 0), low=0))
+        here = self.player.simulation
+        if env_id == here.env_id and pairs == here.arguments:
+            self.reset(number, policy or None)
+            return
+        self._go({"env_id": env_id, "arguments": pairs, "policy": policy or None, "seed": number})
+
+    def _go(self, changes: Setup) -> None:
+        """Lead the tab to the page of another set-up, after the set-up was tried."""
+        here = self.player.simulation
+        setup = {
+            "env_id": here.env_id,
+            "arguments": here.arguments,
+            "policy": here.policy,
+            "seed": here.seed,
+        } | changes
+        simulation, _ = checked_simulation(setup)
+        simulation.reset()
+        simulation.env.close()
+        self._tell(go=self._keep(setup))
+
+    def record(self, suffix: str = ".csv") -> None:
+        """Begin a recording, or end it and write its file."""
+        if self.player.recording is None:
+            self.player.recording = Recording(self.player.simulation, self._out, suffix, self._said)
+            self._tell(recording=True, status="Recording. Press again to stop.")
+        else:
+            self._stop_recording()
+
+    def _stop_recording(self) -> None:
+        """End the recording and write its file."""
+        recording = self.player.recording
+        self.player.recording = None
+        if recording is not None:
+            self._tell(recording=False, status="Writing ...")
+            recording.write()
+
+    def _said(self, text: str, kind: str) -> None:
+        """Tell the end of a recording from its own thread."""
+        self._doc.add_next_tick_callback(lambda: self._tell(status=text, kind=kind))
+
+    def close(self) -> None:
+        """Write an unfinished recording, and let the simulation go."""
+        self.playing = False
+        recording = self.player.recording
+        if recording is not None:
+            recording.tell = lambda text, kind: print(f"hoof-env view: {text}", flush=True)
+            recording.write()
+            self.player.recording = None
+        self.player.simulation.env.close()
+        self.player.history.clear()
+
+
+HANDLERS: dict[str, Callable[..., None]] = {
+    "play": Tab.play,
+    "step": Tab.step,
+    "reset": Tab.reset,
+    "speed": Tab.set_speed,
+    "back": Tab.back,
+    "touch": Tab.touch,
+    "drive": Tab.drive,
+    "release": Tab.release,
+    "push": Tab.push,
+    "condition": Tab.condition,
+    "setup": Tab.setup,
+    "record": Tab.record,
+}
+"""Requests of a page by name."""
+
+
+def checked_simulation(setup: Setup) -> tuple[Simulation, list[str]]:
+    """Make a simulation; return it with what was warned of."""
+    with warnings.catch_warnings(record=True) as said:
+        warnings.simplefilter("always")
+        simulation = Simulation(**setup)
+    return simulation, [str(one.message) for one in said]

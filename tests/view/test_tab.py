@@ -1,0 +1,325 @@
+"""The page's tab without a browser: requests, refusals, recordings, and pages that stand alone."""
+
+from __future__ import annotations
+
+import json
+import re
+import socket
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+
+from hoof_env import cli
+from hoof_env.errors import HoofEnvError, MissingExtraError, ParameterError
+
+pytest.importorskip("bokeh")
+
+from bokeh.document import Document
+
+from hoof_env.view import server
+from hoof_env.view.controls import CONDITIONS, PAPER_ID, paper_values, setting_sliders
+from hoof_env.view.playback import Playback
+from hoof_env.view.recording import FORMATS
+from hoof_env.view.server import MOST_TABS, Pages, start
+from hoof_env.view.tab import HANDLERS, Tab
+
+LEG, HORSE = "hoof_env/HorseLeg-v0", "hoof_env/Horse-v0"
+SETUP = {"env_id": LEG, "arguments": {}, "policy": None, "seed": 0}
+
+
+class Page:
+    """A tab, and what it told."""
+
+    def __init__(self, out, **changes):
+        self.kept = []
+        keep = lambda setup: self.kept.append(setup) or "?setup=kept"  # noqa: E731
+        self.tab = Tab(Document(), SETUP | changes, keep, out)
+
+    def ask(self, name, **more):
+        """Send a request; return what the tab told meanwhile."""
+        heard = {}
+        self.tab.told.on_change("data", lambda _a, _o, new: heard.update(json.loads(new["message"][0])))
+        self.tab._on_asked("data", None, {"message": [json.dumps({"name": name, "count": 1} | more)]})
+        return heard
+
+    def tick(self, seconds):
+        """Let real time pass."""
+        for _ in range(round(seconds / 0.04)):
+            self.tab._last -= 0.04
+            self.tab._tick()
+
+    @property
+    def row(self):
+        return self.tab.look.frame.data["row"].copy()
+
+
+@pytest.fixture
+def page(tmp_path):
+    made = Page(tmp_path)
+    yield made
+    made.tab.close()
+
+
+def test_time_passes_only_while_it_plays(page):
+    page.tick(0.4)
+    assert page.row[0] >= 0.39
+    assert page.ask("play", value=False)["playing"] is False
+    before = page.row
+    page.tick(0.4)
+    np.testing.assert_array_equal(page.row, before)
+    page.ask("step")
+    assert page.row[0] == pytest.approx(before[0] + 0.02, abs=1e-6)
+    page.ask("speed", value=0.1)
+    page.ask("play", value=True)
+    at = page.row[0]
+    page.tick(0.4)
+    assert page.row[0] - at < 0.1
+
+
+def test_the_page_goes_back_in_time_and_on_again(page):
+    rows = []
+    for _ in range(30):
+        page.tick(0.04)
+        rows.append(page.row)
+    told = page.ask("back", value=float(rows[10][0]))
+    np.testing.assert_allclose(page.row, rows[10], rtol=1e-6, atol=1e-6)
+    assert told["playing"] is False
+    assert page.tab.look.curves.data["time"][-1] <= rows[10][0] + 1e-6
+    page.ask("play")
+    page.tick(0.04)
+    assert page.row[0] > rows[-1][0]
+
+
+def test_a_reset_with_a_seed_begins_the_same_episode(page):
+    page.tick(0.3)
+    page.ask("reset", seed="5", policy="walk")
+    first = page.row
+    page.tick(0.3)
+    page.ask("reset", seed="5")
+    np.testing.assert_array_equal(page.row, first)
+    assert page.tab.player.simulation.policy == "walk"
+    assert page.row[0] == 0.0
+
+
+def test_a_slider_moves_the_ground_and_the_next_episode_keeps_it(page):
+    page.tick(0.2)
+    page.ask("touch", setting="stiffness", value=40000)
+    page.ask("reset")
+    page.ask("touch", setting="restitution", value=0.1)  # before the first step of the episode
+    page.tick(0.2)
+    assert page.tab.player.simulation.parameters == {"stiffness": 40000.0, "restitution": 0.1}
+    page.ask("touch", setting="target_speed", value=1.5)
+    assert page.tab.player.simulation.commanded_speed == 1.5
+    page.ask("touch", setting="exponent", value=1.5)
+    assert page.kept[-1]["arguments"]["exponent"] == 1.5
+
+
+@pytest.mark.parametrize(
+    ("request_", "words"),
+    [
+        ({"name": "touch", "setting": "restitution", "value": 7}, "restitution"),
+        ({"name": "touch", "setting": "restitution", "value": None}, "restitution"),
+        ({"name": "drive", "setting": "swing_sin", "value": 7}, "swing_sin"),
+        ({"name": "speed", "value": 900}, "speed"),
+        ({"name": "back", "value": "soon"}, "time"),
+        ({"name": "reset", "seed": "-3"}, "seed"),
+        ({"name": "reset", "policy": "gallop"}, "policy"),
+        ({"name": "reset", "policy": "tests/view"}, "tests/view"),
+        ({"name": "condition", "value": "fly"}, "fly"),
+        ({"name": "record", "suffix": ".doc"}, "format"),
+        ({"name": "push", "value": 30}, "push"),
+        ({"name": "stop everything"}, "request"),
+        ({"name": "touch"}, "request"),
+    ],
+)
+def test_a_refusal_says_why_and_the_page_lives_on(page, request_, words):
+    page.tick(0.1)
+    told = page.ask(**request_)
+    assert told["kind"] == "error"
+    assert words in told["status"]
+    at = page.row[0]
+    page.tick(0.1)
+    assert page.row[0] > at
+    assert not page.kept
+
+
+@pytest.mark.parametrize(
+    ("form", "words"),
+    [
+        ({"env_id": "CartPole-v1"}, "of this package"),
+        ({"preset": "mule"}, "mule"),
+        ({"arguments": "friction=-2"}, "friction"),
+        ({"arguments": "friction"}, "key=value"),
+        ({"policy": "docs"}, "docs"),
+        ({"seed": "many"}, "many"),
+    ],
+)
+def test_a_refused_set_up_leaves_the_page_as_it_is(page, form, words):
+    asked = {"env_id": LEG, "arguments": "", "preset": "", "policy": "run", "seed": "0"} | form
+    told = page.ask("setup", **asked)
+    assert told["kind"] == "error"
+    assert words in told["status"]
+    assert not page.kept
+
+
+def test_another_set_up_gets_a_page_of_its_own(page):
+    told = page.ask(
+        "setup",
+        env_id=LEG,
+        arguments="friction=0.7 trunk_mass=60",
+        preset="identified",
+        policy="walk",
+        seed="4",
+    )
+    assert told["go"] == "?setup=kept"
+    arguments = {"friction": 0.7, "trunk_mass": 60, "preset": "identified"}
+    assert page.kept == [{"env_id": LEG, "arguments": arguments, "policy": "walk", "seed": 4}]
+
+
+def test_a_policy_that_fails_pauses_the_page_until_another_drives(page):
+    page.tick(0.1)
+    broken = type("Broken", (), {"predict": lambda *_, **__: (np.full(4, np.nan), None)})()
+    page.tab.player.simulation._player = broken
+    page.tick(0.1)
+    assert page.tab.playing is False
+    page.ask("reset", policy="run")
+    page.ask("play", value=True)
+    page.tick(0.1)
+    assert page.row[0] > 0.05
+
+
+def test_the_conditions_of_the_paper_are_the_paper(page):
+    page.ask("condition", value="run, inelastic")
+    (setup,) = page.kept
+    assert setup["env_id"] == PAPER_ID
+    assert setup["arguments"]["restitution"] == paper_values()["restitution"][0] == 0.0
+    assert len(CONDITIONS) == 4
+
+
+@pytest.mark.parametrize("suffix", FORMATS)
+def test_a_recording_is_written_in_each_format(page, suffix, tmp_path):
+    if suffix in (".mp4", ".gif"):
+        pytest.importorskip("imageio_ffmpeg")
+        pytest.importorskip("pygame")
+    assert page.ask("record", suffix=suffix)["recording"] is True
+    page.tick(0.2)
+    writes = []
+    recording = page.tab.player.recording
+    recording.tell = lambda *what: writes.append(what)
+    page.tab.player.recording = None
+    recording.write().join()
+    assert writes[0][1] == "note", writes
+    (path,) = tmp_path.glob(f"horseleg-v0-*{suffix}")
+    assert path.stat().st_size > 1000
+
+
+def test_a_tab_that_is_closed_during_a_recording_writes_it(tmp_path, capfd):
+    page = Page(tmp_path)
+    page.ask("record", suffix=".csv")
+    page.tick(0.2)
+    recording = page.tab.player.recording
+    write = recording.write
+    threads = []
+    recording.write = lambda: threads.append(write())
+    page.tab.close()
+    threads[0].join()
+    (path,) = tmp_path.glob("*.csv")
+    assert str(path) in capfd.readouterr().out
+    assert len(path.read_text().splitlines()) > 100
+
+
+def test_every_slider_of_a_setting_has_unit_and_range(page):
+    for env_id, arguments in ((LEG, {"drive": "motor"}), (HORSE, {})):
+        tab = Page(page.tab._out, env_id=env_id, arguments=arguments).tab
+        sliders = [one for group in setting_sliders(tab.player.simulation).values() for one in group]
+        assert len(sliders) >= 6
+        for one in sliders:
+            assert one.low < one.high
+            assert one.low - 1e-9 <= one.value <= one.high + 1e-9
+        assert {"touch", "drive"} <= set(HANDLERS)
+
+
+# Server
+
+
+def test_a_port_that_is_taken_is_told():
+    with socket.socket() as taken:
+        taken.bind(("127.0.0.1", 0))
+        taken.listen()
+        with pytest.raises(ParameterError, match=r"port: expected a free one, \d+ is taken"):
+            start(SETUP, port=taken.getsockname()[1])
+    with pytest.raises(ParameterError, match="address"):
+        start(SETUP, address="203.0.113.7", port=0)
+
+
+@pytest.mark.parametrize(
+    "options", [["--id", "CartPole-v1"], ["--port", "99999"], ["--policy", "gallop"], ["--seed", "-1"]]
+)
+def test_the_command_refuses_before_it_serves(options, capsys):
+    assert cli.main(["view", "--no-open", *options]) == 2
+    assert "hoof-env: error" in capsys.readouterr().err
+
+
+def test_without_bokeh_the_command_says_how_to_get_it(monkeypatch):
+    monkeypatch.setattr(server, "find_spec", lambda name: None)
+    with pytest.raises(MissingExtraError, match=r'pip install "hoof-env\[view\]"'):
+        start(SETUP)
+
+
+def test_a_ninth_tab_is_refused_and_an_old_page_too(tmp_path):
+    def opened(pages, arguments):
+        doc = Document()
+        request = type("Request", (), {"arguments": arguments})
+        context = type("Context", (), {"request": request})
+        doc._session_context = lambda: context
+        pages.open(doc)
+        return doc
+
+    pages = Pages(SETUP, tmp_path)
+    session = type("Session", (), {"connection_count": 1})
+    pages.server = type("Server", (), {"get_sessions": lambda self: [session] * MOST_TABS})()
+    assert "tabs are open" in opened(pages, {}).template_variables["reason"]
+    pages.server = type("Server", (), {"get_sessions": lambda self: []})()
+    assert "too old" in opened(pages, {"setup": [b"guessed"]}).template_variables["reason"]
+    kept = pages.keep(SETUP | {"seed": 7}).partition("=")[2]
+    doc = opened(pages, {"setup": [kept.encode()]})
+    assert doc.template_variables["simulation"].seed == 7
+
+
+# Pages that stand alone
+
+
+def test_a_page_stands_alone_with_the_numbers_of_the_record(tmp_path):
+    made = Playback.of_policy(LEG, "walk", seconds=0.4, friction=0.3)
+    (record,) = made.records
+    assert len(record.rows) == 21
+    assert record.curves["time"][-1] == pytest.approx(0.4)
+    text = made.write(tmp_path / "page.html").read_text()
+    outside = r"""<(?:script|link|img|iframe)[^>]*(?:src|href)=["'](?!data:)"""
+    assert not re.findall(outside, text[:1000] + text[-4000:])
+    assert len(text) < 2.2e6
+    linked = made.html("bokeh.min.js")
+    assert '<script src="bokeh.min.js">' in linked
+    assert len(linked) < 4e5
+    assert made._repr_html_().startswith("<iframe title=")
+    assert "0.40 s" in repr(made)
+
+
+def test_four_conditions_play_side_by_side():
+    runs = [
+        {"label": name, "env_id": PAPER_ID, "policy": arguments["gait"], "arguments": arguments}
+        for name, arguments in CONDITIONS.items()
+    ]
+    made = Playback.play(*runs, seconds=0.6)
+    peaks = {record.label: record.curves["normal"].max() for record in made.records}
+    assert peaks["run, inelastic"] > peaks["run, elastic"] > peaks["walk, elastic"] > 0
+    assert made.html("bokeh.min.js").count('<div data-record="') == 4
+    with pytest.raises(HoofEnvError, match="records"):
+        Playback("nothing", [])
+
+
+def test_view_needs_no_browser_to_import():
+    code = "import sys, hoof_env, hoof_env.cli; sys.exit('bokeh' in sys.modules)"
+    assert subprocess.run([sys.executable, "-c", code], check=False, timeout=120).returncode == 0
