@@ -55,7 +55,6 @@ class Simulation:
         env_id, arguments, policy, seed: arguments; they change with the calls below.
         env: environment.
         setting: its surroundings, see `instant.Surroundings`.
-        terms: names of the reward's terms.
         parameters: physical parameters that were touched, by name.
         hand: gait that drives the leg instead of the policy, None for the policy.
         ended: how the episode ended, "" while it runs.
@@ -84,12 +83,16 @@ class Simulation:
         self.ended = ""
         self._observation: Any = None
         self._starts = True
-        self.terms: tuple[str, ...] = self._leg.batch.terms
 
     @property
     def legs(self) -> tuple[str, ...]:
         """Prefixes of the columns of each leg, ("",) of a single one."""
         return tuple(f"{name}_" for name in self.setting.hips) or ("",)
+
+    @property
+    def terms(self) -> tuple[str, ...]:
+        """Names of the reward's terms."""
+        return tuple(self._leg.batch.terms)
 
     @property
     def is_driven(self) -> bool:

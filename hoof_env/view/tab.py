@@ -88,9 +88,8 @@ class Tab:
     def _say_end(self, ended: str) -> None:
         """Say that an episode ended."""
         if ended:
-            self._tell(
-                status=f"The episode ended: {ended}. The next one has seed {self.player.simulation.seed}."
-            )
+            seed = self.player.simulation.seed
+            self._tell(status=f"The episode ended: {ended}. The next one has seed {seed}.")
             if self.player.recording is not None:
                 self._stop_recording()
 
