@@ -189,6 +189,7 @@ def read_stamp():
 def install(purpose: str, anew: bool) -> str:
     """Install for a purpose; returns what the stamp says of it."""
     print(f"{'Making' if anew else 'Updating'} .venv with Python {sys.version.split()[0]}", flush=True)
+    stamp = "\n".join([*read_stamp(), ""])
     with suppress(OSError):
         stamp_path().unlink()
     if anew:
@@ -202,6 +203,8 @@ def install(purpose: str, anew: bool) -> str:
         install_torch(tool)
     except NoWheel as missing:
         if purpose != "all":
+            if not anew:  # nothing has changed: what was installed before still serves
+                stamp_path().write_text(stamp)
             raise
         print(f"  {missing}")
         print(f"  left out: {', '.join(NEED_TORCH)}; the tests that need them will say so", flush=True)

@@ -233,6 +233,9 @@ def test_without_a_wheel_of_pytorch_the_tests_get_all_else_and_a_line_says_so(
     assert len(without_torch.done) == count
     assert setup.main("demo") == 1
     assert "PyTorch cannot be had for Python 3." in capsys.readouterr().err
+    count = len(without_torch.done)
+    assert setup.main() == 0  # what the tests have is still there
+    assert len(without_torch.done) == count
 
 
 def test_where_pytorch_cannot_be_reached_set_up_stops(setup, without_torch, capsys):

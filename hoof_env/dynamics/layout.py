@@ -230,7 +230,8 @@ class StrideSums(Layout):
 
     A new quantity takes a row here, the line that computes it in `observables.count_stride`, and one in
     `PaperSolver._sum`. It is then in `step.sums` of the reward's terms, in `episode.sums`, in infos and in
-    the manual. Each field has one row or, in engines without it, none; a sum or a peak begins at 0.
+    the manual. Each field has one row or, in engines without it, none, and is NaN; a sum or a peak begins at
+    0.
     """
 
     peak_grf_increase: Annotated[Row, Quantity("N", "increase of the stances' peaks in the control step")]
@@ -256,10 +257,8 @@ class StrideSums(Layout):
         Row, Quantity("m", "load-weighted backward travel of the hoof along the ground in the control step")
     ]
     slip: Annotated[Row, Quantity("m", "way that the hoof slid in stance in the control step, to and fro")]
-    braking: Annotated[Block, LIMITED, Quantity("N s", "impulse of the ground backward in the control step")]
-    propulsion: Annotated[
-        Block, LIMITED, Quantity("N s", "impulse of the ground forward in the control step")
-    ]
+    braking: Annotated[Row, LIMITED, Quantity("N s", "impulse of the ground backward in the control step")]
+    propulsion: Annotated[Row, LIMITED, Quantity("N s", "impulse of the ground forward in the control step")]
 
 
 class LegSettings(Layout):

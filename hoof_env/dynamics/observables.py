@@ -189,8 +189,8 @@ def count_stride(trunk, leg, form, h):  # type: ignore[no-untyped-def]
     # in stance alone: a sole without mass flies back as it is unloaded, which is no slip of the hoof
     leg.sums.slip = leg.sums.slip + where(loaded, rubbed * per_load, 0.0)
     if form.has_limits:
-        leg.sums.braking[0] = leg.sums.braking[0] + h * maximum(-push.real, 0.0)
-        leg.sums.propulsion[0] = leg.sums.propulsion[0] + h * maximum(push.real, 0.0)
+        leg.sums.braking = leg.sums.braking + h * maximum(-push.real, 0.0)
+        leg.sums.propulsion = leg.sums.propulsion + h * maximum(push.real, 0.0)
 
 
 @dataclass

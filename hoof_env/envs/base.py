@@ -14,15 +14,13 @@ from gymnasium.envs.registration import EnvSpec
 from gymnasium.error import ClosedEnvironmentError, ResetNeeded
 from numpy.typing import NDArray
 
-from hoof_env.dynamics.engine import TrunkEngine
 from hoof_env.envs.batch import EpisodeBatch
 from hoof_env.envs.batch_reports import summaries_of
 from hoof_env.envs.batch_states import state_of
 from hoof_env.envs.conditions import CHANGEABLE
+from hoof_env.envs.properties import LegProperties
 from hoof_env.errors import FixedSettingError, ParameterError, check_choice
 from hoof_env.gait import GaitParameters
-from hoof_env.ground.terrain import Terrain
-from hoof_env.leg.geometry import Geometry
 from hoof_env.render.renderer import check_side
 from hoof_env.tasks.plain import as_plain, json_value, to_json
 from hoof_env.tasks.registry import Task, task_of
@@ -66,18 +64,16 @@ def generator_of(state: Any) -> np.random.Generator:
     return generator
 
 
-class LegBase:
+class LegBase(LegProperties):
     """Base of the single and the vector environment.
 
     Attributes:
         task, settings: task and its settings.
-        batch: episodes, a batch of one in the single environment.
         spec: Gymnasium's specification. Its `max_episode_steps` is the environment's own limit, from
             `episode_seconds` and `dt`, unless it has one already.
     """
 
     task: Task
-    batch: EpisodeBatch
     metadata: dict[str, Any]
     render_mode: str | None
     _size: tuple[int, int]
@@ -176,54 +172,6 @@ class LegBase:
         self.batch.change(self.task.settings(given))
         self._given = given
 
-    @property
-    def geometry(self) -> Geometry:
-        """Geometry of a leg."""
-        return self.batch.body.geometry
-
-    @property
-    def gaits(self) -> dict[str, GaitParameters]:
-        """Gaits of the preset by name; of a horse they are `HorseGait`s."""
-        of_body: Any = self.batch.body.gaits
-        gaits: dict[str, GaitParameters] = of_body
-        return gaits
-
-    @property
-    def engine(self) -> TrunkEngine:
-        """Engine that simulates all environments."""
-        return self.batch.engine
-
-    @property
-    def terrain(self) -> Terrain:
-        """Terrain under the legs."""
-        return self.batch.engine.terrain
-
-    @property
-    def dt(self) -> float:
-        """Control step [s]."""
-        return self.batch.dt
-
-    @property
-    def sim_dt(self) -> float:
-        """Substep of the settings [s], which the engine may divide."""
-        return self.batch.settings.sim_dt
-
-    @property
-    def observation_names(self) -> tuple[str, ...]:
-        """Names of the observation's entries, in order."""
-        return tuple(self.batch.names)
-
-    @property
-    def action_names(self) -> tuple[str, ...]:
-        """Names of the actions; a horse's carry the leg as prefix."""
-        names: tuple[str, ...] = self.batch.body.action_names
-        return names
-
-    @property
-    def observation_units(self) -> tuple[str, ...]:
-        """Units of `raw_observation`, in the order of the observation."""
-        return tuple(entry.unit for entry in self.batch.entries)
-
     def episode_summary(self) -> dict[str, Any]:
         """Return figures of the episode so far by name, as in `info["episode_summary"]`; in a vector
         environment of shape (num_envs,). The info lacks them where a wrapper ends an episode, such as the one
@@ -249,13 +197,6 @@ class LegBase:
     def _each(self, values: Any) -> Any:
         """Return values of all environments as an array; the single environment returns its own value."""
         return np.array(values)
-
-    @property
-    def action_form(self) -> str:
-        """Meaning of actions: "rates" of the gait parameters of one leg, or "offsets" from a horse's gait.
-        States and files of policies contain it, so that those of another form are refused."""
-        form: str = self.batch.body.action_form
-        return form
 
     def action_for(self, gait: str | GaitParameters | NDArray[np.float64]) -> NDArray[np.float32]:
         """Return the action that moves from the present gait towards another one as fast as is allowed. If it

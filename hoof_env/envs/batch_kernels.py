@@ -98,6 +98,10 @@ class BatchKernels:
         self._run_idle(self.observe_kernel)
         self.engine.reset(np.empty((self.legs, self.engine.features.gait_size, 0)), envs=[])
 
+    def compile_measured(self) -> None:
+        """Compile or load the kernel of `measured`, which few use: making a batch leaves it out."""
+        self.kernels.observers.measure_one(self.addresses, np.zeros((len(self.names), 0)))
+
     def _run_idle(self, *kernels: Any) -> None:
         """Run kernels on no environment."""
         idle = self.addresses.copy()

@@ -29,6 +29,19 @@ def state_of(batch: Any) -> dict[str, Any]:
     return state | ({"paper": batch.paper.get_state()} if batch.paper else {})
 
 
+def check_single(state: Any) -> None:
+    """Check that a state is not one of a vector environment.
+
+    Raises:
+        ParameterError: it is.
+    """
+    generators = state.get("generator") if isinstance(state, Mapping) else None
+    if isinstance(generators, list):
+        raise ParameterError(
+            f"state: expected one of a single environment, got one of {len(generators)} environments"
+        )
+
+
 def spread_state(batch: Any, state: Mapping[str, Any]) -> dict[str, Any]:
     """Return the state of a single environment as one of a vector environment with this state in every row.
 
@@ -87,6 +100,8 @@ def set_state(batch: Any, state: Mapping[str, Any]) -> None:
             f"state['episode']: expected shape {expected} for {batch.num_envs} environments, "
             f"got {episode.shape}"
         )
+    if "begun" in state:
+        raise ParameterError("state: 'begun' is called 'start_values' now")
     # States of older versions have no start values: infos then contain NaN.
     start_values = np.asarray(state.get("start_values", np.nan))
     if start_values.dtype.kind != "f" or start_values.shape not in ((), batch.start_values.shape):

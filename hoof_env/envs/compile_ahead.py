@@ -4,22 +4,30 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
+from functools import partial
+from typing import Any
 
 from hoof_env.dynamics.advance import LANES
 from hoof_env.envs.batch import EpisodeBatch
 from hoof_env.simd.cache import COMPILED, given_folder
 from hoof_env.tasks.registry import TASKS
 
+
+def compile_task(name: str, num_envs: int, **settings: Any) -> None:
+    """Compile or load the kernels of a task, by its name in `TASKS`, for one environment or many."""
+    task = TASKS[name]
+    # Making a batch compiles or loads its kernels.
+    EpisodeBatch(task, task.settings(settings), num_envs).compile_measured()
+
+
 KERNELS: dict[str, Callable[[], object]] = {
-    "one environment": lambda: EpisodeBatch(TASKS["leg"], TASKS["leg"].settings({}), 1),
-    "many side by side": lambda: EpisodeBatch(TASKS["leg"], TASKS["leg"].settings({}), LANES),
-    "the paper's solver": lambda: EpisodeBatch(
-        TASKS["fixed"], TASKS["fixed"].settings({"solver": "paper"}), 1
-    ),
-    "one horse": lambda: EpisodeBatch(TASKS["horse"], TASKS["horse"].settings({}), 1),
-    "many horses": lambda: EpisodeBatch(TASKS["horse"], TASKS["horse"].settings({}), LANES),
+    "one environment": partial(compile_task, "leg", 1),
+    "many side by side": partial(compile_task, "leg", LANES),
+    "the paper's solver": partial(compile_task, "fixed", 1, solver="paper"),
+    "one horse": partial(compile_task, "horse", 1),
+    "many horses": partial(compile_task, "horse", LANES),
 }
-"""Functions that make a batch for each set of kernels, by name. All ids share these kernels, and all settings
+"""Functions that compile each set of kernels, by name. All ids share these kernels, and all settings
 except `hoof_stiffness` of one leg, and `harmonics` and a rigid hoof of a horse."""
 
 
@@ -36,7 +44,7 @@ def compile_kernels(say: Callable[[str], None]) -> list[str]:
     for name, make in KERNELS.items():
         start = time.monotonic()
         count = len(COMPILED)
-        # Making a batch compiles or loads all of its kernels; `COMPILED` grows by those not in the cache.
+        # Grows by the kernels that are not in the cache.
         make()
         if new := COMPILED[count:]:
             say(f"{name}: {time.monotonic() - start:.1f} s for {', '.join(new)}")

@@ -18,7 +18,7 @@ from hoof_env.envs.arguments import EnvArguments, takes
 from hoof_env.envs.base import LegBase, array_of, generator_of
 from hoof_env.envs.batch_reports import failure_of, summary_of
 from hoof_env.envs.batch_starts import check_options
-from hoof_env.envs.batch_states import set_state
+from hoof_env.envs.batch_states import check_single, set_state
 from hoof_env.envs.infos import name_columns
 from hoof_env.envs.recording import Recording
 from hoof_env.envs.step import SOME_SWITCHED
@@ -234,9 +234,8 @@ class HorseLegEnv(LegBase, gym.Env[NDArray[np.float32], NDArray[np.float32]]):
             gym.logger.warn("render() was called without a render_mode: pass 'rgb_array' or 'human'")
             return None
         self._check_started("render")
-        assert self._recording is not None
-        frame: NDArray[np.uint8] | None = self._recording.frame(self.render_mode, self.metadata["render_fps"])
-        return frame
+        recording: Any = self._recording  # made at once with a render_mode
+        return recording.frame(self.render_mode, self.metadata["render_fps"])
 
     def close(self) -> None:
         """Close the window, if any."""
@@ -260,6 +259,7 @@ class HorseLegEnv(LegBase, gym.Env[NDArray[np.float32], NDArray[np.float32]]):
         Raises:
             ParameterError: a state of another id, version, geometry or setting, or one that lacks a part.
         """
+        check_single(state)
         self._check_state(state)
         generator = generator_of(state["generator"])
         set_state(self.batch, state)

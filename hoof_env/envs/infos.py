@@ -93,12 +93,23 @@ class NamedArray(np.ndarray[Any, np.dtype[np.float64]]):
     names: tuple[str, ...] = ()
 
     def __getitem__(self, key: Any) -> Any:
-        if isinstance(key, str):
-            if key not in self.names:
-                new = present_name(key, self.names)
-                raise KeyError(f"{key!r} is called {new!r} now" if new else key)
-            key = (..., self.names.index(key))
-        return np.asarray(self)[key][()]
+        return np.asarray(self)[self._place(key)][()]
+
+    def __setitem__(self, key: Any, value: Any) -> None:
+        np.asarray(self)[self._place(key)] = value
+
+    def _place(self, key: Any) -> Any:
+        """Return an index for an array without names.
+
+        Raises:
+            KeyError: there is no such name.
+        """
+        if not isinstance(key, str):
+            return key
+        if key not in self.names:
+            new = present_name(key, self.names)
+            raise KeyError(f"{key!r} is called {new!r} now" if new else key)
+        return (..., self.names.index(key))
 
     def __array_wrap__(self, array: Any, context: Any = None, return_scalar: bool = False) -> Any:
         """Return the result of an operation as a plain array: it has no names."""

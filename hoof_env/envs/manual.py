@@ -60,7 +60,7 @@ def page(task: str, film: str = "") -> str:
     s = definition.settings({})
     body = definition.body(s)
     parts = page_of_body(body)
-    film = _film(_NAMES[task], parts.kind, film) if film else ""
+    film = _film(COMMON if task == "mo" else _NAMES[task], parts.kind, film) if film else ""
     if task == "mo":
         objectives = _objectives(check_weights(s.reward_weights))
         observations = _observations(definition, body)
@@ -233,11 +233,11 @@ def _features(s: Settings, body: Body) -> Features:
 
 
 def _objectives(weights: Mapping[str, float]) -> str:
-    """Write the table of the rewards of `HorseLegMO-v0`: terms of each, and weights that are not 0."""
+    """Write the table of the rewards of `HorseLegMO-v0`: terms and weights of each."""
     rows = []
     for number, objective in enumerate(OBJECTIVES):
         terms = [term for term in TASKS["leg"].terms if term.objective == objective]
-        each = ", ".join(f"{weights[term.name]:g} {term.unit}" for term in terms if weights[term.name])
+        each = ", ".join(f"{weights[term.name]:g} {term.unit}" for term in terms)
         rows.append((str(number), objective, " + ".join(f"`{term.key}`" for term in terms), each))
     return markdown_table(("Num", "Objective", "Terms", "Weights by default"), rows)
 

@@ -19,13 +19,12 @@ from gymnasium.vector.utils import batch_space
 from numpy.typing import NDArray
 
 from hoof_env.envs.arguments import VectorArguments, takes
-from hoof_env.envs.base import LegBase, array_of, generator_of
 from hoof_env.envs.batch_reports import endings_of, infos_of
 from hoof_env.envs.batch_starts import check_options
-from hoof_env.envs.batch_states import set_state, spread_state
 from hoof_env.envs.infos import name_columns
 from hoof_env.envs.recording import Recording
-from hoof_env.envs.rows import UNKNOWN_SEED, RowAttributes, RowSeeds
+from hoof_env.envs.row_states import RowStates
+from hoof_env.envs.rows import RowAttributes, RowSeeds
 from hoof_env.envs.vector_checks import check_actions, check_drawn, check_mask
 from hoof_env.errors import ParameterError, count
 from hoof_env.render.renderer import USUAL_SIZE
@@ -51,7 +50,7 @@ def mode_of(value: Any) -> AutoresetMode:
 
 
 class HorseLegVectorEnv(  # type: ignore[misc]  # generators are of all
-    RowSeeds, RowAttributes, LegBase, VectorEnv[NDArray[np.float32], NDArray[np.float32], NDArray[Any]]
+    RowSeeds, RowAttributes, RowStates, VectorEnv[NDArray[np.float32], NDArray[np.float32], NDArray[Any]]
 ):
     """`num_envs` environments of a task, stepped together.
 
@@ -167,6 +166,11 @@ class HorseLegVectorEnv(  # type: ignore[misc]  # generators are of all
             ParameterError: actions of a wrong shape or type, or not finite.
             ResetNeeded: `reset` was not called, or, with autoreset disabled, an episode has ended.
         """
+        if self._phase == "new" and self._started.any():
+            missing = np.flatnonzero(~self._started).tolist()
+            raise ResetNeeded(
+                f"step() was called while environments {missing} have no episode yet: expected their reset()"
+            )
         self._check_started("step")
         batch = self.batch
         n = self.num_envs
@@ -281,53 +285,3 @@ class HorseLegVectorEnv(  # type: ignore[misc]  # generators are of all
         for env, recording in self._watched.items():
             if not self._ended[env]:  # else it has just started, and `_start` began its recording
                 recording.add()
-
-    def _observed(self) -> NDArray[np.float32]:
-        """Return the observations, a copy that later steps do not change."""
-        return self.batch.observations[: self.num_envs].copy()
-
-    # State
-
-    def get_state(self) -> dict[str, Any]:
-        """Return everything that changes, generators included: episodes that continue from it have the same
-        bits.
-
-        Raises:
-            ResetNeeded: there are no episodes yet.
-        """
-        generators = [generator.bit_generator.state for generator in self._generators]
-        return {**self._state_of_batch(), "ended": self._ended.copy(), "generator": generators}
-
-    def set_state(self, state: Mapping[str, Any]) -> NDArray[np.float32]:
-        """Restore a state of `get_state`; return the observations. With a state of a single environment every
-        row continues from it, so that many actions can be tried from one state.
-
-        Raises:
-            ParameterError: a state of another id, geometry, setting or number of environments.
-        """
-        if isinstance(state, Mapping) and isinstance(state.get("generator"), Mapping):
-            self._check_state(state)
-            state = spread_state(self.batch, state)
-        self._check_state(state, "ended")
-        n = self.num_envs
-        states = state["generator"]
-        ended = array_of(state["ended"]).copy()
-        if ended.dtype != bool or ended.ndim != 1:
-            raise ParameterError(
-                f"state['ended']: expected a bool array of shape ({n},), got {state['ended']!r}"
-            )
-        if ended.size != n:
-            raise ParameterError(f"state: expected one of {n} environments, got one of {ended.size}")
-        if not isinstance(states, (list, tuple)) or len(states) != n:
-            raise ParameterError(f"state['generator']: expected a list of {n}, got {states!r:.60}")
-        # The last checks: nothing has changed until here.
-        generators = [generator_of(values) for values in states]
-        set_state(self.batch, state)
-        self._ended = ended
-        self._started = np.ones(n, bool)
-        self._generators = generators
-        self._seeds = [UNKNOWN_SEED] * n
-        self._phase = "running"
-        for recording in self._watched.values():
-            recording.begin()
-        return self._observed()

@@ -188,8 +188,3 @@ def load_ground(preset: Preset = DEFAULT_PRESET, **overrides: Any) -> Ground:
     except ParameterError as error:
         raise preset_error_type(preset)(f"{preset_label(preset)}: ground: {error}") from None
     return replace(ground, **{name: value for name, value in overrides.items() if value is not None})
-
-
-def write_ground(ground: Ground) -> dict[str, float]:
-    """Return the section of a preset that `load_ground` reads."""
-    return {name: getattr(ground, name) for name in SETTINGS}

@@ -1,9 +1,10 @@
-"""Named rows of memory: `leg.theta` instead of a row number.
+"""Named rows of memory: `leg.load` instead of a row number.
 
 A subclass of `Layout` lists its fields in order, each a `Row`, a planar `Vector`, a `Block`
 of rows or another layout. Positions follow from the order, here and nowhere else. `Annotated[Row, note]` and
-`Annotated[Block, size, note]` keep a note about a field, such as its unit. Kernels reach the fields as
-attributes, of `Rows` on the stack and of `Columns` in an array; Python reaches them by `rows` and `names`.
+`Annotated[Block, size, note]` keep a note about a field, such as its unit; `Annotated[Row, size, note]` is a
+row that some engines lack. Kernels reach the fields as attributes, of `Rows` on the stack and of `Columns` in
+an array; Python reaches them by `rows` and `names`.
 """
 
 from __future__ import annotations
@@ -19,7 +20,7 @@ from numba.core.imputils import lower_constant, lower_getattr_generic, lower_set
 from numba.core.typing.templates import AttributeTemplate
 from numpy.typing import NDArray
 
-from hoof_env.simd.memory import part_of, read_row, row_type, write_row
+from hoof_env.simd.memory import absent_row, part_of, read_row, row_type, write_row
 from hoof_env.simd.types import INDEX, Code, Columns, Plane, Rows
 
 
@@ -41,8 +42,8 @@ class Block:
 
 
 class Size(NamedTuple):
-    """Default number of rows of a block, which `Layout.sized` may change. With 0 it takes no memory; kernels
-    may still mention its name in branches that are not taken."""
+    """Default number of rows of a block, 0 or 1 of a row, which `Layout.sized` may change. With 0 it takes no
+    memory; kernels may still mention its name in branches that are not taken."""
 
     name: str
     rows: int
@@ -72,7 +73,7 @@ class _Named(type):
         names = []
         for key, hint in get_type_hints(cls, include_extras=True).items():
             kind, notes = _taken_apart(hint)
-            size = notes.pop(0) if kind is Block else kind.size
+            size = notes.pop(0) if _has_size(kind, notes) else kind.size
             size = size.rows if isinstance(size, Size) else size
             if notes:
                 cls.notes[key] = notes[0]
@@ -109,13 +110,13 @@ def _sized(layout: Any, sizes: tuple[tuple[str, int], ...]) -> Any:
     kept = {}
     for key, hint in hints.items():
         kind, notes = _taken_apart(hint)
-        if kind is not Block:
+        if not _has_size(kind, notes):
             kept[key] = hint.sized(**wanted) if isinstance(hint, _Named) else hint
             continue
         size, *rest = notes
         if isinstance(size, Size):
             size = size._replace(rows=wanted.get(size.name, size.rows))
-        kept[key] = Annotated[(Block, size, *rest)]
+        kept[key] = Annotated[(kind, size, *rest)]
     # the layout itself if nothing changed: equal layouts must be one type to numba
     if kept == hints:
         return layout
@@ -129,7 +130,7 @@ def views(layout: Any, data: NDArray[Any]) -> Any:
     fields = {}
     for name, field in layout.fields.items():
         rows = data[layout.rows(name)]
-        fields[name] = rows[0] if field.kind is Row else rows
+        fields[name] = rows[0] if is_row(field) else rows
     return SimpleNamespace(**fields)
 
 
@@ -140,12 +141,22 @@ def _taken_apart(hint: Any) -> tuple[Any, list[Any]]:
     return hint, []
 
 
+def _has_size(kind: Any, notes: list[Any]) -> bool:
+    """True if the first note about a field is its number of rows."""
+    return kind is Block or bool(notes and isinstance(notes[0], Size))
+
+
+def is_row(field: Field) -> bool:
+    """True for one row that takes memory."""
+    return field.kind is Row and field.size == 1
+
+
 def _names(key: str, field: Field) -> list[str]:
     if isinstance(field.kind, _Named):
         return [f"{key}_{name}" for name in field.kind.names]
     if field.kind is Vector:
         return [f"{key}_x", f"{key}_y"]
-    return [key] if field.kind is Row else [f"{key}_{k}" for k in range(field.size)]
+    return [key] if is_row(field) else [f"{key}_{k}" for k in range(field.size)]
 
 
 class LayoutConstant(types.Opaque):
@@ -232,8 +243,11 @@ class _FieldsOfMemory(AttributeTemplate):
 
 
 def _get_field(context: Any, builder: Any, memory: Any, value: Any, name: str) -> Any:
-    (start, _, kind) = memory.layout.fields[name]
+    field = memory.layout.fields[name]
+    (start, _, kind) = field
     code = Code(context, builder)
+    if kind is Row and not field.size:
+        return absent_row(builder, memory)
     if kind is Row:
         return read_row(code, memory, value, INDEX(start))
     if kind is Vector:
@@ -245,11 +259,14 @@ def _get_field(context: Any, builder: Any, memory: Any, value: Any, name: str) -
 def _set_field(context: Any, builder: Any, signature: Any, values: Any, name: str) -> Any:
     (memory, given) = signature.args
     (place, value) = values
-    (start, _, kind) = memory.layout.fields[name]
+    field = memory.layout.fields[name]
+    (start, _, kind) = field
     code = Code(context, builder)
     # a whole block would need a copy of memory; kernels have no use for it
     if kind not in (Row, Vector):
         raise TypeError(f"{name}: the rows of a block or a layout are set one by one")
+    if not field.size:
+        return
     parts = [value] if kind is Row else code.split(given, value)
     for k, part in enumerate(parts):
         write_row(code, memory, place, INDEX(start + k), part)

@@ -341,11 +341,15 @@ class _SetRow(AbstractTemplate):
         return signature(types.none, *args) if _is_row(args) and is_real(args[2]) else None
 
 
+def absent_row(builder: Any, memory: Any) -> Any:
+    """Return NaN as the row of a field that takes no memory, instead of what lies behind it."""
+    return spread(builder, ir.Constant(DOUBLE, math.nan), max(memory.count, 1))
+
+
 def _get_row(context: Any, builder: Any, signature: Any, values: Any) -> Any:
     memory = signature.args[0]
     if memory.is_empty:
-        # not a number, instead of what lies behind
-        return spread(builder, ir.Constant(DOUBLE, math.nan), max(memory.count, 1))
+        return absent_row(builder, memory)
     row = context.cast(builder, values[1], signature.args[1], types.intp)
     return read_row(Code(context, builder), signature.args[0], values[0], row)
 

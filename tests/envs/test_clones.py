@@ -63,6 +63,16 @@ def test_a_state_that_is_none_of_one_environment_changes_nothing():
         with pytest.raises(ParameterError, match=message):
             envs.set_state(state)
         same(envs.get_state(), before)
+    for state, message in (
+        (before, "state: expected one of a single environment, got one of 3 environments"),
+        (
+            {"begun" if key == "start_values" else key: part for key, part in good.items()},
+            "state: 'begun' is called 'start_values' now",
+        ),
+    ):
+        with pytest.raises(ParameterError, match=message):
+            env.unwrapped.set_state(state)
+        same(env.unwrapped.get_state(), good)
 
 
 @pytest.mark.parametrize("env_id", [LEG, HORSE])

@@ -162,6 +162,12 @@ def test_named_rows():
         assert not np.shares_memory(twin, row)
     with pytest.raises(KeyError, match="fast"):
         row["fast"]
+    changed = row.copy()
+    changed["swing_sin"] = 9.0
+    changed[0] = 8.0
+    assert (changed["swing_sin"], changed[0], row["swing_sin"] == 9.0) == (9.0, 8.0, False)
+    with pytest.raises(KeyError, match="fast"):
+        changed["fast"] = 1.0
     horse = name_columns(np.arange(2.0), ("left_fore_highest_grf", "left_fore_toe_deflection_normal"))
     for old, new in (("highest", "highest_grf"), ("toe_give_normal", "toe_deflection_normal")):
         with pytest.raises(KeyError, match=f"'left_fore_{old}' is called 'left_fore_{new}' now"):

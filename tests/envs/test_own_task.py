@@ -383,7 +383,7 @@ def test_a_term_with_the_name_of_a_built_in_one_is_the_users():
 
 def test_a_sum_that_a_leg_does_not_have_is_not_a_number():
     def braking(step, weight):
-        return weight * step.sums.braking[0]
+        return weight * step.sums.braking
 
     register("own/Braking-v0", terms=[Term("braking", 1.0, "-", "of x", braking)])
     env = gym.make("own/Braking-v0")

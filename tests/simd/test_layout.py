@@ -10,7 +10,7 @@ from numba import njit
 from numba.core.errors import TypingError
 
 from hoof_env.simd import block_at, columns, load_rows, rows
-from hoof_env.simd.layout import Block, Layout, Row, Vector, views
+from hoof_env.simd.layout import Block, Layout, Row, Size, Vector, views
 from hoof_env.simd.memory import address, doubles
 
 
@@ -105,3 +105,31 @@ def test_memory_of_another_layout_does_not_fill_rows():
 
     with pytest.raises(TypeError, match="fill: expected one layout"):
         wrong(np.zeros((10, 1)))
+
+
+class Sums(Layout):
+    first: Row
+    extra: Annotated[Row, Size("extra", 0), "a note"]
+    last: Row
+
+
+@pytest.mark.parametrize("lanes", [0, 8])
+@pytest.mark.parametrize("extra", [0, 1])
+def test_a_row_that_some_lack_is_not_a_number_there_and_takes_no_memory(lanes, extra):
+    layout = Sums.sized(extra=extra)
+
+    @njit(error_model="numpy")
+    def work(data):
+        for n in range(0, data.shape[1], max(lanes, 1)):
+            sums = columns(address(data), lanes, layout, n, data.shape[1], 1)
+            sums.extra = sums.extra + 1.0
+            sums.first = sums.extra
+
+    assert layout.names == (("first", "extra", "last") if extra else ("first", "last"))
+    assert layout.notes == {"extra": "a note"}
+    data = np.arange(8.0 * layout.size).reshape(layout.size, 8)
+    expected = data.copy()
+    expected[0] = expected[1] + 1.0 if extra else np.nan
+    expected[1] = expected[1] + extra
+    work(data)
+    np.testing.assert_array_equal(data, expected)

@@ -1,0 +1,76 @@
+"""Properties of the single and the vector environment that follow from their settings."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from hoof_env.dynamics.engine import TrunkEngine
+from hoof_env.envs.batch import EpisodeBatch
+from hoof_env.gait import GaitParameters
+from hoof_env.ground.terrain import Terrain
+from hoof_env.leg.geometry import Geometry
+
+
+class LegProperties:
+    """Leg, engine, ground and names of an environment.
+
+    Attributes:
+        batch: episodes, a batch of one in the single environment.
+    """
+
+    batch: EpisodeBatch
+
+    @property
+    def geometry(self) -> Geometry:
+        """Geometry of a leg."""
+        return self.batch.body.geometry
+
+    @property
+    def gaits(self) -> dict[str, GaitParameters]:
+        """Gaits of the preset by name; of a horse they are `HorseGait`s."""
+        of_body: Any = self.batch.body.gaits
+        gaits: dict[str, GaitParameters] = of_body
+        return gaits
+
+    @property
+    def engine(self) -> TrunkEngine:
+        """Engine that simulates all environments."""
+        return self.batch.engine
+
+    @property
+    def terrain(self) -> Terrain:
+        """Terrain under the legs."""
+        return self.batch.engine.terrain
+
+    @property
+    def dt(self) -> float:
+        """Control step [s]."""
+        return self.batch.dt
+
+    @property
+    def sim_dt(self) -> float:
+        """Substep of the settings [s], which the engine may divide."""
+        return self.batch.settings.sim_dt
+
+    @property
+    def observation_names(self) -> tuple[str, ...]:
+        """Names of the observation's entries, in order."""
+        return tuple(self.batch.names)
+
+    @property
+    def action_names(self) -> tuple[str, ...]:
+        """Names of the actions; a horse's carry the leg as prefix."""
+        names: tuple[str, ...] = self.batch.body.action_names
+        return names
+
+    @property
+    def observation_units(self) -> tuple[str, ...]:
+        """Units of `raw_observation`, in the order of the observation."""
+        return tuple(entry.unit for entry in self.batch.entries)
+
+    @property
+    def action_form(self) -> str:
+        """Meaning of actions: "rates" of the gait parameters of one leg, or "offsets" from a horse's gait.
+        States and files of policies contain it, so that those of another form are refused."""
+        form: str = self.batch.body.action_form
+        return form
