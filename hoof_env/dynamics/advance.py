@@ -1,9 +1,9 @@
 """Kernels of the engine: load environments from its memory, advance them step after step, store them.
 
-`advance_leg`, `advance_four` and `advance_batch` are one function, `run`, compiled for one leg alone, for
-four lanes that are the legs of one trunk, and for `LANES` environments side by side with any number of legs;
-`react_leg`, `react_four` and `react_batch` also compute joint reactions, and take a fifth longer to compile.
-Kernels work on copies on the stack, which the compiler keeps in registers where it can.
+`advance_leg`, `advance_four` and `advance_batch` are one function, that of `advance_of`, compiled for one leg
+alone, for four lanes that are the legs of one trunk, and for `LANES` environments side by side with any number
+of legs; `react_leg`, `react_four` and `react_batch` also compute joint reactions, and take a fifth longer to
+compile. Kernels work on copies on the stack, which the compiler keeps in registers where it can.
 
 An engine's memory is one matrix `data`, a column for each environment: the rows of the trunk, then those of
 each leg, fields as in `layout.TrunkMemory` and `LegMemory`. Each kind of engine (`layout.Features`) has
@@ -237,108 +237,134 @@ def run_steps(  # type: ignore[no-untyped-def]
                 elapsed = 0.0
 
 
+@inline_llvm
+def leg_memory_of(at, i, n, row, far, lanes, form):  # type: ignore[no-untyped-def]
+    """Return the `LegMemory` of the i-th leg of environment n and, with lanes, of the neighbouring columns or
+    legs; `at` is the engine's array, `row` and `far` are distances from row to row and from lane to lane."""
+    return columns(at, lanes, form.leg_memory, (form.trunk_rows + i * form.leg_rows) * row + n, row, far)
+
+
 @inline_source
-def run(  # type: ignore[no-untyped-def]
-    data,
-    model,
-    tables,
-    ground,
-    constants,
-    reactions,
-    h,
-    steps,
-    keeps_account,
-    begin,
-    end,
-    leg_count,
-    lanes,
-    lanes_are_legs,
-    reacts,
-    law,
-    form,
-):
-    """Advance environments `begin` to `end`, `lanes` at a time, or one at a time if its legs are the lanes.
+def load(trunk, legs, leg_count, memory, at, n, row, far, lanes, form):  # type: ignore[no-untyped-def]
+    """Load the environments from column n on."""
+    read_trunk(trunk, memory)
+    if form.has_limits:
+        clear_limits(trunk)
+    for i in range(leg_count):
+        read_leg(block_at(legs, i), leg_memory_of(at, i, n, row, far, lanes, form), form)
+
+
+@inline_source
+def store_legs(trunk, legs, leg_count, good, at, n, row, far, lanes, form):  # type: ignore[no-untyped-def]
+    """Store reports, and where `good` holds what changes of the legs."""
+    for i in range(leg_count):
+        leg = block_at(legs, i)
+        memory = leg_memory_of(at, i, n, row, far, lanes, form)
+        report_leg(trunk, leg, memory.report)
+        store(memory.state, leg.state, form.leg_state, good)
+        store(memory.strides, leg.strides, form.strides, good)
+        store(memory.sums, leg.sums, form.sums, good)
+
+
+@inline_source
+def store_reactions(forces, leg_count, reactions, n, row, lanes, lanes_are_legs):  # type: ignore[no-untyped-def]
+    """Store the joint reactions of all legs."""
+    for i in range(leg_count):
+        stride = REACTIONS_SIZE * row if lanes_are_legs else 1
+        out = columns(address(reactions), lanes, Reactions, i * REACTIONS_SIZE * row + n, row, stride)
+        leg_forces = block_at(forces, i)
+        for k in range(REACTIONS_SIZE):
+            out[k] = leg_forces[k]
+
+
+@inline_source
+def read_shapes(shapes, leg_count, constants, lanes, lanes_are_legs):  # type: ignore[no-untyped-def]
+    """Load the `LegConstants` of all legs, which all environments share."""
+    stride = CONSTANTS_SIZE if lanes_are_legs else 0
+    shared = columns(address(constants), lanes, None, 0, 1, stride)
+    for k in range(leg_count * CONSTANTS_SIZE):
+        shapes[k] = shared[k]
+
+
+@inline_source
+def judge(trunk, legs, leg_count, before, resets, lanes_are_legs, form):  # type: ignore[no-untyped-def]
+    """Return the results of the environments, and where the rows of the kernel are to be stored."""
+    result = find_result(trunk, legs, leg_count, lanes_are_legs, form)
+    good = result == OK
+    if form.has_limits:
+        good = good | (result >= FIRST_LIMIT)  # a motion beyond a limit is a motion
+    if resets:
+        # a reset writes the started lanes only, even where the start is infeasible
+        good = before == RESET_REQUESTED
+        result = where(good, result, before)
+    return result, good
+
+
+@inline_source
+def store_trunk(trunk, account, memory, good, keeps_account, form):  # type: ignore[no-untyped-def]
+    """Store the report, and where `good` holds what changes of the trunk."""
+    report_trunk(trunk, memory.report)
+    store(memory.state, trunk.state, form.trunk_state, good)
+    if keeps_account:
+        for k in range(form.account_size):
+            account[k] = account[k] + memory.account[k]
+        store(memory.account, account, form.account_size, good)
+
+
+def advance_of(
+    lanes: int, lanes_are_legs: bool, reacts: bool, law: Any, form: EngineLayout
+) -> Callable[..., None]:
+    """Return the body of a kernel: a function that advances environments `begin` to `end` by substeps of h
+    [s]; if their number is negative, environments with the result `RESET_REQUESTED` are started.
 
     Args:
-        data, model, tables, ground, constants, reactions: `TrunkEngine.arrays`.
-        h: length of a substep [s].
-        steps: number of substeps; if negative, environments with the result `RESET_REQUESTED` are started.
-        keeps_account: true if energies and impulses are integrated.
-        reacts: a constant; if false, no code for joint reactions is compiled.
-        law, form: law of contact (`hoof.law_of`) and `form.EngineLayout`, constants.
+        lanes: number of environments side by side or, if `lanes_are_legs`, of legs of one environment.
+        reacts: false for a kernel without code for joint reactions.
+        law, form: law of contact, see `hoof.law_of`, and layouts of the engine.
     """
-    trunk = rows(doubles(form.trunk_size * lanes), lanes, form.trunk)
-    legs = rows(doubles(leg_count * form.leg_size * lanes), lanes, form.leg)
-    account = rows(doubles(form.account_size * lanes), lanes, form.account)
-    shapes = rows(doubles(leg_count * CONSTANTS_SIZE * lanes), lanes, LegConstants)
-    forces = rows(doubles(leg_count * REACTIONS_SIZE * lanes), lanes, Reactions)
-    unpacked = unpack_model(model, tables, ground, doubles(8 + 3 * form.gait), lanes_are_legs, law, form)
-    at = address(data)
-    row = data.shape[1]
-    # lanes are neighbouring columns; lanes that are legs are as far apart as the legs' rows in one column
-    envs = lanes
-    near = 1
-    far = 1
-    if lanes_are_legs:
-        envs = 1
-        near = 0
-        far = form.leg_rows * row
-    if reacts or form.has_limits:
-        constants_stride = CONSTANTS_SIZE if lanes_are_legs else 0
-        shared = columns(address(constants), lanes, None, 0, 1, constants_stride)
-        for k in range(leg_count * CONSTANTS_SIZE):
-            shapes[k] = shared[k]
-    for n in range(begin, end, envs):
-        memory = columns(at, lanes, form.trunk_memory, n, row, near)
-        before = memory.result
-        starts = before == RESET_REQUESTED
-        if steps < 0 and not any_lane(starts):
-            continue
-        read_trunk(trunk, memory)
-        if form.has_limits:
-            clear_limits(trunk)
-        for k in range(form.account_size):
-            account[k] = 0.0
-        for i in range(leg_count):
-            first = (form.trunk_rows + i * form.leg_rows) * row + n
-            read_leg(block_at(legs, i), columns(at, lanes, form.leg_memory, first, row, far), form)
-        if steps < 0:
-            begin_step(trunk, legs, leg_count, unpacked)
-            if unpacked.kind != FIXED:
-                velocities_to_momenta(trunk, legs, leg_count, unpacked, starts)
-        run_steps(
-            trunk, legs, leg_count, unpacked, account, shapes, forces, h, max(steps, 0), keeps_account, reacts
-        )
-        report_trunk(trunk, memory.report)
-        result = find_result(trunk, legs, leg_count, lanes_are_legs, form)
-        good = result == OK
-        if form.has_limits:
-            good = good | (result >= FIRST_LIMIT)  # a motion beyond a limit is a motion
-        if steps < 0:
-            # a reset writes the started lanes only, even where the start is infeasible
-            result = where(starts, result, before)
-            good = starts
-        memory.result = result
-        store(memory.state, trunk.state, form.trunk_state, good)
-        if keeps_account:
+
+    @inline_source
+    def run(  # type: ignore[no-untyped-def]
+        data, model, tables, ground, constants, reactions, h, steps, keeps_account, begin, end, leg_count
+    ):
+        trunk = rows(doubles(form.trunk_size * lanes), lanes, form.trunk)
+        legs = rows(doubles(leg_count * form.leg_size * lanes), lanes, form.leg)
+        account = rows(doubles(form.account_size * lanes), lanes, form.account)
+        shapes = rows(doubles(leg_count * CONSTANTS_SIZE * lanes), lanes, LegConstants)
+        forces = rows(doubles(leg_count * REACTIONS_SIZE * lanes), lanes, Reactions)
+        unpacked = unpack_model(model, tables, ground, doubles(8 + 3 * form.gait), lanes_are_legs, law, form)
+        at = address(data)
+        row = data.shape[1]
+        count = max(steps, 0)
+        # lanes are neighbouring columns; lanes that are legs are as far apart as the legs' rows in one column
+        near = 0 if lanes_are_legs else 1
+        far = form.leg_rows * row if lanes_are_legs else 1
+        if reacts or form.has_limits:
+            read_shapes(shapes, leg_count, constants, lanes, lanes_are_legs)
+        for n in range(begin, end, 1 if lanes_are_legs else lanes):
+            memory = columns(at, lanes, form.trunk_memory, n, row, near)
+            before = memory.result
+            starts = before == RESET_REQUESTED
+            if steps < 0 and not any_lane(starts):
+                continue
+            load(trunk, legs, leg_count, memory, at, n, row, far, lanes, form)
             for k in range(form.account_size):
-                account[k] = account[k] + memory.account[k]
-            store(memory.account, account, form.account_size, good)
-        for i in range(leg_count):
-            leg = block_at(legs, i)
-            first = (form.trunk_rows + i * form.leg_rows) * row + n
-            leg_memory = columns(at, lanes, form.leg_memory, first, row, far)
-            report_leg(trunk, leg, leg_memory.report)
-            store(leg_memory.state, leg.state, form.leg_state, good)
-            store(leg_memory.strides, leg.strides, form.strides, good)
-            store(leg_memory.sums, leg.sums, form.sums, good)
+                account[k] = 0.0
+            if steps < 0:
+                begin_step(trunk, legs, leg_count, unpacked)
+                if unpacked.kind != FIXED:
+                    velocities_to_momenta(trunk, legs, leg_count, unpacked, starts)
+            run_steps(
+                trunk, legs, leg_count, unpacked, account, shapes, forces, h, count, keeps_account, reacts
+            )
+            result, good = judge(trunk, legs, leg_count, before, steps < 0, lanes_are_legs, form)
+            memory.result = result
+            store_trunk(trunk, account, memory, good, keeps_account, form)
+            store_legs(trunk, legs, leg_count, good, at, n, row, far, lanes, form)
             if reacts:
-                leg_forces = block_at(forces, i)
-                first = i * REACTIONS_SIZE * row + n
-                stride = REACTIONS_SIZE * row if lanes_are_legs else 1
-                out = columns(address(reactions), lanes, Reactions, first, row, stride)
-                for k in range(REACTIONS_SIZE):
-                    out[k] = leg_forces[k]
+                store_reactions(forces, leg_count, reactions, n, row, lanes, lanes_are_legs)
+
+    return run
 
 
 KERNELS = {"leg": (1, 1, False), "four": (1, 4, True), "batch": (0, LANES, False)}
@@ -376,29 +402,13 @@ def _new_kernels(contact_law: Callable[..., Any] | None, features: Features, ide
         identity += f" {tuple(features)}"
 
     def new_kernel(name: str, legs: int, lanes: int, lanes_are_legs: bool, reacts: bool) -> Any:
+        run = advance_of(lanes, lanes_are_legs, reacts, law, form)
+
         def advance(  # type: ignore[no-untyped-def]
             data, model, tables, ground, constants, reactions, h, steps, keeps_account, begin, end
         ):
             count = legs if legs else model[0].legs
-            run(
-                data,
-                model,
-                tables,
-                ground,
-                constants,
-                reactions,
-                h,
-                steps,
-                keeps_account,
-                begin,
-                end,
-                count,
-                lanes,
-                lanes_are_legs,
-                reacts,
-                law,
-                form,
-            )
+            run(data, model, tables, ground, constants, reactions, h, steps, keeps_account, begin, end, count)
 
         advance.__name__ = name
         return kernel(advance, f"{name} {identity}", threads=not lanes_are_legs and lanes > 1)

@@ -13,28 +13,22 @@ import copy
 from collections.abc import Callable, Sequence
 from typing import Any
 
-import numpy as np
-from numba.core.errors import NumbaError
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from hoof_env.constants import GRAVITY
-from hoof_env.dynamics import engine_states, layout, memory
+from hoof_env.dynamics import layout, memory
 from hoof_env.dynamics.advance import BY_LEGS, LANES, RESET_REQUESTED, advance_kernels
-from hoof_env.dynamics.engine_memory import EngineMemory
+from hoof_env.dynamics.engine_motion import MOST_STEPS, EngineMotion
 from hoof_env.dynamics.layout import Features
-from hoof_env.dynamics.limits import CHECK_EVERY
-from hoof_env.dynamics.names import NamedColumns
 from hoof_env.dynamics.parts import (
     Limb,
     Limits,
     Trunk,
-    broken,
 )
 from hoof_env.dynamics.step_length import StepLength
 from hoof_env.dynamics.stepping import SCHEMES
 from hoof_env.errors import (
     Floats,
-    NotStartedError,
     ParameterError,
     all_of,
     check_choice,
@@ -47,8 +41,8 @@ from hoof_env.gait import MOST_HARMONICS, FilterSettings, GaitParameters
 from hoof_env.ground.contact import Ground
 from hoof_env.ground.terrain import Terrain
 from hoof_env.leg.profile import leg_profile
-from hoof_env.simd.threads import blocks, check_threads, limit_threads, run_together
-from hoof_env.simd.user_functions import check_function, what_cannot_be_compiled
+from hoof_env.simd.threads import blocks, check_threads, limit_threads
+from hoof_env.simd.user_functions import check_function
 
 HEIGHT = layout.TrunkSettings.fields["height"].start
 """Row of a trunk's height at rest among its settings."""
@@ -60,18 +54,8 @@ empty."""
 MOST_LEGS = 32
 """Largest number of legs: kernels work on the stack, where a leg takes 15 kB with eight lanes."""
 
-MOST_STEPS = 10**12
-"""Largest number of substeps of a call: they are counted in 64 bits."""
 
-PART = 2_000_000
-"""Number of substeps, those of all legs added up, that a long call runs in machine code at a time: at most
-about a second. Ctrl-C takes effect between two parts. Sums have other last digits than in one part."""
-
-LEAST_PART = 1000
-"""Least number of substeps of each environment in such a part."""
-
-
-class TrunkEngine(EngineMemory):
+class TrunkEngine(EngineMotion):
     """Legs on a trunk over the ground; see the module docstring.
 
     Args:
@@ -142,9 +126,8 @@ class TrunkEngine(EngineMemory):
             raise ParameterError(f"limbs: expected at most {MOST_LEGS}, got {len(self.limbs)}")
         self.trunk = one_of("trunk", trunk, Trunk)
         self.motion_limits = None if limits is None else one_of("limits", limits, Limits)
-        springs = self.limbs[0].spring is not None
         order = count("harmonics", harmonics, most=MOST_HARMONICS)
-        self.features = Features(order, springs, has_limits=limits is not None)
+        self.features = Features(order, self.limbs[0].spring is not None, limits is not None)
         memory.check_limbs(self.trunk, self.limbs, self.features.springs)
         if contact_law is not None and self.features.springs:
             raise ParameterError(
@@ -174,6 +157,10 @@ class TrunkEngine(EngineMemory):
         self.substeps = length.choose(self.sim_dt, asked)
         self.reacts = flag("reactions", reactions)
         self.counts_strides = flag("strides", strides)
+        self._allocate()
+
+    def _allocate(self) -> None:
+        """Find the kernel, and make the memory of all environments."""
         self.runs_scalar = len(self.limbs) in BY_LEGS and self.num_envs <= MAX_SCALAR_ENVS
         self._choose_kernel()
         columns = self.num_envs if self.runs_scalar else memory.columns_for(self.num_envs)
@@ -220,11 +207,6 @@ class TrunkEngine(EngineMemory):
         return self.total_mass * GRAVITY
 
     # Arguments of the kernels, for callers with kernels of their own
-
-    @property
-    def substep(self) -> float:
-        """Length of a substep [s]."""
-        return self.sim_dt / self.substeps
 
     def alone(self) -> TrunkEngine:
         """Return a new engine like this one for one environment."""
@@ -295,121 +277,3 @@ class TrunkEngine(EngineMemory):
         m.strides[:, :, where] = 0.0
         m.result[where] = RESET_REQUESTED
         self._go(-1)
-
-    # Motion
-
-    def advance(
-        self, command: ArrayLike | None = None, steps: int = 1, *, account: bool = True
-    ) -> NDArray[np.int64]:
-        """Advance by `steps` of `sim_dt` under a command.
-
-        Args:
-            command: gait parameters as `command` takes them, for all environments; None keeps the last.
-            steps: number of steps; 0 evaluates forces and accelerations at the present state.
-            account: true to update `account`.
-
-        Returns:
-            Results of the environments, values of `parts.Result`, shape (num_envs,). An environment that
-            could not be simulated has its state and its report from before this call.
-
-        Raises:
-            ParameterError: the command has a wrong shape or is not finite.
-            NotStartedError: no environment was ever reset.
-            KeyboardInterrupt: Ctrl-C during a long call, which then ends after a part of the steps.
-        """
-        steps = count("steps", steps, 0, MOST_STEPS // self.substeps)
-        if command is not None:
-            self.command(command)
-        self._go_on(steps, account)
-        if self._memory.result.any():
-            if np.isnan(self._memory.trunk).all():
-                raise NotStartedError("the engine was asked to move before reset(): expected reset() first")
-            if steps:
-                self.observe()
-        return self._memory.result.astype(np.int64)
-
-    def run(
-        self,
-        command: ArrayLike | None = None,
-        steps: int = 1,
-        every: int = 1,
-        *,
-        continue_past_limits: bool = False,
-    ) -> dict[str, NDArray[Any]]:
-        """Advance and record `state` and `report` at the start and after each `every` steps, for plots.
-
-        Args:
-            command, steps: as in `advance`.
-            every: number of steps from one instant of the record to the next.
-            continue_past_limits: true to continue beyond a limit, as `advance` does.
-
-        Returns:
-            Arrays by name, time on the first axis, and "result", values of `parts.Result`, shape (num_envs,).
-            Once an environment does not end OK all stop, and the record ends there: with the instant where a
-            limit was passed, without one that could not be simulated.
-
-        Raises:
-            ParameterError, NotStartedError: as `advance`.
-        """
-        steps = count("steps", steps, low=0)
-        every = count("every", every)
-        self.advance(command, 0)
-        m = self._memory
-        times = 1 + -(-steps // every)
-        whole = np.empty((*m.data.shape, times))
-        whole[..., 0] = m.data
-        for k in range(1, times):
-            self._go(min(every, steps - (k - 1) * every), True)
-            if lost := broken(m.result).any():
-                self.observe()
-            whole[..., k] = m.data
-            if lost or (m.result.any() and not continue_past_limits):
-                times = k if lost else k + 1
-                break
-        kept = memory.memory_of(whole[..., :times], self.num_envs, m.constants, m.reactions, m.features)
-        named = {name: np.moveaxis(values, -1, 0) for name, values in memory.named_rows(kept).items()}
-        return NamedColumns(named | {"result": self.results})
-
-    def _go_on(self, steps: int, account: bool) -> None:
-        """Advance as `_go`, a long call in parts, so that Ctrl-C takes effect."""
-        left = steps * self.substeps
-        part = max(PART // (self.columns * len(self.limbs)), LEAST_PART) // CHECK_EVERY * CHECK_EVERY
-        if left <= part:
-            self._go(steps, account)
-            return
-        m = self._memory
-        kept = self._copy((*engine_states.STATE, "stride_sums", "result"))
-        first = np.zeros(self.num_envs)
-        sums = np.zeros_like(m.stride_sums)
-        are_peaks = np.array(layout.stride_peaks(self.features))
-        while left and not broken(first).all():
-            # the short part first: limits are checked at steps counted from the end
-            length = left % part or part
-            self._go_substeps(length, account)
-            left -= length
-            # a failure stays, and so does a limit unless a failure follows
-            first = np.where(broken(first) | ((first != 0) & ~broken(m.result)), first, m.result)
-            peaks = np.maximum(sums[:, are_peaks], m.stride_sums[:, are_peaks])
-            sums += m.stride_sums
-            sums[:, are_peaks] = peaks
-        lost = broken(first)
-        m.stride_sums[:] = sums
-        # an environment that fails has its state from before the call, not from before the part
-        for name, values in kept.items():
-            getattr(m, name)[..., lost] = values[..., lost]
-        m.result[:] = first
-
-    def _go(self, steps: int, account: bool = False) -> None:
-        self._go_substeps(steps * self.substeps, account)
-
-    def _go_substeps(self, substeps: int, account: bool) -> None:
-        try:
-            common = (*self.arrays, self.substep, substeps, account)
-            calls = [(*common, block.start, block.stop) for block in self.blocks]
-            run_together(self._run, calls, self.num_threads)
-        except NumbaError as error:
-            if self.contact_law is None:
-                raise
-            raise ParameterError(f"contact_law: {what_cannot_be_compiled(error)}") from error
-
-    # Reports
