@@ -20,14 +20,14 @@ LONGEST_FUNCTION, LONGEST_CLASS, LONGEST_FILE = 60, 250, 450
 MOST_PARAMETERS, MOST_OF_KERNELS = 8, 12
 
 MOST = {
-    "packed": 108,
+    "packed": 107,
     "unformatted": 15,
-    "fragments": 3,
+    "fragments": 2,
     "people": 2,
     "long_functions": 2,
     "long_classes": 2,
     "long_files": 0,
-    "many_parameters": 11,
+    "many_parameters": 10,
     "leg_or_horse": 6,
 }
 """Largest counts."""

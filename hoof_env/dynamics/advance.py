@@ -1,9 +1,9 @@
 """Kernels of the engine: load environments from its memory, advance them step after step, store them.
 
 `advance_leg`, `advance_four` and `advance_batch` are one function, that of `advance_of`, compiled for one leg
-alone, for four lanes that are the legs of one trunk, and for `LANES` environments side by side with any number
-of legs; `react_leg`, `react_four` and `react_batch` also compute joint reactions, and take a fifth longer to
-compile. Kernels work on copies on the stack, which the compiler keeps in registers where it can.
+alone, for four lanes that are the legs of one trunk, and for `LANES` environments side by side with any
+number of legs; `react_leg`, `react_four` and `react_batch` also compute joint reactions, and take a fifth
+longer to compile. Kernels work on copies on the stack, which the compiler keeps in registers where it can.
 
 An engine's memory is one matrix `data`, a column for each environment: the rows of the trunk, then those of
 each leg, fields as in `layout.TrunkMemory` and `LegMemory`. Each kind of engine (`layout.Features`) has

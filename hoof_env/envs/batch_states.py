@@ -35,11 +35,9 @@ def check_single(state: Any) -> None:
     Raises:
         ParameterError: it is.
     """
-    generators = state.get("generator") if isinstance(state, Mapping) else None
-    if isinstance(generators, list):
-        raise ParameterError(
-            f"state: expected one of a single environment, got one of {len(generators)} environments"
-        )
+    if isinstance(state, Mapping) and "ended" in state:
+        many = np.size(state["ended"])
+        raise ParameterError(f"state: expected one of a single environment, got one of {many} environments")
 
 
 def spread_state(batch: Any, state: Mapping[str, Any]) -> dict[str, Any]:

@@ -169,7 +169,7 @@ class HorseLegVectorEnv(  # type: ignore[misc]  # generators are of all
         if self._phase == "new" and self._started.any():
             missing = np.flatnonzero(~self._started).tolist()
             raise ResetNeeded(
-                f"step() was called while environments {missing} have no episode yet: expected their reset()"
+                f"step() was called while environments {missing} have no episode yet: expected reset()"
             )
         self._check_started("step")
         batch = self.batch

@@ -295,7 +295,7 @@ def test_a_first_reset_of_some_needs_the_others():
     env = BOTH["vector"]()
     observations, _ = env.reset(seed=0, options={"reset_mask": np.array([True, False, True])})
     assert np.isfinite(observations).all()
-    with pytest.raises(ResetNeeded, match="expected reset"):
+    with pytest.raises(ResetNeeded, match=r"environments \[1\] have no episode yet: expected reset"):
         env.step(actions(0, 3))
     env.reset(seed=[None, 1, None], options={"reset_mask": np.array([False, True, False])})
     whole = BOTH["vector"]()
