@@ -125,7 +125,8 @@ def _made(
     apply = _apply(layouts, body)
     finish = _finish(terms, layouts, body, observers)
     advance = advance_kernels(contact_law, features)
-    advance_one = getattr(advance, f"advance_{BY_LEGS[body.legs]}")
+    # Bodies without a kernel of their own run side by side: nothing calls their `step_one`.
+    advance_one = getattr(advance, f"advance_{BY_LEGS.get(body.legs, 'batch')}")
     advance_batch = advance.advance_batch
     sums_size = layouts.sums
     step = _step(task_record, slots, sums_size, body, apply, finish)
