@@ -84,8 +84,8 @@ class BatchKernels:
             self.rewards,
         )
         self.addresses = ADDRESSES.of(*arrays, columns=range(self.engine.columns))
-        # A block of columns for each thread; the paper's solver runs on one.
-        blocks = self.engine.blocks[:1] if self.paper else self.engine.blocks
+        # A block of columns for each thread; the paper's solver runs on one, with all of them.
+        blocks = [range(self.engine.columns)] if self.paper else self.engine.blocks
         self._blocks = [(ADDRESSES.of(*arrays, columns=block),) for block in blocks]
 
     def _compile(self) -> None:

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from hoof_env.constants import GRAVITY
 from hoof_env.dynamics.engine import TrunkEngine
-from hoof_env.dynamics.parts import HoofSpring, Limb, Limits, Prescribed, Trunk
+from hoof_env.dynamics.parts import HoofSpring, Limb, Prescribed, Trunk
 from hoof_env.gait import GaitParameters
 from hoof_env.ground.contact import Ground
 from hoof_env.ground.terrain import Terrain
@@ -136,27 +136,6 @@ def test_a_stiff_spring_tends_to_a_rigid_hoof():
     assert off[1] < off[0] / 4
     assert off[2] < off[1] / 4
     assert off[2] < 1e-4
-
-
-def test_a_batch_has_the_bits_of_single_environments():
-    rng, n = np.random.default_rng(3), 9
-    settings = {"harmonics": 3, "limits": Limits(), "strides": True}
-    batch = horse(NATURAL, settings=settings | {"num_envs": n}, spring=HoofSpring(4e4, 500.0, 3e4, 300.0))
-    numbers = np.zeros((4, 8, n))
-    numbers[:, :4] = np.array([WALK.crank_speed, 0.3, 0.2, 0.2])[:, None]
-    numbers[:, 1:] += rng.uniform(-0.05, 0.05, (4, 7, n))
-    theta, vx = THETA[:, None] + rng.uniform(-1, 1, (4, n)), rng.uniform(-1, 1, n)
-    batch.reset(numbers, theta, y=1.5, vx=vx)
-    batch.advance(steps=400)
-    assert (batch.account["hoof_loss"] > 0).all()
-    for env in range(n):
-        one = batch.alone()
-        one.reset(numbers[..., [env]], theta[:, [env]], y=1.5, vx=vx[env])
-        one.advance(steps=400)
-        for name in ("state", "report", "account", "strides"):
-            whole = getattr(batch, name)
-            for row, value in getattr(one, name).items():
-                assert np.array_equal(value[..., 0], whole[row][..., env]), (name, row)
 
 
 @pytest.mark.parametrize(("integrator", "order"), [("midpoint", 2), ("rk4", 4)])

@@ -77,6 +77,30 @@ def same(one, two) -> None:
         assert a.tobytes() == b.tobytes(), (one, two)
 
 
+def same_rows(found, expected, rows):
+    """Raise unless arrays, and infos where they are valid, have the same first rows to the bit."""
+    *arrays, infos = found
+    *others, expected_infos = expected
+    for one, other in zip(arrays, others, strict=True):
+        same(one[:rows], other[:rows])
+    _same_infos(infos, expected_infos, rows)
+
+
+def _same_infos(found, expected, rows):
+    for key in (key for key in expected if not key.startswith("_")):
+        mask = expected.get(f"_{key}", np.ones(rows, bool))[:rows]
+        if not mask.any():
+            continue
+        same(found.get(f"_{key}", np.ones(rows, bool))[:rows] & mask, mask)
+        if isinstance(expected[key], dict):
+            _same_infos(found[key], expected[key], rows)
+        elif expected[key].dtype == np.dtype(object):
+            same([*found[key][:rows][mask]], [*expected[key][:rows][mask]])
+        else:
+            assert len(found[key]) >= rows
+            same(np.asarray(found[key])[:rows][mask], np.asarray(expected[key])[:rows][mask])
+
+
 def make(env_id, n=0, **settings):
     """The environment of an id, or `n` of them side by side."""
     return (gym.make_vec(env_id, num_envs=n, **settings) if n else gym.make(env_id, **settings)).unwrapped

@@ -11,7 +11,7 @@ from family import HORSE, actions, same
 from hoof_env import Sb3VecEnv
 from hoof_env.envs import conditions
 from hoof_env.envs.horse_leg import HorseLegEnv
-from hoof_env.errors import FixedSettingError, ParameterError, UnknownArgumentError
+from hoof_env.errors import ParameterError
 
 LEG, SPEED, TERRAIN = (f"hoof_env/HorseLeg{name}-v0" for name in ("", "Speed", "Terrain"))
 
@@ -93,31 +93,6 @@ def test_a_row_takes_them_when_it_starts_again_and_has_the_bits_of_one(env_id, c
             same(rows[0][k], observation)
             assert (rows[1][k], rows[2][k], rows[3][k]) == (reward, *ended), (step, k)
             over[k] = any(ended)
-
-
-@pytest.mark.parametrize(("name", "value"), [("target_speed", "fast"), ("terrain", {"kind": "moon"}),
-    ("terrain", {"kind": "slope", "angle": 0.1}), ("reward_weights", {"speed": 1.0}),
-    ("randomize", {"friction": (0.3, 0.1)})])  # fmt: skip
-@pytest.mark.parametrize("many", [False, True])
-def test_what_is_refused_changes_nothing(name, value, many):
-    env, other = (gym.make_vec(LEG, 3, **SHORT) if many else gym.make(LEG, **SHORT) for _ in range(2))
-    env.reset(seed=0), other.reset(seed=0)
-    with pytest.raises(ParameterError, match=name):
-        env.unwrapped.change_settings(**{name: value})
-    assert env.unwrapped.settings == other.unwrapped.settings
-    same(env.reset()[0], other.reset()[0])
-
-
-def test_other_settings_stay_as_they_were_made():
-    env = gym.make(LEG).unwrapped
-    with pytest.raises(FixedSettingError, match=r"change_settings: expected some of target_speed.*got 'dt'"):
-        env.change_settings(dt=0.01)
-    with pytest.raises(UnknownArgumentError, match="did you mean target_speed"):
-        env.change_settings(target_sped=1.0)
-    with pytest.raises(FixedSettingError, match=r"from the next reset on by change_settings\(terrain=...\)"):
-        env.terrain = None
-    with pytest.raises(ParameterError, match="'ground' is constant without terrain"):
-        gym.make(TERRAIN).unwrapped.change_settings(terrain=None)
 
 
 def test_a_refused_reset_keeps_the_episode():

@@ -37,19 +37,6 @@ def test_gymnasium_finds_nothing_wrong(soft):
     check_env(soft.unwrapped, skip_render_check=True)
 
 
-def test_a_row_of_many_has_the_bits_of_one_alone(soft):
-    envs = gym.make_vec(LEG, num_envs=9, **SOFT)
-    observations, _ = envs.reset(seed=3)
-    seen, rewards = [observations[0]], []
-    for _ in range(50):
-        observations, reward, *_ = envs.step(envs.unwrapped.action_for("run"))
-        seen.append(observations[0])
-        rewards.append(reward[0])
-    alone, _ = play(soft, 50)
-    assert np.array_equal(seen, [alone[0], *alone[1::2]])
-    assert np.array_equal(rewards, alone[2::2])
-
-
 def test_a_softer_hoof_has_lower_peaks():
     peaks = [play(gym.make(FIXED, gait="run", hoof_stiffness=k))[1]["episode_summary"]["highest_grf_n"]
              for k in (None, 1e5, 2e4)]  # fmt: skip
@@ -79,27 +66,6 @@ def test_the_default_damping_is_that_of_the_settings_whatever_is_drawn():
     before = settings.copy()
     env.reset(seed=1)
     assert np.array_equal(settings[0, -4:], before[0, -4:])
-
-
-@pytest.mark.parametrize(
-    ("changes", "words"),
-    [
-        ({"hoof_stiffness": 0.0}, "hoof_stiffness: expected .* got 0.0"),
-        ({"hoof_stiffness": "soft"}, "hoof_stiffness: expected .* got 'soft'"),
-        ({**SOFT, "hoof_damping": 0.0}, "hoof_damping: expected .* got 0.0"),
-        ({"hoof_damping": 300.0}, "hoof_damping: expected a hoof_stiffness beside it, got 300.0"),
-        ({**SOFT, "friction_fast": 0.1}, "friction_fast: expected none with a hoof_stiffness"),
-        ({**SOFT, "randomize": {"friction_slow": 0.01}}, "randomize: 'friction_slow': expected none with"),
-    ],
-)
-def test_what_does_not_fit_is_named(changes, words):
-    with pytest.raises(ParameterError, match=words):
-        gym.make(LEG, **changes)
-
-
-def test_the_papers_solver_has_none():
-    with pytest.raises(ParameterError, match=r'hoof_stiffness: expected None with solver="paper", got 4000'):
-        gym.make(FIXED, solver="paper", **SOFT)
 
 
 def test_a_law_of_ones_own_has_none():

@@ -141,22 +141,3 @@ def test_the_papers_solver_can_be_made_exact():
         forces.append(substeps(env)["normal"])
     assert np.abs(forces[0] - forces[2]).max() < 1e-6 * forces[2].max()
     assert np.abs(forces[1] - forces[2]).max() > 1e-3 * forces[2].max()
-
-
-@pytest.mark.parametrize(
-    ("kwargs", "message"),
-    [
-        ({"gait": "trot"}, "gait: expected one of carrying_walk, run, walk, got 'trot'"),
-        ({"integrator": "leapfrog", "solver": "paper"}, "integrator: expected one of euler.*got 'leapfrog'"),
-        ({"integrator": "euler"}, "integrator: expected one of .*midpoint.*got 'euler'"),
-        ({"baumgarte_beta": -1.0, "solver": "paper"}, "baumgarte_beta: expected.*got -1.0"),
-        ({"baumgarte_alpha": "a", "solver": "paper"}, "baumgarte_alpha: expected.*got 'a'"),
-        ({"trunk": "rail", "solver": "paper"}, "trunk: expected 'fixed' with solver=\"paper\", got 'rail'"),
-        ({"drive": "motor", "solver": "paper"}, "drive: expected 'prescribed' with"),
-        ({"terrain": {"kind": "slope", "angle": 0.1}, "solver": "paper"}, "terrain: expected None with"),
-        ({"randomize": {"friction": 0.3}, "solver": "paper"}, "randomize: expected None with"),
-    ],
-)
-def test_refusals_of_the_papers_set_up(kwargs, message):
-    with pytest.raises(ParameterError, match=message):
-        gym.make(FIXED, **kwargs)

@@ -1,6 +1,5 @@
 """The vector reward: its parts, that they add up to the scalar one, and what a fall costs."""
 
-import gymnasium as gym
 import numpy as np
 import pytest
 from family import FALLS
@@ -65,8 +64,3 @@ def test_objectives_add_up_to_the_scalar_reward_and_all_else_is_the_same(kwargs)
         if any(flags):
             break
     assert ("failure" in info) == (kwargs is FALLS)
-
-
-def test_many_are_refused_with_what_makes_them():
-    with pytest.raises(gym.error.Error, match="MOSyncVectorEnv"):
-        gym.make_vec("hoof_env/HorseLegMO-v0", num_envs=2)

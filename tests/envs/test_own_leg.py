@@ -15,7 +15,6 @@ from family import roll, same
 from gymnasium.envs.registration import EnvSpec
 
 from hoof_env import Geometry, read_preset
-from hoof_env.errors import DataFileError, ParameterError
 from hoof_env.gait import LIMITS
 from hoof_env.ground import contact as ground
 from hoof_env.leg.geometry import PARTS
@@ -101,34 +100,3 @@ def test_a_path_stays_a_path(tmp_path):
         env = gym.make(LEG, preset=given).unwrapped
         assert env.settings.preset == str(path)
         assert env.geometry.name == str(path)
-
-
-def without(name):
-    return {key: value for key, value in CONTENT.items() if key != name}
-
-
-@pytest.mark.parametrize(
-    ("content", "message"),
-    [
-        (without("provenance"), "expected an entry 'provenance' beside the others, a text that says where"),
-        (
-            without("geometry"),
-            "expected an entry 'geometry' beside the others, an object; found provenance, ",
-        ),
-        (without("gaits"), "expected an object 'gaits' with at least one gait, got None"),
-        (without("ground"), "expected an entry 'ground' with the stiffness and the exponent that its gaits"),
-        ({**CONTENT, "gait": {}}, "unknown entries gait; expected some of provenance, units, geometry"),
-        ({**CONTENT, "geometry": {**CONTENT["geometry"], "colour": "bay"}}, "geometry: .*; unknown colour"),
-        ({**CONTENT, "gaits": {"trot": {"speed": 1.0}}}, "gait 'trot': expected crank_speed.*'speed'"),
-        ({**CONTENT, "ground": {"softness": 1.0}}, "ground: .* no other entries than stiffness, exponent"),
-        ({**CONTENT, "geometry": {**CONTENT["geometry"], "lengths": {"OP": 1.0}}}, "lengths: .*missing AJ, "),
-    ],
-)
-def test_errors_are_of_the_argument_or_of_the_file(tmp_path, content, message):
-    with pytest.raises(ParameterError, match=message):
-        gym.make(LEG, preset=content, stiffness=None)
-    path = tmp_path / "mine.json"
-    path.write_text(json.dumps(content), encoding="utf-8")
-    with pytest.raises((DataFileError, ParameterError), match=message) as caught:
-        gym.make(LEG, preset=path, stiffness=None)
-    assert "mine.json" in str(caught.value) or "lengths" in message

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import copy
 import os
 import pickle
 import re
@@ -32,6 +31,7 @@ from hoof_env.tasks import registry as tasks
 from hoof_env.tasks.episode import Episode
 from hoof_env.tasks.observation import ENTRIES, ObservationInputs
 from hoof_env.tasks.reward import TERMS, Outcome
+from tests.kernels import link_kernels
 
 PAGE = (Path(__file__).parents[2] / "docs" / "own_task.md").read_text(encoding="utf-8")
 PAGE = PAGE.split("## A leg of your own", 1)[0]  # tests/envs/test_own_leg.py has the rest
@@ -49,43 +49,6 @@ def registered():
     for registry, before in ((gym.registry, known), (tasks._OWN, own)):
         registry.clear()
         registry.update(before)
-
-
-@pytest.fixture(scope="module")
-def own():
-    """The module with an id of its own, imported."""
-    import own_functions
-
-    yield own_functions
-    tasks._OWN.pop(own_functions.ID)
-    gym.registry.pop(own_functions.ID)
-
-
-def rows_of(infos, env):
-    """The terms and measurements of one of many."""
-    return {k: infos[k][env] for k in infos if k.startswith("reward_")}, np.asarray(infos["measured"][env])
-
-
-@pytest.mark.parametrize("count", [1, 7, 9])
-@pytest.mark.parametrize("settings", [{}, {"terrain": HILLS, "observation": ["trunk", "feel", "watch"]}])
-def test_one_and_many_have_the_same_bits(own, count, settings):
-    """1 and 7 go one by one, 9 side by side, seven of its sixteen lanes idle."""
-    envs = gym.make_vec(own.ID, num_envs=count, autoreset_mode="DISABLED", **settings)
-    env = gym.make(own.ID, **settings)
-    observed = envs.reset(seed=5)[0]
-    last = count - 1
-    same(env.reset(seed=5 + last)[0], observed[last])
-    for acts in actions(2, 60, count):
-        observations, rewards, *_, infos = envs.step(acts)
-        observation, reward, *_, info = env.step(acts[last])
-        same(observation, observations[last])
-        assert reward == rewards[last]
-        same(({k: info[k] for k in info if k.startswith("reward_")}, np.asarray(info["measured"])),
-             rows_of(infos, last))  # fmt: skip
-    same(
-        {name: values[last] for name, values in envs.unwrapped.raw_observation().items()},
-        env.unwrapped.raw_observation(),
-    )
 
 
 @pytest.mark.parametrize("settings", [{}, {"terrain": HILLS}, {"exponent": 1.25}], ids=str)
@@ -132,24 +95,6 @@ def test_infos_sums_weights_names_and_units(own):
     names = "some of .*support, overspeed, loading, friction, comfort"
     with pytest.raises(ParameterError, match=rf"{names}, got \{{'slop': 1\}}"):
         gym.make(own.ID, reward_weights={"slop": 1})
-
-
-@pytest.mark.parametrize("make", [gym.make, lambda id: gym.make_vec(id, num_envs=9)], ids=["1", "9"])
-def test_states_and_copies_go_on_with_the_same_bits(own, make):
-    env = make(own.ID).unwrapped
-    env.reset(seed=3)
-    several = env.action_space.shape[:-1]
-    for acts in actions(0, 10, *several):
-        env.step(acts)
-    state, other = env.get_state(), make(own.ID).unwrapped
-    other.set_state(pickle.loads(pickle.dumps(state)))
-    copies = [other, copy.deepcopy(env), pickle.loads(pickle.dumps(env))]
-    for acts in actions(1, 10, *several):
-        expected = env.step(acts)
-        for twin in copies:
-            same(twin.step(acts)[:4], expected[:4])
-    with pytest.raises(ParameterError, match=f"expected one of {LEG}, got one of {own.ID}"):
-        gym.make(LEG).unwrapped.set_state(state)
 
 
 def test_a_pickle_of_another_registration_is_refused(own):
@@ -488,6 +433,7 @@ def test_an_edit_of_the_users_file_compiles_anew_and_nothing_else_does(tmp_path)
             for x, compiled in map(str.split, done.stdout.splitlines())
         ]
 
+    link_kernels(tmp_path / "cache")
     (tmp_path / "mine.py").write_text(textwrap.dedent(USER))
     assert rewards("A", "B") == [(0.04, True), (0.4, True)]
     assert rewards("A", "B") == [(0.04, False), (0.4, False)]
@@ -531,6 +477,7 @@ print((seen[3] - seen[1]) / 2)
 @pytest.mark.skipif(not Path("/proc/self/statm").exists(), reason="the system does not tell how much memory")
 def test_a_reward_that_is_tried_after_another_takes_little_memory(tmp_path):
     """Some 11 MB with what numba keeps of its kernel; 42 MB where the observation is compiled anew, too."""
+    link_kernels(tmp_path)
     environment = os.environ | {"NUMBA_CACHE_DIR": str(tmp_path)}
     done = subprocess.run([sys.executable, "-c", TRIALS], env=environment, capture_output=True, text=True)
     assert float(done.stdout) < 20, done.stderr

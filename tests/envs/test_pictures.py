@@ -10,7 +10,6 @@ from family import HORSE, actions, same
 
 from hoof_env.dynamics.engine import TrunkEngine
 from hoof_env.envs.recording import SHOWN
-from hoof_env.errors import ParameterError
 
 LEG = "hoof_env/HorseLeg-v0"
 
@@ -105,7 +104,3 @@ def test_the_size_of_a_picture(env_id):
         envs = gym.make_vec(env_id, 2, rendered=1, **made)
         envs.reset(seed=0)
         assert [frame.shape for frame in envs.render()] == [(360, 640, 3)] * 2
-    with pytest.raises(ParameterError, match="width: expected a whole number, 480 or more, got 100"):
-        gym.make(env_id, width=100)
-    with pytest.raises(ParameterError, match="height: expected at most 8192, got 10000"):
-        gym.make(env_id, height=10_000)

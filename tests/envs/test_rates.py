@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from hoof_env.envs.policies import open_loop
 from hoof_env.errors import ParameterError
-from hoof_env.gait import PARAMETERS, FilterSettings, GaitParameters, HarmonicGait, load_gait
+from hoof_env.gait import PARAMETERS, FilterSettings, GaitParameters, load_gait
 from hoof_env.tasks.observation import HIGH, LOW, MIDDLE
 
 LEG, FIXED = "hoof_env/HorseLeg-v0", "hoof_env/HorseLegFixed-v0"
@@ -176,20 +176,6 @@ def test_of_many_each_goes_from_where_it_is():
             one.step(alone)
         many.step(taken)
     np.testing.assert_allclose(gaits_of(many), targets, atol=1e-4)
-
-
-def test_action_for_refuses_what_is_no_gait_and_asks_for_an_episode():
-    many = gym.make_vec(LEG, num_envs=2).unwrapped
-    many.reset(seed=0)
-    wrong = ("trot", None, 3, [1.0, 2.0], [1.0, 2.0, 3.0, np.nan], HarmonicGait(5.0, 0.4, 0.1, -0.2))
-    for gait in (*wrong, np.zeros((3, 4)), np.zeros((2, 1, 4))):
-        with pytest.raises(ParameterError, match=r"gait: expected one of carrying_walk, run, walk.*got"):
-            many.action_for(gait)
-    one = gym.make(LEG).unwrapped
-    one.reset(seed=0)
-    for gait in (*wrong, np.zeros((2, 4))):
-        with pytest.raises(ParameterError, match=r"gait: expected one of carrying_walk, run, walk.*got"):
-            one.action_for(gait)
 
 
 def test_a_gait_beyond_what_can_be_commanded_is_refused_by_its_parameter():

@@ -9,8 +9,6 @@ import numpy as np
 import pytest
 from family import HORSE, IDS, MODES, actions, both, same, scaled
 
-from hoof_env.errors import FixedSettingError, ParameterError
-
 LEG = "hoof_env/HorseLeg-v0"
 EVERYTHING = {
     "observation": ["crank", "gait", "trunk", "hoof", "target", "ground"],
@@ -21,22 +19,13 @@ EVERYTHING = {
 }
 
 
-@pytest.mark.parametrize("mode", MODES[:2], ids=lambda mode: mode.name)
 @pytest.mark.parametrize("env_id", IDS)
-def test_each_answers_as_the_single_environment(env_id, mode):
-    settings = EVERYTHING if env_id == LEG else {"episode_seconds": 0.3}
-    ours, theirs = both(env_id, 4, mode, **settings)
+def test_each_says_of_itself_what_a_single_environment_says(env_id):
+    ours, theirs = both(env_id, 4)
     ours.reset(seed=0), theirs.reset(seed=0)
-    for name in ("dt", "sim_dt", *(f"observation_{what}" for what in ("names", "units", "space"))):
+    spaces = [f"observation_{what}" for what in ("names", "units", "space")]
+    for name in ("dt", "sim_dt", *spaces, "action_space"):
         assert ours.get_attr(name) == theirs.get_attr(name), name
-    for k, taken in enumerate(actions(1, 40, 4, env_id=env_id)):
-        ours.step(taken), theirs.step(taken)
-        if k in (3, 14, 15, 39):
-            for name in ("weight", "episode_summary", "raw_observation"):
-                same(ours.call(name), theirs.call(name))
-    assert ours.get_attr("action_space") == theirs.get_attr("action_space")
-    if env_id != HORSE:
-        same(ours.call("action_for", "run"), theirs.call("action_for", "run"))
     assert [ours.weight[env] for env in range(4)] == list(theirs.get_attr("weight"))
     assert ours.episode_summary()["distance_m"].shape == (4,)
 
@@ -59,9 +48,6 @@ def test_the_record_of_a_row(mode):
             same(ours.record(5), theirs.call("record")[5])  # of a row that went on
     twin = copy.deepcopy(ours)
     same(twin.record(5), ours.record(5))
-    for env in (9, -1, 1.5):
-        with pytest.raises(ParameterError, match="env: expected"):
-            ours.record(env)
 
 
 def test_a_mark_on_each():
@@ -73,16 +59,6 @@ def test_a_mark_on_each():
         assert envs.get_attr("mark") == envs.call("mark") == (1, 2, 3, 4)
         with pytest.raises(AttributeError, match="nothing"):
             envs.get_attr("nothing")
-    for name in ("trunk_mass", "dt", "weight", "gaits", "step"):
-        with pytest.raises(FixedSettingError, match=f"{name}: expected no assignment.*gymnasium.make"):
-            ours.set_attr(name, 5)
-    with pytest.raises(ParameterError, match=r"reset\(options=\{'parameters': \{'trunk_mass': \.\.\.\}\}\)"):
-        ours.set_attr("trunk_mass", 5)
-    with pytest.raises(ParameterError, match="values: expected one or 4, got 3"):
-        ours.set_attr("mark", [1, 2, 3])
-    for name in ("reset", "step"):
-        with pytest.raises(ParameterError, match=rf"call: '{name}' is of all together; expected envs.{name}"):
-            ours.call(name)
 
 
 @pytest.mark.parametrize(

@@ -1,8 +1,7 @@
-"""Environments on several threads are the environments on one, whatever is done with them."""
+"""Environments on several threads: errors, forks, interrupts; their bits are in `test_bits.py`."""
 
 from __future__ import annotations
 
-import copy
 import os
 import pickle
 import subprocess
@@ -12,15 +11,12 @@ import textwrap
 import gymnasium as gym
 import numpy as np
 import pytest
-from family import IDS, MODES, actions, same
+from family import actions, same
 
-from hoof_env import Sb3VecEnv
 from hoof_env.errors import ParameterError
 from hoof_env.simd import threads
 
 LEG = "hoof_env/HorseLeg-v0"
-SIZES = (3, 7, 8, 65, 200)
-"""Numbers of environments: one by one, one group of lanes, and several."""
 
 
 @pytest.fixture(autouse=True)
@@ -41,27 +37,6 @@ def rolled(envs, steps=40, seed=1):
     return [envs.step(taken) for taken in _actions(envs, seed, steps)]
 
 
-@pytest.mark.parametrize("mode", MODES[:2], ids=lambda mode: mode.name)
-@pytest.mark.parametrize("env_id", IDS)
-def test_any_number_of_threads_gives_the_same_bits(env_id, mode):
-    for n in SIZES if env_id == LEG else SIZES[-1:]:
-        expected = None
-        for num_threads in (1, 2, 3, 8):
-            envs = make(n, num_threads, env_id, autoreset_mode=mode)
-            found = [envs.reset(seed=5), rolled(envs)]
-            expected = expected or found
-            same(found, expected)
-
-
-def test_stable_baselines_environment():
-    one, many = (Sb3VecEnv(num_envs=40, num_threads=k, episode_seconds=0.3) for k in (1, 4))
-    for envs in (one, many):
-        envs.seed(3)
-    same(one.reset(), many.reset())
-    for taken in actions(2, 40, 40):
-        same(one.step(taken), many.step(taken))
-
-
 def test_a_bad_action_stops_all_blocks():
     envs = make(40, 4).unwrapped
     envs.reset(seed=0)
@@ -73,25 +48,6 @@ def test_a_bad_action_stops_all_blocks():
     same(envs.get_state(), before)
 
 
-def test_a_state_goes_on_under_another_number_of_threads():
-    one, many = make(40, 1).unwrapped, make(40, 5).unwrapped
-    many.reset(seed=4)
-    rolled(many, 9)
-    same(one.set_state(many.get_state()), many._observed())
-    same(rolled(one), rolled(many))
-
-
-@pytest.mark.parametrize("again", [copy.deepcopy, lambda envs: pickle.loads(pickle.dumps(envs))])
-def test_copies_go_on_by_themselves(again):
-    envs = make(40, 4).unwrapped
-    envs.reset(seed=4)
-    rolled(envs, 9)
-    twin = again(envs)
-    expected = rolled(copy.deepcopy(envs))
-    same(rolled(twin), expected)
-    same(rolled(envs), expected)
-
-
 def test_a_copy_has_no_more_threads_than_there_are_processors(monkeypatch):
     envs = make(40, 4).unwrapped
     envs.reset(seed=4)
@@ -99,12 +55,6 @@ def test_a_copy_has_no_more_threads_than_there_are_processors(monkeypatch):
     monkeypatch.setattr(threads, "available", lambda: 3)
     assert pickle.loads(kept).batch.engine.num_threads == 3
     same(rolled(pickle.loads(kept)), rolled(envs))
-
-
-@pytest.mark.parametrize("given", [0, 9, 2.0])
-def test_bad_numbers_of_threads(given):
-    with pytest.raises(ParameterError, match=r"num_threads: expected.*got"):
-        make(40, given)
 
 
 def in_a_process(n, program):

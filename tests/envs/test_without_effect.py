@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from family import IDS, OTHER, actions, same
 
-from hoof_env import RandomizeParameters, Sb3VecEnv
+from hoof_env import Sb3VecEnv
 from hoof_env.dynamics.parts import ONE_LEG
 from hoof_env.envs.batch import EpisodeBatch
 from hoof_env.errors import FixedSettingError, ParameterError
@@ -79,32 +79,6 @@ def test_all_are_tried():
     assert all(getattr(Settings(), name) != value for name, value in OTHER.items())
 
 
-@pytest.mark.parametrize(
-    ("env_id", "kwargs", "message"),
-    [
-        (LEG, {"motor_gain": 30.0}, "motor_gain: expected drive='motor' beside it.*got drive='prescribed'"),
-        (LEG, {"motor_torque": "strong"}, "motor_torque: expected drive='motor'"),
-        (LEG, {"motor_inertia": 1.0, "drive": "prescribed"}, "motor_inertia: expected drive='motor'"),
-        (RAIL, {"trunk_share": 0.5}, "trunk_share: expected trunk='suspended' beside it.*got trunk='rail'"),
-        (LEG, {"trunk": "fixed", "trunk_drag": 1.0}, "trunk_drag: .* or trunk='rail' beside"),
-        (HORSE, {"trunk_drag": 1.0}, "trunk_drag: expected none of a horse"),
-        (LEG, {"size": 0.7}, "size: expected none of one leg"),
-        (FIXED, {"trunk_stiffness": 1.0}, "trunk_stiffness: expected.*got trunk='fixed'"),
-        (LEG, {"target_seconds": (1.0, 2.0)}, r"target_seconds: .* a range of target_speed.*=\(2.5, 2.5\)"),
-        (LEG, {"target_seconds": (1.0, 2.0), "target_speed": 2.0}, "a range of target_speed beside.*=2.0"),
-        (RAIL, {"target_seconds": (1.0, 2.0)}, "target_seconds: expected a range of target_speed.*=None"),
-        (LEG, {"friction_slow": 1e-4, "friction_law": "tanh"}, "friction_slow: .* friction_law='ambrosio'"),
-        (FIXED, {"baumgarte_alpha": 5.0}, "baumgarte_alpha: expected solver='paper'.*got solver='exact'"),
-        (RAIL, {"randomize": {"trunk_share": 0.5}}, "randomize: 'trunk_share': expected trunk='suspended'"),
-    ],
-    ids=str,
-)  # fmt: skip
-@pytest.mark.parametrize("make", [gym.make, gym.make_vec], ids=["single", "vector"])
-def test_arguments(make, env_id, kwargs, message):
-    with pytest.raises(ParameterError, match=message):
-        make(env_id, **kwargs)
-
-
 @pytest.mark.parametrize("env_id", IDS)
 def test_what_an_environment_says_of_itself_makes_it_again(env_id):
     """All its settings as JSON, those without effect with the values that they have anyway; and its spec."""
@@ -115,15 +89,6 @@ def test_what_an_environment_says_of_itself_makes_it_again(env_id):
     same(from_spec.set_state(env.get_state()), env.batch.observations[0])
     again = gym.make(env_id, **json.loads(json.dumps(env.get_state()["settings"]))).unwrapped
     same(again.set_state(env.get_state()), env.batch.observations[0])
-
-
-def test_options_and_ranges():
-    env = gym.make(RAIL)
-    message = r"options\['parameters'\]: 'trunk_damping': expected trunk='suspended' beside it"
-    with pytest.raises(ParameterError, match=message):
-        env.reset(seed=0, options={"parameters": {"trunk_damping": 1.0}})
-    with pytest.raises(ParameterError, match=message):
-        RandomizeParameters(env, {"trunk_damping": (1.0, 2.0)})
 
 
 def test_a_friction_law_without_a_lower_threshold_does_not_compare_with_one():

@@ -1,9 +1,9 @@
-"""One clear error for each thing that can be wrong, and the environment goes on as if nothing had been."""
+"""What environments refuse once they are made, and go on as if nothing had been: resets, steps, states, and
+other calls (`CALLS`), by the words of each error. A new option or method adds its rows here."""
 
 from __future__ import annotations
 
 import copy
-from decimal import Decimal
 
 import gymnasium as gym
 import numpy as np
@@ -11,134 +11,12 @@ import pytest
 from family import HORSE, IDS, actions, same
 from gymnasium.error import ClosedEnvironmentError, ResetNeeded
 
-from hoof_env import Sb3VecEnv, make_policy, read_preset
-from hoof_env.errors import ParameterError
-from hoof_env.gait import load_gait
+from hoof_env import RandomizeParameters, Sb3VecEnv, make_policy, read_preset
+from hoof_env.errors import FixedSettingError, ParameterError, UnknownArgumentError
+from hoof_env.gait import HarmonicGait, load_gait
 
 LEG, NAN = "hoof_env/HorseLeg-v0", float("nan")
 OTHER_LEG = {**read_preset("identified"), "provenance": "another"}
-
-ARGUMENTS = [
-    ({"trunk_mas": 80.0}, "HorseLeg-v0: unexpected keyword argument 'trunk_mas'; did you mean trunk_mass?"),
-    ({"wings": 2}, r"unexpected keyword argument 'wings' \(known: preset, gait, trunk, "),
-    ({"task": "fly"}, "task: expected one of fixed, horse, leg, .*got 'fly'"),
-    ({"preset": "no_such_leg"}, "preset: expected one of identified, got 'no_such_leg'"),
-    ({"trunk": "floating"}, "trunk: expected one of fixed, rail, suspended, got 'floating'"),
-    ({"trunk": "free"}, "trunk: expected one of fixed, rail, suspended, got 'free'"),
-    ({"trunk": 3}, "trunk: expected one of fixed, rail, suspended, got 3"),
-    ({"gait": "trot"}, "gait: expected one of carrying_walk, run, walk, got 'trot'"),
-    ({"solver": "fast"}, "solver: expected one of exact, paper, got 'fast'"),
-    ({"solver": "paper", "integrator": "euler"}, "trunk: expected 'fixed' with solver=\"paper\""),
-    (
-        {"observation": ["crank", "target"], "target_speed": None},
-        "observation: 'target' is constant without target_speed",
-    ),
-    ({"observation": ["crank", "ground"]}, "observation: 'ground' is constant without terrain"),
-    *(
-        ({name: value}, rf"{name}: expected .*\(0, {bound}\].*got {value!r}")
-        for name, bound in (("crank_rate", 20), ("swing_rate", 6))
-        for value in (0.0, -1.0, NAN, float("inf"), 1.001 * bound, "fast", None)
-    ),
-    ({"drive": "belt"}, "drive: expected one of motor, prescribed, got 'belt'"),
-    ({"normal_law": "hertz"}, "normal_law: expected one of .*lankarani-nikravesh.*got 'hertz'"),
-    ({"friction_law": "stick"}, "friction_law: expected one of ambrosio.*got 'stick'"),
-    ({"integrator": "leapfrog"}, "integrator: expected one of .*midpoint.*got 'leapfrog'"),
-    ({"render_mode": "ansi"}, "render_mode: expected one of .*rgb_array, got 'ansi'"),
-    ({"dt": 0.0205}, "dt: expected a whole multiple of sim_dt = 0.001 s, got 0.0205 s"),
-    ({"dt": 0.0005}, "dt: expected a whole multiple"),
-    ({"dt": 1e300, "sim_dt": 1e-9}, "dt: expected.* got 1e.300 s .ratio inf; at most 100000"),
-    ({"sim_dt": 1e-300}, "sim_dt: expected 1e-12 or more, got 1e-300"),
-    ({"dt": NAN}, "dt: expected.*got nan"),
-    ({"sim_dt": 0.0}, "sim_dt: expected"),
-    ({"sim_dt": 0.2, "dt": 0.2}, "sim_dt: expected.*got 0.2"),
-    ({"trunk_mass": -80.0}, "trunk_mass: expected.*got -80.0"),
-    ({"trunk_mass": "heavy"}, "trunk_mass: expected.*got 'heavy'"),
-    ({"trunk_share": 1.5}, "trunk_share: expected.*got 1.5"),
-    ({"trunk_stiffness": -1.0}, "trunk_stiffness: expected.*got -1.0"),
-    ({"hip_height": 0.0}, "hip_height: expected.*got 0.0"),
-    ({"hip_height": "low"}, "hip_height: expected.*got 'low'"),
-    ({"stiffness": float("inf")}, "stiffness: expected.*got inf"),
-    ({"restitution": 1.1}, "restitution: expected.*got 1.1"),
-    ({"restitution": 0.0, "normal_law": "flores"}, "restitution: expected a number in .0.01, 1."),
-    ({"exponent": 0.0}, "exponent: expected.*got 0.0"),
-    ({"exponent": 1.51}, "exponent: expected a multiple of 1/8, .*, got 1.51"),
-    ({"friction": -0.1}, "friction: expected.*got -0.1"),
-    ({"friction_fast": 1e-4}, "friction_fast: expected more than friction_slow"),
-    ({"drive": "motor", "motor_gain": -1.0}, "motor_gain: expected.*got -1.0"),
-    ({"drive": "motor", "motor_torque": "strong"}, "motor_torque: expected.*got 'strong'"),
-    ({"approach_floor": 1e300}, "approach_floor: expected.*got 1e.300"),
-    ({"episode_seconds": -1.0}, "episode_seconds: expected.*got -1.0"),
-    ({"episode_seconds": 1e308}, "episode_seconds: expected.*got 1e.308"),
-    ({"episode_seconds": 10.0, "dt": 20.0}, r"episode_seconds: expected.*\[20, .*got 10.0"),
-    ({"target_speed": "fast"}, "target_speed.*: expected.*got 'fast'"),
-    ({"target_speed": [3.0, 1.0]}, r"target_speed\[1\]: expected.*\[3, .*got 1.0"),
-    ({"target_speed": [1.0, 2.0, 3.0]}, r"target_speed: expected two numbers, got \[1.0, 2.0, 3.0\]"),
-    ({"target_speed": (1.0, 2.0), "target_seconds": 0.0}, r"target_seconds\[0\]: expected.*got 0.0"),
-    ({"observation": ["tail"]}, r"observation: expected a list of some of crank, .*got \['tail'\]"),
-    ({"observation": []}, r"observation: expected a list of some of crank, .*got \[\]"),
-    ({"observation": ["hoof", "hoof"]}, "observation: expected a list"),
-    ({"observation": "hoof"}, "observation: expected a list of some of crank, .*got 'hoof'"),
-    ({"observation": [["hoof"]]}, "observation: expected a list of some of crank"),
-    ({"reward_weights": {"speed": 1.0}}, "reward_weights: expected a mapping with some of progress.*got"),
-    ({"reward_weights": {"peak": NAN}}, "reward_weights.'peak'.: expected.*got nan"),
-    ({"reward_weights": 3}, "reward_weights: expected a mapping"),
-    ({"terrain": 3}, "terrain: expected None or a mapping, got 3"),
-    ({"terrain": {"kind": "moon"}}, r"terrain\['kind'\]: expected one of hills, slope, got 'moon'"),
-    ({"terrain": {"kind": "hills", "steep": 1}}, "terrain: hills has no steep; expected some of seed"),
-    ({"terrain": {"kind": "hills", "rise": -1}}, r"terrain\['rise'\]: expected.*got -1"),
-    ({"terrain": {"kind": "hills", "stiffness": 2}}, r"terrain\['stiffness'\]: expected two numbers, got 2"),
-    ({"terrain": {"kind": "slope", "angle": 2}}, "angle.*: expected.*got 2"),
-    ({"terrain": {"bumps": 1}}, "terrain.*"),
-    ({"terrain": {"kind": "slope", "angle": 0.001}}, "terrain: expected ground whose mean height.*suspended"),
-    ({"terrain": {"kind": "hills", "rise": 0.5}}, r"terrain\['rise'\]: expected at most 0.339 m.*got 0.5 m"),
-    ({"terrain": np.zeros(2)}, r"terrain: expected None or a mapping, got \[0.0, 0.0\]"),
-    ({"friction": Decimal("0.5")}, "friction: expected a number of Python or NumPy.*Decimal"),
-    ({"randomize": 3}, "randomize: expected a mapping with some of trunk_mass.*got 3"),
-    ({"randomize": []}, r"randomize: expected a mapping with some of trunk_mass.*got \[\]"),
-    ({"randomize": np.zeros(2)}, r"randomize: expected a mapping with some of trunk_mass.*got \[0.0"),
-    ({"observation": ["ground"], "terrain": {}}, "'ground' is constant without terrain, got terrain={}"),
-    ({"randomize": {"preset": "x"}}, "randomize: expected a mapping with some of trunk_mass"),
-    ({"randomize": {"friction": (0.1, 0.2, 0.3)}}, r"randomize\['friction'\]: expected a number or two"),
-    ({"randomize": {"friction": (0.3, 0.1)}}, r"randomize\['friction'\]: expected the lower one first"),
-    ({"randomize": {"friction": (0.3, NAN)}}, r"randomize\['friction'\]\[1\]: expected.*got nan"),
-    ({"randomize": {"trunk_mass": (-1.0, 80.0)}}, "trunk_mass: expected.*got -1.0"),
-    ({"randomize": {"friction_slow": (0.0, 0.1)}}, "friction_fast: expected more than friction_slow"),
-]
-
-
-@pytest.mark.parametrize("make", [gym.make, gym.make_vec], ids=["single", "vector"])
-@pytest.mark.parametrize(("kwargs", "message"), ARGUMENTS, ids=[str(kwargs) for kwargs, _ in ARGUMENTS])
-def test_arguments(make, kwargs, message):
-    with pytest.raises(ParameterError, match=message):
-        make(LEG, **kwargs)
-
-
-@pytest.mark.parametrize(
-    ("kwargs", "message"),
-    [
-        *(({"num_envs": n}, "num_envs: expected a whole number, 1 or more, got") for n in (0, -1, 1.5, True)),
-        ({"num_envs": 10**9}, "num_envs: expected at most 1e.06, got 1000000000"),
-        ({"autoreset_mode": "LATER"}, "autoreset_mode: expected one of NEXT_STEP, SAME_STEP, DISABLED, got"),
-        (
-            {"autoreset_mode": None},
-            "autoreset_mode: expected one of NEXT_STEP, SAME_STEP, DISABLED, got None",
-        ),
-        ({"autoreset_mode": []}, r"autoreset_mode: expected one of.*got \[\]"),
-        ({"max_episode_steps": 0}, "max_episode_steps: expected a whole number, 1 or more, got 0"),
-        ({"max_episode_steps": 2.5}, "max_episode_steps: expected a whole number, 1 or more, got 2.5"),
-        ({"render_mode": "human"}, "render_mode: expected one of rgb_array, got 'human'"),
-        ({"render_mode": "rgb_array", "rendered": 0}, "rendered: expected a whole number, 1 or more, got 0"),
-        ({"render_mode": "rgb_array", "rendered": 3}, "rendered: expected at most num_envs=2, got 3"),
-        (
-            {"render_mode": "rgb_array", "num_envs": 17},
-            "rendered: expected how many of the 17 environments to draw, .* record_first_only=True",
-        ),
-    ],
-    ids=str,
-)
-def test_arguments_of_the_vector_environment(kwargs, message):
-    with pytest.raises(ParameterError, match=message):
-        gym.make_vec(LEG, **{"num_envs": 2, **kwargs})
 
 
 BOTH = {"single": lambda **kwargs: gym.make(LEG, **kwargs).unwrapped,
@@ -401,30 +279,208 @@ def test_states_of_other_numbers_of_environments():
         check_nothing_lost(*going(kind), lambda env, s=state: env.set_state(s), message)
 
 
+# All other calls
+
+
+def single(env_id=LEG, **settings):
+    env = gym.make(env_id, **settings).unwrapped
+    env.reset(seed=0)
+    return env
+
+
+def three(**settings):
+    envs = gym.make_vec(LEG, num_envs=3, **settings).unwrapped
+    envs.reset(seed=0)
+    return envs
+
+
+def wrapped():
+    env = RandomizeParameters(gym.make(LEG), {"friction": 0.3})
+    env.reset(seed=0)
+    return env
+
+
+KINDS = {
+    "single": single,
+    "vector": three,
+    "horse": lambda: single(HORSE),
+    "rail": lambda: single("hoof_env/HorseLegRail-v0"),
+    "terrain": lambda: single("hoof_env/HorseLegTerrain-v0"),
+    "wrapper": wrapped,
+}
+
+
+def asks(name, *arguments):
+    """A call of a method."""
+    return lambda env: getattr(env, name)(*arguments)
+
+
+def assigns(name, value):
+    return lambda env: setattr(env, name, value)
+
+
+def changes(**settings):
+    return lambda env: env.change_settings(**settings)
+
+
+def resets(**options):
+    return lambda env: env.reset(options=options)
+
+
+def state_with(**entries):
+    """A state of a single environment with some entries changed, or functions of those that it has."""
+
+    def set_state(envs):
+        good = single().get_state()
+        envs.set_state({**good, **{k: v(good[k]) if callable(v) else v for k, v in entries.items()}})
+
+    return set_state
+
+
+def of_before(env):
+    """A state with an old name."""
+    return {"begun" if key == "start_values" else key: part for key, part in env.get_state().items()}
+
+
+NO_GAIT = r"gait: expected one of carrying_walk, run, walk.*got"
+NO_GAITS = (
+    "trot", None, 3, [1.0, 2.0], [1.0, 2.0, 3.0, NAN], HarmonicGait(5.0, 0.4, 0.1, -0.2),
+    {"crank_speed": 1.0},
+)  # fmt: skip
+OF_ONE = "state: expected what get_state gives of one"
+BESIDE = r"options\['parameters'\]: 'trunk_damping': expected trunk='suspended' beside it"
+CALLS = [
+    # gaits to go to
+    *(
+        ("single", asks("action_for", gait), ParameterError, NO_GAIT)
+        for gait in (*NO_GAITS, np.zeros((2, 4)))
+    ),
+    *(
+        ("vector", asks("action_for", gait), ParameterError, NO_GAIT)
+        for gait in (*NO_GAITS, np.zeros((4, 4)), np.zeros((3, 1, 4)))
+    ),
+    # resets
+    ("horse", resets(crank_angle=0.0), ParameterError, "mapping with some of gait, parameters, phase"),
+    ("horse", resets(phase="early"), ParameterError, r"options\['phase'\]"),
+    ("horse", resets(gait="canter"), ParameterError, r"options\['gait'\]: expected one of"),
+    ("horse", resets(gait=[1.0, 2.0]), ParameterError, "a HorseGait, or finite numbers of shape"),
+    (
+        "horse",
+        resets(gait=np.full(16, 5.0)),
+        ParameterError,
+        r"options\['gait'\]: expected fore_speed_cos from -0.6 to 0.6, got 5",
+    ),
+    (
+        "horse",
+        resets(gait=np.r_[-5.0, np.zeros(15)]),
+        ParameterError,
+        r"options\['gait'\]: expected rate from 0.1 to",
+    ),
+    (
+        "horse",
+        resets(gait=np.tile(np.r_[4.0, np.zeros(15)], (3, 1))),
+        ParameterError,
+        r"options\['gait'\]: expected one gait or 1",
+    ),
+    ("horse", resets(pitch=1.0), ParameterError, r"options\['pitch'\]"),
+    ("rail", resets(parameters={"trunk_damping": 1.0}), ParameterError, BESIDE),
+    (
+        "rail",
+        resets(target_speed=2.0),
+        ParameterError,
+        r"options\['target_speed'\]: expected none where no speed",
+    ),
+    *(
+        ("wrapper", lambda env, options=options: env.reset(options=options), ParameterError,
+         r"options.*: expected a mapping with some of .*, got")
+        for options in ("fast", ["gait"], {"parameters": 5}, {"parameters": None})
+    ),
+    # settings from the next reset on
+    *(
+        (kind, changes(**{name: value}), ParameterError, name)
+        for kind in ("single", "vector")
+        for name, value in (
+            ("target_speed", "fast"),
+            ("terrain", {"kind": "moon"}),
+            ("terrain", {"kind": "slope", "angle": 0.1}),
+            ("reward_weights", {"speed": 1.0}),
+            ("randomize", {"friction": (0.3, 0.1)}),
+        )
+    ),
+    ("single", changes(dt=0.01), FixedSettingError, "expected some of target_speed.*got 'dt'"),
+    ("single", changes(target_sped=1.0), UnknownArgumentError, "did you mean target_speed"),
+    (
+        "single",
+        assigns("terrain", None),
+        FixedSettingError,
+        r"from the next reset on by change_settings\(terrain=...\)",
+    ),
+    ("terrain", changes(terrain=None), ParameterError, "'ground' is constant without terrain"),
+    # states of a single environment for all of many
+    ("vector", state_with(settings=lambda s: {**s, "friction": 0.1}), ParameterError, "friction: 0.4 here"),
+    ("vector", state_with(engine=lambda s: {**s, "layout": 3}), ParameterError, OF_ONE),
+    ("vector", state_with(episode=np.zeros((3, 2))), ParameterError, OF_ONE),
+    ("vector", state_with(generator={"state": 3}), ParameterError, "state.*generator"),
+    (
+        "single",
+        lambda env: env.set_state(three().get_state()),
+        ParameterError,
+        "state: expected one of a single environment, got one of 3 environments",
+    ),
+    ("single", lambda env: env.set_state(of_before(env)), ParameterError, "'begun' is called 'start_values' now"),
+    ("single", state_with(id="own/Everything-v0"), ParameterError, f"one of {LEG}, got one of own"),
+    # attributes, methods, records and generators of rows
+    *(
+        ("vector", asks("set_attr", name, 5), FixedSettingError, f"{name}: expected no assignment.*m.make")
+        for name in ("trunk_mass", "dt", "weight", "gaits", "step")
+    ),
+    (
+        "vector",
+        asks("set_attr", "trunk_mass", 5),
+        ParameterError,
+        r"reset\(options=\{'parameters': \{'trunk_mass': \.\.\.\}\}\)",
+    ),
+    ("vector", asks("set_attr", "mark", [1, 2]), ParameterError, "values: expected one or 3, got 2"),
+    *(
+        ("vector", asks("call", name), ParameterError, f"'{name}' is of all together; expected envs.{name}")
+        for name in ("reset", "step")
+    ),
+    *(("vector", asks("record", row), ParameterError, "env: expected") for row in (3, -1, 1.5)),
+    *(
+        ("vector", assigns("np_random", value), ParameterError, "np_random: expected")
+        for value in (3, [np.random.default_rng(0)], [1, 2, 3])
+    ),
+]  # fmt: skip
+"""Kind of environment, call, class and words of the error."""
+
+
+@pytest.mark.parametrize(
+    ("kind", "call", "error", "words"), CALLS, ids=[f"{row[0]}-{row[3]}" for row in CALLS]
+)
+def test_calls(kind, call, error, words):
+    """Nothing changes, the settings included."""
+    env = KINDS[kind]()
+    before, settings = env.unwrapped.get_state(), env.unwrapped.settings
+    with pytest.raises(error, match=words):
+        call(env)
+    same(env.unwrapped.get_state(), before)
+    assert env.unwrapped.settings == settings
+
+
+def test_the_adapter_has_no_method_of_one_environment():
+    env = Sb3VecEnv(LEG, 2)
+    with pytest.raises(ParameterError, match="expected all environments, which are one, got"):
+        env.env_method("close", indices=0)
+
+
 def test_gaits_and_policies_by_name_or_refused_in_words():
     env = gym.make(LEG)
     leg, run = env.unwrapped, load_gait("run")
     env.reset(seed=0, options={"gait": "walk"})
     for gait in ("run", run.to_array(), run.to_array().tolist()):
         same(leg.action_for(gait), leg.action_for(run))
-    for gait in ("trot", None, 3, [1.0, 2.0], {"crank_speed": 1.0}, [1.0, 2.0, 3.0, NAN]):
-        with pytest.raises(ParameterError, match=r"gait: expected one of carrying_walk, run, walk.*got"):
-            leg.action_for(gait)
     for arguments in ((env, "run"), ("run", "walk"), ("run", gym.make("CartPole-v1"))):
         with pytest.raises(ParameterError, match=r"env: expected an environment of this package, make_pol"):
             make_policy(*arguments)
     with pytest.raises(ParameterError, match=r"policy: expected one of .*got 3"):
         make_policy(3, env)
-
-
-def test_adapter():
-    for env_id in ("hoof_env/HorseLegMO-v0", "CartPole-v1", "Nobodys-v0", "no_such_module:Leg-v0"):
-        with pytest.raises(ParameterError, match="env_id: expected an id of this package with many at once"):
-            Sb3VecEnv(env_id, 2)
-    with pytest.raises(ParameterError, match="unexpected keyword argument 'trunck'; did you mean trunk"):
-        Sb3VecEnv(LEG, 2, trunck="rail")
-    with pytest.raises(ParameterError, match="autoreset_mode: expected SAME_STEP, got 'NEXT_STEP'"):
-        Sb3VecEnv(LEG, 2, autoreset_mode="NEXT_STEP")
-    env = Sb3VecEnv(LEG, 2)
-    with pytest.raises(ParameterError, match="expected all environments, which are one, got"):
-        env.env_method("close", indices=0)
