@@ -1,5 +1,4 @@
-"""What engines of whole animals have: limits, slip, legs of their own in each environment, and the words for
-what does not fit."""
+"""What engines of whole animals have: limits, slip, legs of their own in each environment."""
 
 from dataclasses import replace
 
@@ -13,13 +12,12 @@ from hoof_env.dynamics.memory import LIFT_OFF
 from hoof_env.dynamics.observables import stance_figures
 from hoof_env.dynamics.parts import HoofSpring, Limb, Limits, Motor, Prescribed, Result, Trunk
 from hoof_env.dynamics.reactions import LegConstants, leg_constants
-from hoof_env.errors import ParameterError
 from hoof_env.gait import GaitParameters, HarmonicGait
 from hoof_env.ground.contact import Ground
 from hoof_env.ground.terrain import Terrain
 from hoof_env.leg.kinematics import FrameMotion, pose
 from hoof_env.leg.profile import places
-from tests.dynamics.scenes import HIPS, LEG, LOWEST, NATURAL, THETA, WALK, horse
+from tests.dynamics.scenes import HIPS, LEG, LOWEST, NATURAL, THETA, WALK
 from tests.linkage import POINTS
 
 SPRING = HoofSpring(4e4, 600.0)
@@ -221,46 +219,3 @@ def test_commands_after_a_partial_reset():
     for name in ("trunk", "limbs", "command", "account"):
         assert np.array_equal(before[name][..., others], after[name][..., others]), name
     assert np.array_equal(after["command"][..., [2, 5]], wanted)
-
-
-# -- words -----------------------------------------------------------------------------------------------
-
-
-@pytest.mark.parametrize(
-    ("make", "words"),
-    [
-        (lambda: HoofSpring(4e4, 0.0), r"hoof_spring.damping: expected .* got 0.0"),
-        (lambda: HoofSpring(-1.0, 3.0), r"hoof_spring.stiffness: expected .* got -1.0"),
-        (lambda: HoofSpring(4e4, 300.0, 1e4, np.nan), r"tangential_damping: expected .* got nan"),
-        (lambda: Limits(pitch=(0.2, -0.2)), r"limits.pitch: expected a lower and a higher bound, got"),
-        (lambda: Limits(clearance="low"), r"limits.clearance: expected a number, got 'low'"),
-        (lambda: Limb(LEG, spring=4e4), r"limb.spring: expected a HoofSpring or None, got 40000.0"),
-        (lambda: horse(length=1.4), r"limbs\[0\].hip: expected within the trunk, 0.7 m .* got -0.75"),
-        (lambda: TrunkEngine([Limb(LEG), Limb(LEG, spring=SPRING)], FREE), r"limbs\[1\].spring: expected no"),
-        (lambda: TrunkEngine(Limb(LEG), FREE, harmonics=4), r"harmonics: expected .* got 4"),
-        (lambda: HarmonicGait(5.0, 0.1, 0.1, 0.1, (0.1,)), r"higher: expected the sine and .* got \(0.1,\)"),
-        (lambda: HarmonicGait(5.0, 0.1, 0.1, 0.1, (0.1, 0.9)), r"higher\[1\]: expected .* got 0.9"),
-        (lambda: horse().reset(HarmonicGait(5.0, 0.1, 0.1, 0.1), 0.0), r"gait: expected a swing"),
-        (lambda: horse().vary(0, limbs=[Limb(LEG.scaled(1.1), hip) for hip in HIPS]), r"made without limits"),
-        (lambda: animal(Limits()).vary(0, limbs=[Limb(LEG)]), r"limbs: expected 4, got 1"),
-        (
-            lambda: animal(Limits()).vary(0, limbs=[Limb(LEG, hip) for hip in HIPS]),
-            r"limbs\[0\].spring: expected a HoofSpring",
-        ),
-        (
-            lambda: animal(Limits()).vary(
-                0, limbs=[Limb(LEG.replace(lengths={"FG": 0.6}), hip, spring=SPRING) for hip in HIPS]
-            ),
-            r"limbs\[0\].geometry: expected one similar to the engine's .* other lengths, masses, inertias",
-        ),
-        (lambda: animal(Limits()).set_state(horse().get_state()), r"state: of another engine; .*spring"),
-        (lambda: animal(Limits()).command(np.zeros(6)), r"command: expected shape \(4,\), .* got \(6,\)"),
-        (
-            lambda: animal(Limits(), contact_law=lambda d, v, s, ground: d),
-            r"contact_law: expected none beside springs",
-        ),
-    ],
-)  # fmt: skip
-def test_what_does_not_fit_is_named(make, words):
-    with pytest.raises(ParameterError, match=words):
-        make()

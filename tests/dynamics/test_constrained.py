@@ -17,7 +17,6 @@ from hoof_env.dynamics.constrained import INTEGRATORS, TRACE, ConstrainedLeg, cl
 from hoof_env.dynamics.engine import TrunkEngine
 from hoof_env.dynamics.parts import Limb, Prescribed, Result, Trunk
 from hoof_env.dynamics.step_length import StepWarning
-from hoof_env.errors import ParameterError
 from hoof_env.gait import LIMITS, GaitParameters
 from hoof_env.ground.contact import Ground
 from hoof_env.leg.geometry import load_geometry
@@ -280,33 +279,6 @@ def test_a_failure_is_a_result_and_puts_the_state_back(spoil, result):
     assert "put back" in result.message
     for name, value in vars(before).items():
         assert getattr(leg.state, name).tobytes() == value.tobytes(), name
-
-
-@pytest.mark.parametrize(
-    ("setting", "value"),
-    [
-        ("alpha", -1.0), ("beta", -1.0), ("beta", math.nan), ("integrator", "leapfrog"), ("integrator", None),
-        ("sim_dt", 0.0), ("sim_dt", 1.0), ("height", 0.0), ("height", math.inf),
-    ],
-)  # fmt: skip
-def test_a_bad_setting_is_refused_by_name(setting, value):
-    with pytest.raises(ParameterError, match=setting):
-        ConstrainedLeg(GEOMETRY, Ground(), **{setting: value})
-
-
-@pytest.mark.parametrize(
-    ("argument", "value"), [("theta", math.nan), ("x", math.inf), ("height", 3.0), ("speed", 1.0)]
-)
-def test_a_bad_start_is_refused_by_name(argument, value):
-    with pytest.raises(ParameterError, match=argument):
-        ConstrainedLeg(GEOMETRY, Ground()).reset(WALK, **{argument: value})
-
-
-def test_a_command_of_the_wrong_shape_is_refused():
-    leg = ConstrainedLeg(GEOMETRY, Ground())
-    leg.reset(WALK)
-    with pytest.raises(ParameterError, match="command: expected 4 values"):
-        leg.advance(np.zeros(3), new_trace(1))
 
 
 @pytest.mark.parametrize("copied", [copy.deepcopy, lambda leg: pickle.loads(pickle.dumps(leg))])

@@ -7,7 +7,6 @@ from hoof_env.constants import GRAVITY
 from hoof_env.dynamics.constrained import ConstrainedLeg
 from hoof_env.dynamics.engine import TrunkEngine
 from hoof_env.dynamics.parts import Limb, Motor, Prescribed, Trunk
-from hoof_env.errors import ParameterError
 from hoof_env.gait import load_gait
 from hoof_env.ground.terrain import Terrain
 from hoof_env.leg.geometry import load_geometry
@@ -131,8 +130,3 @@ def test_reactions_change_no_bit_of_the_motion_and_are_the_same_in_a_batch():
         np.testing.assert_array_equal(row, silent.state[name], name)
     for one, many in zip(alone.reactions(), batch.reactions(), strict=True):
         np.testing.assert_array_equal(one[..., 0], many[..., 0])
-
-
-def test_an_engine_without_them_says_so():
-    with pytest.raises(ParameterError, match="reactions=True"):
-        walker().reactions()

@@ -6,7 +6,6 @@ import pytest
 from hoof_env.constants import GRAVITY
 from hoof_env.dynamics.engine import TrunkEngine
 from hoof_env.dynamics.parts import Limb, Prescribed, Trunk
-from hoof_env.errors import ParameterError
 from hoof_env.gait import GaitParameters
 from tests.dynamics.scenes import LEG
 
@@ -53,21 +52,3 @@ def test_drag_slows_it_exponentially(kind):
     trunk = Trunk(**{**NOTHING, "kind": kind, "drag": 60.0})
     trace, mass = play(trunk, 2.0, vx=5.0)
     assert trace["vx"] == pytest.approx(5.0 * np.exp(-60.0 / mass * trace["time"]), rel=1e-3)
-
-
-@pytest.mark.parametrize(
-    ("settings", "message"),
-    [
-        ({"kind": "loose"}, "trunk: expected one of fixed, free, rail, suspended, got 'loose'"),
-        ({"mass": 0.0}, "trunk_mass: expected"),
-        ({"share": 1.1}, r"trunk_share: expected a finite number in \[0, 1\], got 1.1"),
-        ({"stiffness": -1.0}, "trunk_stiffness: expected"),
-        ({"damping": float("nan")}, "trunk_damping: expected"),
-        ({"drag": -1.0}, "trunk_drag: expected"),
-        ({"height": 0.0}, "trunk_height: expected"),
-        ({"pitch_inertia": 0.0}, "trunk_pitch_inertia: expected"),
-    ],
-)
-def test_bad_settings_are_named(settings, message):
-    with pytest.raises(ParameterError, match=message):
-        Trunk(**settings)

@@ -10,7 +10,6 @@ from hypothesis import strategies as st
 from hoof_env.dynamics.engine import TrunkEngine
 from hoof_env.dynamics.observables import StanceCounter
 from hoof_env.dynamics.parts import Limb, Prescribed, Trunk
-from hoof_env.errors import ParameterError
 from tests.dynamics.scenes import LEG, RUN
 
 TRUNKS = {
@@ -162,9 +161,3 @@ def test_strides_change_nothing_else():
         made.advance(steps=400)
     for name, value in engines[0].state.items():
         np.testing.assert_array_equal(value, engines[1].state[name], err_msg=name)
-
-
-@pytest.mark.parametrize("name", ["strides", "reactions"])
-def test_a_flag_is_a_truth(name):
-    with pytest.raises(ParameterError, match=f"{name}: expected True or False, got 'no'"):
-        TrunkEngine(Limb(LEG), TRUNKS["suspended"], **{name: "no"})

@@ -427,7 +427,7 @@ CALLS = [
         ParameterError,
         "state: expected one of a single environment, got one of 3 environments",
     ),
-    ("single", lambda env: env.set_state(of_before(env)), ParameterError, "'begun' is called 'start_values' now"),
+    ("single", lambda env: env.set_state(of_before(env)), ParameterError, "'begun' is called 'start_v"),
     ("single", state_with(id="own/Everything-v0"), ParameterError, f"one of {LEG}, got one of own"),
     # attributes, methods, records and generators of rows
     *(

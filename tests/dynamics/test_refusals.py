@@ -1,14 +1,19 @@
-"""The engine of several legs refuses what it cannot mean."""
+"""What engines and their parts refuse, by the words of each error: the engine of several legs, the paper's
+solver, trunks, springs, limits. A new part adds its rows to `PARTS`."""
 
+import math
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
+from hoof_env.dynamics.constrained import ConstrainedLeg, new_trace
 from hoof_env.dynamics.engine import TrunkEngine
-from hoof_env.dynamics.parts import Limb, Motor, Prescribed, Result, Trunk
+from hoof_env.dynamics.parts import HoofSpring, Limb, Limits, Motor, Prescribed, Result, Trunk
 from hoof_env.errors import NotStartedError, ParameterError
-from tests.dynamics.scenes import LEG, RUN, WALK
+from hoof_env.gait import HarmonicGait
+from hoof_env.ground.contact import Ground
+from tests.dynamics.scenes import HIPS, LEG, LOWEST, NATURAL, RUN, WALK, horse
 
 LIMBS = (Limb(LEG, (0.4, 0.0), Motor()), Limb(LEG, (-0.4, 0.0), Prescribed()))
 FREE = Trunk("free", mass=100.0, height=1.6)
@@ -227,3 +232,110 @@ def test_a_state_of_another_engine_is_refused(change, message):
         e.set_state(state)
     e.advance(steps=0)
     np.testing.assert_equal(e.get_state(), before)
+
+
+# Parts, animals, and the paper's solver
+
+SPRING = HoofSpring(4e4, 600.0)
+ANIMAL = Trunk("free", mass=320.0, height=LOWEST, drag=0.0, pitch_inertia=80.0)
+
+
+def animal(limits, **settings):
+    """Four legs on springs."""
+    limbs = [Limb(LEG, hip, Motor(), SPRING) for hip in HIPS]
+    return TrunkEngine(limbs, ANIMAL, NATURAL, limits=limits, strides=True, **settings)
+
+
+def constrained(**settings):
+    return ConstrainedLeg(LEG, Ground(), **settings)
+
+
+def commanded(command):
+    leg = constrained()
+    leg.reset(WALK)
+    leg.advance(command, new_trace(1))
+
+
+def of(make, settings):
+    """A call of something with settings."""
+    return lambda: make(**settings)
+
+
+CONSTRAINED_STARTS = (
+    ("theta", math.nan, "theta"),
+    ("x", math.inf, "x"),
+    ("height", 3.0, "height"),
+    ("speed", 1.0, "speed"),
+)
+PARTS = [
+    (lambda: HoofSpring(4e4, 0.0), r"hoof_spring.damping: expected .* got 0.0"),
+    (lambda: HoofSpring(-1.0, 3.0), r"hoof_spring.stiffness: expected .* got -1.0"),
+    (lambda: HoofSpring(4e4, 300.0, 1e4, np.nan), r"tangential_damping: expected .* got nan"),
+    (lambda: Limits(pitch=(0.2, -0.2)), r"limits.pitch: expected a lower and a higher bound, got"),
+    (lambda: Limits(clearance="low"), r"limits.clearance: expected a number, got 'low'"),
+    (lambda: Limb(LEG, spring=4e4), r"limb.spring: expected a HoofSpring or None, got 40000.0"),
+    (lambda: horse(length=1.4), r"limbs\[0\].hip: expected within the trunk, 0.7 m .* got -0.75"),
+    (lambda: TrunkEngine([Limb(LEG), Limb(LEG, spring=SPRING)], ANIMAL), r"limbs\[1\].spring: expected"),
+    (lambda: TrunkEngine(Limb(LEG), ANIMAL, harmonics=4), r"harmonics: expected .* got 4"),
+    (lambda: HarmonicGait(5.0, 0.1, 0.1, 0.1, (0.1,)), r"higher: expected the sine and .* got \(0.1,\)"),
+    (lambda: HarmonicGait(5.0, 0.1, 0.1, 0.1, (0.1, 0.9)), r"higher\[1\]: expected .* got 0.9"),
+    (lambda: horse().reset(HarmonicGait(5.0, 0.1, 0.1, 0.1), 0.0), r"gait: expected a swing"),
+    (lambda: horse().vary(0, limbs=[Limb(LEG.scaled(1.1), hip) for hip in HIPS]), r"made without limits"),
+    (lambda: animal(Limits()).vary(0, limbs=[Limb(LEG)]), r"limbs: expected 4, got 1"),
+    (
+        lambda: animal(Limits()).vary(0, limbs=[Limb(LEG, hip) for hip in HIPS]),
+        r"limbs\[0\].spring: expected a HoofSpring",
+    ),
+    (
+        lambda: animal(Limits()).vary(
+            0, limbs=[Limb(LEG.replace(lengths={"FG": 0.6}), hip, spring=SPRING) for hip in HIPS]
+        ),
+        r"limbs\[0\].geometry: expected one similar to the engine's .* other lengths, masses, inertias",
+    ),
+    (lambda: animal(Limits()).set_state(horse().get_state()), r"state: of another engine; .*spring"),
+    (lambda: animal(Limits()).command(np.zeros(6)), r"command: expected shape \(4,\), .* got \(6,\)"),
+    (
+        lambda: animal(Limits(), contact_law=lambda d, v, s, ground: d),
+        r"contact_law: expected none beside springs",
+    ),
+    *(
+        (of(Trunk, settings), words)
+        for settings, words in (
+            ({"kind": "loose"}, "trunk: expected one of fixed, free, rail, suspended, got 'loose'"),
+            ({"mass": 0.0}, "trunk_mass: expected"),
+            ({"share": 1.1}, r"trunk_share: expected a finite number in \[0, 1\], got 1.1"),
+            ({"stiffness": -1.0}, "trunk_stiffness: expected"),
+            ({"damping": math.nan}, "trunk_damping: expected"),
+            ({"drag": -1.0}, "trunk_drag: expected"),
+            ({"height": 0.0}, "trunk_height: expected"),
+            ({"pitch_inertia": 0.0}, "trunk_pitch_inertia: expected"),
+        )
+    ),
+    *(
+        (of(constrained, {name: value}), name)
+        for name, value in (
+            ("alpha", -1.0), ("beta", -1.0), ("beta", math.nan), ("integrator", "leapfrog"),
+            ("integrator", None), ("sim_dt", 0.0), ("sim_dt", 1.0), ("height", 0.0), ("height", math.inf),
+        )
+    ),
+    *(
+        (lambda name=name, value=value: constrained().reset(WALK, **{name: value}), words)
+        for name, value, words in CONSTRAINED_STARTS
+    ),
+    (lambda: commanded(np.zeros(3)), "command: expected 4 values"),
+    *(
+        (
+            lambda name=name: TrunkEngine(Limb(LEG), Trunk("suspended"), **{name: "no"}),
+            f"{name}: expected True or False, got 'no'",
+        )
+        for name in ("strides", "reactions")
+    ),
+    (lambda: engine().reactions(), "reactions=True"),
+]  # fmt: skip
+"""Calls and words."""
+
+
+@pytest.mark.parametrize(("call", "words"), PARTS, ids=[words for _, words in PARTS])
+def test_parts(call, words):
+    with pytest.raises(ParameterError, match=words):
+        call()
