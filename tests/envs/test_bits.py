@@ -77,11 +77,13 @@ FEW = tuple((65, threads) for threads in (1, 2, 3, 8))
 AGAIN = tuple(MODES[:2])
 """The ways how episodes begin again by themselves."""
 
+COPIED: dict[str, Any] = {"halves": AGAIN, "steps": 26, "ends": 9}
+
 CASES = {
     **{env_id: Case(env_id, short(), sizes=ALL if env_id == LEG else FEW) for env_id in IDS},
-    **{f"{env_id} drawn": Case(env_id, drawn(80.0), sizes=((1, 1),), halves=AGAIN) for env_id in LEGS[1:]},
-    f"{LEG} drawn": Case(LEG, drawn(80.0), sizes=((40, 1),), halves=AGAIN),
-    f"{HORSE} drawn": Case(HORSE, drawn(400.0), sizes=((1, 1),), halves=AGAIN),
+    **{f"{env_id} drawn": Case(env_id, drawn(80.0), sizes=((1, 1),), **COPIED) for env_id in LEGS[1:]},
+    f"{LEG} drawn": Case(LEG, drawn(80.0), sizes=((40, 1),), **COPIED),
+    f"{HORSE} drawn": Case(HORSE, drawn(400.0), sizes=((1, 1),), **COPIED),
     "falls": Case(LEG, FALLS, steps=80, ends=4),
     "commands": Case(LEG, short(**COMMANDS, observation=("crank", "hoof", "target"))),
     "motor": Case(LEG, short(drive="motor")),
