@@ -32,14 +32,18 @@ def numbers_of(what: str, given: Any) -> dict[str, Any]:
 
 def check_keys(what: str, given: Any, expected: Sequence[str], optional: Sequence[str] = ()) -> None:
     """Raise `ParameterError` unless a mapping has the expected keys, and no others than the optional ones."""
+    names = ", ".join(expected or optional) or "no entries"
     if not isinstance(given, Mapping):
-        raise ParameterError(f"{what}: expected a mapping with {', '.join(expected)}, got {given!r}")
+        raise ParameterError(f"{what}: expected a mapping with {names}, got {given!r}")
     missing, unknown = set(expected) - set(given), set(given) - {*expected, *optional}
     if missing or unknown:
         parts = [f"missing {', '.join(sorted(missing))}"] if missing else []
         parts += [f"unknown {', '.join(sorted(map(str, unknown)))}"] if unknown else []
-        wanted = ", ".join(expected) + (f", and perhaps {', '.join(optional)}" if optional else "")
-        raise ParameterError(f"{what}: expected exactly {wanted}; {'; '.join(parts)}")
+        if expected:
+            wanted = f"exactly {names}" + (f", and perhaps {', '.join(optional)}" if optional else "")
+        else:
+            wanted = f"some of {names}" if optional else names
+        raise ParameterError(f"{what}: expected {wanted}; {'; '.join(parts)}")
 
 
 def count_of(values: Any) -> int:
@@ -98,7 +102,8 @@ def checked_pivot(given: Any, pivots: Sequence[str]) -> Any:
             raise ParameterError(
                 f"pivot: expected two numbers ({name}_x, {name}_y) in metres, got {given[name]!r}"
             )
-        places[name] = tuple(check_number(f"pivot[{i}]", c) for i, c in enumerate(given[name]))
+        where = "pivot" if len(pivots) == 1 else f"pivot[{name!r}]"
+        places[name] = tuple(check_number(f"{where}[{i}]", c) for i, c in enumerate(given[name]))
     return places[pivots[0]] if len(pivots) == 1 else MappingProxyType(places)
 
 
@@ -126,9 +131,18 @@ def checked_solids(given: Any, mechanism: Mechanism) -> dict[str, Mapping[str, A
                     f"{what}['centre']: expected two numbers, along and across from the tail, in metres, "
                     f"got {solid['centre']!r}"
                 )
-            checked["centre"] = [check_number(f"{what}['centre']", part) for part in solid["centre"]]
+            # a tuple, which its owner cannot change either
+            checked["centre"] = tuple(check_number(f"{what}['centre']", part) for part in solid["centre"])
         solids[name] = MappingProxyType(checked)
     return solids
+
+
+def plain_solids(solids: Solids) -> dict[str, Any]:
+    """Return such bodies as JSON can hold them."""
+    return {
+        name: {key: list(value) if key == "centre" else value for key, value in solid.items()}
+        for name, solid in solids.items()
+    }
 
 
 def with_solids(

@@ -19,7 +19,6 @@ from numpy.typing import NDArray
 
 from hoof_env._output import staged
 from hoof_env.errors import DataFileError, ParameterError, check_choice, check_number, flag
-from hoof_env.leg.assembly import check_full_revolution
 from hoof_env.leg.checks import (
     check_feet,
     check_keys,
@@ -29,11 +28,13 @@ from hoof_env.leg.checks import (
     checked_pivot,
     checked_solids,
     numbers_of,
+    plain_solids,
     scaled_solids,
     with_solids,
 )
 from hoof_env.leg.mechanism import Mechanism
 from hoof_env.leg.mechanism_list import PAPER, read_mechanism
+from hoof_env.leg.mobility import check_motion
 
 if TYPE_CHECKING:
     from hoof_env.leg.kinematics import Pose
@@ -79,7 +80,7 @@ class Geometry:
 
     Raises:
         ParameterError: a value is missing, unknown, not finite or out of range.
-        GeometryError: `full_turn`, and the linkage cannot be assembled at some crank angle.
+        GeometryError: `full_turn`, and the linkage locks at some crank angle; or bodies leave its points.
     """
 
     lengths: Mapping[str, float]
@@ -121,8 +122,7 @@ class Geometry:
         object.__setattr__(self, "assembly", MappingProxyType({p: int(self.assembly[p]) for p in points}))
         object.__setattr__(self, "solids", MappingProxyType(checked_solids(self.solids, self.mechanism)))
         flag("full_turn", self.full_turn)
-        if self.full_turn:
-            check_full_revolution(self)
+        check_motion(self)
 
     def __hash__(self) -> int:
         lengths = tuple(self.lengths.items())
@@ -247,7 +247,7 @@ class Geometry:
         if content.pop("mechanism") != PAPER:
             content["mechanism"] = self.mechanism.to_mapping()
         if content.pop("solids"):
-            content["solids"] = {name: dict(solid) for name, solid in self.solids.items()}
+            content["solids"] = plain_solids(self.solids)
         return content
 
     @classmethod
@@ -302,7 +302,8 @@ class Geometry:
     def replace(self, **changes: Any) -> Geometry:
         """A copy with some attributes changed; `lengths` and `assembly` may be partial mappings."""
         for name in ("lengths", "assembly"):
-            if name in changes:
+            # what is no mapping is left to the checks of the class
+            if isinstance(changes.get(name), Mapping):
                 changes[name] = {**getattr(self, name), **changes[name]}
         return replace(self, **changes)
 

@@ -114,7 +114,7 @@ def _read_body_point(
 ) -> BodyPoint:
     keys = _entries(where, entry, ("point", "body"), ("from", "along", "across"))
     point = _name(f"{where}.point", keys["point"])
-    if keys["body"] not in bodies:
+    if not _known(keys["body"], bodies):
         raise ParameterError(
             f"{where}: expected 'dyad' with two points, or 'body' with one of {', '.join(bodies)}, "
             f"got body {keys['body']!r}"
@@ -175,7 +175,7 @@ def _read_joints(
             raise ParameterError(f"{where}: expected [point, body, body or 'frame'], got {entry!r}")
         point, *names = entry
         for name in names:
-            if name not in numbers and not (name == FRAME_NAME and name is names[1]):
+            if not _known(name, numbers) and not (name == FRAME_NAME and name is names[1]):
                 raise ParameterError(
                     f"{where}: expected [point, body, body or 'frame'] with bodies of the list "
                     f"({', '.join(numbers)}), got {entry!r}"
@@ -192,11 +192,12 @@ def _read_joints(
 
 def _read_welds(given: Any, numbers: Mapping[str, int]) -> Iterator[tuple[int, int]]:
     for k, entry in enumerate(_list("mechanism.welds", given)):
-        if not isinstance(entry, (list, tuple)) or len(entry) != 2 or not {*entry} <= {*numbers}:
+        pair = entry if isinstance(entry, (list, tuple)) else ()
+        if len(pair) != 2 or not all(_known(name, numbers) for name in pair):
             raise ParameterError(
                 f"mechanism.welds[{k}]: expected two bodies of {', '.join(numbers)}, got {entry!r}"
             )
-        yield numbers[entry[0]], numbers[entry[1]]
+        yield numbers[pair[0]], numbers[pair[1]]
 
 
 def _check_feet(mechanism: Mechanism) -> None:
@@ -299,6 +300,11 @@ def _entries(where: str, given: Any, required: Sequence[str], optional: Sequence
         wrong += [f"unknown {', '.join(unknown)}"] if unknown else []
         raise ParameterError(f"{where}: expected exactly {wanted}; {'; '.join(wrong)}")
     return dict(given)
+
+
+def _known(given: Any, names: Mapping[str, Any]) -> bool:
+    # a list or an object has no hash, and would raise a TypeError
+    return isinstance(given, str) and given in names
 
 
 def _list(where: str, given: Any) -> Sequence[Any]:
