@@ -23,6 +23,9 @@ CRANK_LINK = "crank"
 HOOF_LINK = "hoof"
 """Name of the link with the foot that touches the ground."""
 
+TAKEN = (FRAME_NAME, CRANK_LINK, HOOF_LINK, "world", "trunk", "swing", "x", "z", "pitch")
+"""Names of other parts and joints of a simulator's model."""
+
 Pins = dict[tuple[str, str, str], list[tuple[int, int]]]
 
 
@@ -33,7 +36,7 @@ class LinkTree:
     Attributes:
         mechanism: structure of the leg.
         links: numbers of the bodies in each link, by its name: `CRANK_LINK`, `HOOF_LINK`, otherwise that of
-            its first body.
+            its first body, with "_" behind it if it is one of `TAKEN`.
         tree: every link, the one (or `FRAME_NAME`) that carries it and the point of the pin between them;
             carriers stand before what they carry.
     """
@@ -107,8 +110,12 @@ def link_tree(mechanism: Mechanism, merge: bool = True) -> LinkTree:
     groups = _rigid_groups(mechanism) if merge else [{k} for k in range(count)]
     hoof = mechanism.body_of_foot(mechanism.feet[0])
     links: dict[str, tuple[int, ...]] = {}
+    names = [body.name for body in mechanism.bodies]
     for members in sorted(groups, key=min):
-        name = mechanism.bodies[min(members)].name
+        name = names[min(members)]
+        if name in TAKEN:
+            while name in (*TAKEN, *names):
+                name += "_"
         if hoof in members:
             name = HOOF_LINK
         if mechanism.crank in members:

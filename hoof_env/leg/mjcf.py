@@ -170,7 +170,8 @@ def leg_to_mjcf(
         ("motor", motor, MotorLike, "a Motor"),
         ("ground", ground, GroundLike, "a Ground"),
     ):
-        if given is not None and not isinstance(given, kind):
+        # a class has the names of its fields' defaults, but is no part
+        if given is not None and (isinstance(given, type) or not isinstance(given, kind)):
             raise ParameterError(f"{name}: expected {needed} of this package or None, got {given!r}")
     if not np.isfinite(geometry.pose(theta, swing).points).all():
         raise GeometryError(f"theta: the leg cannot be assembled at a crank angle of {theta:g} rad")

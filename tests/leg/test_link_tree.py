@@ -7,8 +7,8 @@ import pytest
 
 from hoof_env.leg.link_tree import link_tree
 from hoof_env.leg.mechanism import FRAME_NAME
-from hoof_env.leg.mechanism_list import PAPER
-from tests.legs import MECHANISMS
+from hoof_env.leg.mechanism_list import PAPER, read_mechanism
+from tests.legs import FOUR_BAR, MECHANISMS
 
 
 @pytest.mark.parametrize("merge", [True, False], ids=["merged", "body for body"])
@@ -49,3 +49,12 @@ def test_forces_at_pins_are_sums_over_joints(mechanism):
         mine = sum((force for (_, one, _), force in forces.items() if one == link), np.zeros(2))
         others = sum((force for (_, _, two), force in forces.items() if two == link), np.zeros(2))
         assert mine - others == pytest.approx(total, abs=1e-12)
+
+
+@pytest.mark.parametrize("name", ["hoof", "crank", "trunk", "swing", "x", "world"])
+def test_a_body_may_have_the_name_of_another_part(name):
+    rods = [body | {"length": body["name"]} for body in FOUR_BAR["bodies"]]
+    rods[2]["name"] = name
+    joints = [[name if part == "BC" else part for part in joint] for joint in FOUR_BAR["joints"]]
+    tree = link_tree(read_mechanism(FOUR_BAR | {"bodies": rods, "joints": joints}))
+    assert tree.links == {"crank": (0,), "hoof": (1,), f"{name}_": (2,)}

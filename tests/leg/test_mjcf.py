@@ -99,6 +99,7 @@ def test_the_file_is_the_text(tmp_path):
         ({"timestep": 1}, "timestep: expected"),
         ({"trunk": "suspended"}, "trunk: expected a Trunk"),
         ({"motor": True}, "motor: expected a Motor"),
+        ({"motor": Motor}, "motor: expected a Motor"),
         ({"ground": 0.4}, "ground: expected a Ground"),
         ({"path": "leg.urdf"}, "path: expected a file that ends in .xml"),
     ],
