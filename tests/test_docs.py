@@ -4,6 +4,7 @@ import json
 import re
 import runpy
 import subprocess
+from importlib import import_module
 from pathlib import Path
 
 import pytest
@@ -144,6 +145,15 @@ def test_a_page_has_one_title_and_its_images_have_texts(page):
     text = BLOCK.sub("", page.read_text(encoding="utf-8"))
     assert len(re.findall(r"^# ", text, re.MULTILINE)) == 1
     assert "![](" not in text
+
+
+def test_the_api_has_the_bases_of_its_classes():
+    """Inherited methods stand with the base that has them, and Sphinx refuses a page that lacks one."""
+    text = "".join(page.read_text(encoding="utf-8") for page in (ROOT / "docs" / "api").glob("*.md"))
+    names = re.findall(r"^\.\. autoclass:: (\S+)", text, re.MULTILINE)
+    classes = [getattr(import_module(module), name) for module, _, name in (n.rpartition(".") for n in names)]
+    bases = {base for each in classes for base in each.__bases__ if base.__module__.startswith("hoof_env")}
+    assert bases <= {*classes}, bases - {*classes}
 
 
 def test_every_frozen_page_says_of_which_commit_it_is():
