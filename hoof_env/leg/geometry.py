@@ -432,4 +432,7 @@ def load_geometry(source: Preset = DEFAULT_PRESET) -> Geometry:
         _check_entries(values)
     except ParameterError as error:
         raise preset_error_type(source)(f"{preset_label(source)}: {error}") from None
-    return Geometry(**values)
+    try:
+        return Geometry(**values)
+    except ParameterError as error:
+        raise type(error)(f"{preset_label(source)}: {error}") from None

@@ -69,9 +69,9 @@ def test_a_file_with_an_unknown_entry_or_a_bad_value(tmp_path):
         load_geometry(tmp_path / "bytes.json")
     with pytest.raises(DataFileError, match=r"leg\.json: geometry: expected exactly .*; unknown colour$"):
         load_geometry(preset_file(tmp_path, lambda data: data["geometry"].update(colour="bay")))
-    with pytest.raises(ParameterError, match=r"lengths\['FG'\]"):
+    with pytest.raises(ParameterError, match=r"leg\.json: lengths\['FG'\]"):
         load_geometry(preset_file(tmp_path, lambda data: data["geometry"]["lengths"].update(FG=float("nan"))))
-    with pytest.raises(GeometryError, match="dyad 1"):
+    with pytest.raises(GeometryError, match=r"leg\.json: dyad 1"):
         load_geometry(preset_file(tmp_path, lambda data: data["geometry"]["lengths"].update(CB=0.1)))
 
 
