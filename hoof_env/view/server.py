@@ -5,6 +5,7 @@ from __future__ import annotations
 import errno
 import os
 import secrets
+import socket
 import sys
 import webbrowser
 from collections import OrderedDict
@@ -112,11 +113,12 @@ def start(
     simulation.env.close()
     pages = Pages(setup, out)
     try:
+        port = port or free_port(address)
         server = Server(
             {"/": Application(FunctionHandler(pages.open))},
             address=address,
             port=port,
-            allow_websocket_origin=[f"{name}:{port or '*'}" for name in {address, "localhost"}],
+            allow_websocket_origin=[f"{name}:{port}" for name in {address, "localhost"}],
             check_unused_sessions_milliseconds=500,
             unused_session_lifetime_milliseconds=1000,
         )
@@ -127,6 +129,12 @@ def start(
     pages.server = server
     server.start()
     return server, f"http://{address}:{server.port}/"
+
+
+def free_port(address: str) -> int:
+    """Return a port that is free now: pages are refused unless their port is known beforehand."""
+    with socket.create_server((address, 0)) as taken:
+        return int(taken.getsockname()[1])
 
 
 def view(

@@ -36,7 +36,8 @@ const turns = []
 function refresh({source, window: range, master}) {
   const {data} = masters[master]
   const end = Math.max(masters.curves.data.time.at(-1) ?? 0, seconds)
-  const columns = Object.keys(source.data).map((name) => [name, data[name]])
+  // Bokeh warns of axes without data, as after the start of an episode.
+  const columns = Object.keys(source.data).map((name) => [name, data[name].length > 0 ? data[name] : [0]])
   // A full column is shifted in place, which would look the same.
   source.setv({data: Object.fromEntries(columns)}, {sync: false, check_eq: false})
   range.setv({start: end - seconds, end}, hidden)
