@@ -4,6 +4,7 @@ other that is rendered and to any file."""
 from __future__ import annotations
 
 import re
+import sys
 from pathlib import Path
 from typing import Any
 
@@ -12,6 +13,9 @@ from sphinx.addnodes import pending_xref
 from sphinx.application import Sphinx
 
 from hoof_env import __version__
+
+sys.path.insert(0, str(Path(__file__).parent / "site"))
+import playbacks
 
 project = "hoof-env"
 author = "hoof-env contributors"
@@ -57,6 +61,7 @@ nitpicky = True
 nitpick_ignore_regex = [
     ("py:obj", ".*"),  # not every name in a docstring is public
     ("py:class", r"hoof_env\.envs\.batch\..*"),
+    ("py:class", r"hoof_env\.leg\.mechanism\..*"),
     ("py:.*", r"(?!hoof_env\.).*"),  # other people's names; their inventories need a network
 ]
 
@@ -65,7 +70,7 @@ html_title = f"hoof-env {version}"
 html_static_path = ["site/static"]
 html_favicon = "site/static/favicon.svg"
 html_css_files = ["style.css"]
-html_js_files = ["scroll.js"]
+html_js_files = ["scroll.js", ("playback.js", {"defer": "defer"})]
 html_extra_path = ["site/root"]
 html_show_sourcelink = False
 html_copy_source = False
@@ -103,6 +108,8 @@ def keep_text(app: Sphinx, what: str, name: str, what_has_it: Any, options: Any,
 
 def setup(app: Sphinx) -> dict[str, Any]:
     app.connect("source-read", add_children)
+    app.connect("builder-inited", playbacks.write)
+    app.connect("html-page-context", playbacks.show, priority=900)
     app.connect("autodoc-process-docstring", keep_text, priority=400)  # before napoleon
     app.connect("html-page-context", mend_page, priority=900)  # after furo
     app.connect("doctree-read", unlink_folders)

@@ -25,6 +25,7 @@ import numpy as np
 from gymnasium import spaces
 from numpy.typing import NDArray
 
+from hoof_env.envs.shown import line_of
 from hoof_env.errors import (
     DataFileError,
     HoofEnvError,
@@ -136,6 +137,11 @@ class OnnxPolicy:
             raise DataFileError(
                 f"policy {self.path}: expected an ONNX file of agents.export, cannot read it ({reason})"
             ) from None
+
+    def __repr__(self) -> str:
+        return line_of(
+            "OnnxPolicy", path=self.path, env_id=self.record["env_id"], algo=self.record.get("algo")
+        )
 
     def load(self, env: Any, env_id: str) -> OnnxPolicy:
         """Return this policy; raise `DataFileError` if it does not fit `env`, and warn if it was trained with

@@ -20,13 +20,15 @@ class Links(HTMLParser):
 
     def __init__(self, page):
         super().__init__()
-        self.targets, self.ids, self.untold, self.images = [], set(), [], []
+        self.targets, self.ids, self.untold, self.images, self.frames = [], set(), [], [], []
         self.feed(page.read_text(encoding="utf-8"))
 
     def handle_starttag(self, tag, attrs):
         has = dict(attrs)
         self.targets += [has[name] for name in ("href", "src") if has.get(name)]
         self.ids |= {has["id"]} if "id" in has else set()
+        if tag == "iframe":
+            self.frames.append(has["src"])
         if tag == "img":
             self.images.append(has["src"])
             self.untold += [] if has.get("alt", "").strip() else [has["src"]]
@@ -62,12 +64,17 @@ def test_every_link_leads_somewhere(site):
 
 
 def test_every_page_and_every_id_is_there(site):
-    pages, _ = site
+    pages, root = site
     sources = [page.with_suffix(".html").relative_to(ROOT) for page in (ROOT / "docs").rglob("*.md")]
     assert not set(sources) - set(pages)
     for id in (id for id in gymnasium.registry if id.startswith("hoof_env/")):
         page = pages[Path(f"docs/environments/{id[9:-3]}.html")]
-        assert any(image.endswith(".gif") for image in page.images)
+        (frame,) = page.frames  # in place of the film that the repository shows
+        playing = root / Path("docs/environments") / frame
+        assert playing.stat().st_size < 1.5e6
+        assert not any(image.endswith(".gif") for image in page.images)
+    for name in ("docs/paper.html", "docs/horse.html"):
+        assert len(pages[Path(name)].frames) == 1
     assert not [image for page in pages.values() for image in page.untold]
 
 

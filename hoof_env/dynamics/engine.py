@@ -168,6 +168,11 @@ class TrunkEngine(EngineMotion):
         self._memory = memory.new_memory(self, self.num_envs, columns, self.reacts)
         self._model = memory.new_model(self, self.filters, self.counts_strides)
 
+    def __repr__(self) -> str:
+        legs = f"{len(self.limbs)} leg{'s' * (len(self.limbs) > 1)}"
+        masses = f"{self.total_mass:.1f} kg"
+        return f"<TrunkEngine {self.trunk.kind}, {legs}, {masses}, {self.num_envs} environments>"
+
     def _choose_kernel(self) -> None:
         which = BY_LEGS[len(self.limbs)] if self.runs_scalar else "batch"
         does = "react" if self.reacts else "advance"

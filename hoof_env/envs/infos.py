@@ -24,6 +24,7 @@ from hoof_env.dynamics.layout import (
     stride_sums,
 )
 from hoof_env.dynamics.names import present_name
+from hoof_env.envs.shown import html_table
 from hoof_env.gait import parameter_names
 
 
@@ -128,6 +129,12 @@ class NamedArray(np.ndarray[Any, np.dtype[np.float64]]):
 
     def __str__(self) -> str:
         return repr(self)
+
+    def _repr_html_(self) -> str:
+        """Return names and numbers as a table; of many environments the shape of each row."""
+        if self.ndim == 1:
+            return html_table(("name", "value"), [(name, f"{self[name]:.6g}") for name in self.names])
+        return html_table(("name", "shape"), [(name, self[name].shape) for name in self.names])
 
     def get(self, key: str, default: Any = None) -> Any:
         """Return the numbers of a name, or `default` if there is no such name."""

@@ -24,6 +24,7 @@ from hoof_env.envs.manual_bodies import page_of_body
 from hoof_env.envs.manual_common import without_common
 from hoof_env.envs.manual_words import HERE, TABLES, WORDS, rows_of
 from hoof_env.envs.policies import STANDS_FOR
+from hoof_env.envs.shown import Markdown
 from hoof_env.errors import DataFileError, OutputError, check_choice
 from hoof_env.render.renderer import USUAL_SIZE
 from hoof_env.tasks import observation
@@ -123,15 +124,16 @@ def _rewards(task: Task, weights: Mapping[str, float]) -> str:
 
 
 def page_of(id: str) -> str:
-    """Return the manual page of a registered id, or of an id of one's own, which may be "module:id".
+    """Return the manual page of a registered id, or of an id of one's own, which may be "module:id";
+    notebooks render it.
 
     Raises:
         ParameterError: an unknown id.
     """
     ids = {f"hoof_env/{name}-v0": task for task, name in _NAMES.items()}
     if isinstance(id, str) and "/" in id and not id.startswith("hoof_env/"):
-        return page(id)
-    return page(ids[check_choice("id", id, ids)])
+        return Markdown(page(id))
+    return Markdown(page(ids[check_choice("id", id, ids)]))
 
 
 def index() -> str:

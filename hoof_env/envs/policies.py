@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hoof_env._version import __version__
+from hoof_env.envs.shown import line_of
 from hoof_env.errors import DataFileError, ParameterError, check_choice, parse_json
 from hoof_env.gait import LIMITS, GaitParameters, paper_gaits
 from hoof_env.leg.profile import leg_profile
@@ -34,13 +35,21 @@ class Scripted:
             environments it must also take shapes (n, k) and (n,) and return (n, 4), or (4,) for all.
         dt: control step [s].
         start: reset options of the policy's episodes, unless others are given; a gait starts in this gait.
+
+    Attributes:
+        name: name by which `make_policy` made it, "" of others.
     """
+
+    name = ""
 
     def __init__(self, act: Any, dt: float, start: Mapping[str, Any] | None = None) -> None:
         self._act = act
         self._dt = dt
         self.start = dict(start or {})
         self.reset()
+
+    def __repr__(self) -> str:
+        return line_of(type(self).__name__, name=self.name, start=self.start)
 
     def reset(self) -> None:
         """Restart the clocks of all environments."""
@@ -151,6 +160,13 @@ def make_policy(name: str, env: Any, seed: int = 0) -> Scripted:
             f"env: expected an environment of this package, make_policy(name, env), got {env!r}"
         )
     check_choice("policy", name, policy_names(env))
+    policy = _scripted(name, env, leg, seed)
+    policy.name = name
+    return policy
+
+
+def _scripted(name: str, env: Any, leg: Any, seed: int) -> Scripted:
+    """Make the policy of a known name, see `make_policy`; `leg` is the unwrapped environment."""
     count = len(leg.batch.body.action_names)
     if name == "reference":
         return Scripted(lambda observation, time: np.zeros(count, np.float32), leg.dt)

@@ -6,6 +6,7 @@ from typing import Any
 
 from hoof_env.dynamics.engine import TrunkEngine
 from hoof_env.envs.batch import EpisodeBatch
+from hoof_env.envs.shown import html_table, line_of
 from hoof_env.gait import GaitParameters
 from hoof_env.ground.terrain import Terrain
 from hoof_env.leg.geometry import Geometry
@@ -19,6 +20,17 @@ class LegProperties:
     """
 
     batch: EpisodeBatch
+
+    def __repr__(self) -> str:
+        return line_of(type(self).__name__, id=self.batch.task.id, environments=self.batch.num_envs)
+
+    def _repr_html_(self) -> str:
+        """Return what is observed and what actions do, as a table."""
+        both = [("observation", *pair) for pair in zip(self.batch.names, self.observation_units, strict=True)]
+        both += [("action", name, "-1 to 1") for name in self.action_names]
+        return html_table(
+            ("space", "entry", "unit"), both, f"{self.batch.task.id}: {self.batch.task.summary}"
+        )
 
     @property
     def geometry(self) -> Geometry:

@@ -30,8 +30,8 @@ SHADES: tuple[Colour, ...] = (colours.FORCE, colours.TOE, colours.CRANK, colours
 """Colours of the records of a page with several."""
 
 ROWS = 50.0  # rows of the scene a second [1/s]
-SHOWN = ("normal", "friction", "hoof_angle", "torque")
-"""Curves of a page, where there are several records."""
+SHOWN = {"normal": "normal force [N]", "friction": "friction [N]", "torque": "crank torque [N m]"}
+"""Titles of the curves of a page with several records, by column."""
 OF_ONE = ("normal", "forces", "hoof_angle", "crank_speed", "torque", "power")
 """Figures of a page of one record."""
 
@@ -117,9 +117,7 @@ class Playback:
         return cls(title or " and ".join(dict.fromkeys(record.label for record in made)), made)
 
     @classmethod
-    def of_policy(
-        cls, env_id: str, policy: str | None = None, seconds: float = 4.0, **arguments: Any
-    ) -> Playback:
+    def of_policy(cls, env_id: str, policy: Any = None, seconds: float = 4.0, **arguments: Any) -> Playback:
         """Simulate a policy in an environment with these arguments and return the page; see `play`."""
         return cls.play({"env_id": env_id, "policy": policy, "arguments": arguments}, seconds=seconds)
 
@@ -178,19 +176,23 @@ class Playback:
         return shown
 
     def _figures_of_several(self) -> list[figures.Curves]:
-        """Return figures with the curves of all records, each record in its colour."""
+        """Return figures with the curves of several records, each in its colour: records whose labels are
+        alike up to a comma share their figures."""
+        groups: dict[str, list[Record]] = {}
+        for record in self.records:
+            groups.setdefault(record.label.partition(",")[0], []).append(record)
         shown = []
-        for column in SHOWN:
-            lines = [
-                figures.Line(str(k), record.label, SHADES[k % len(SHADES)])
-                for k, record in enumerate(self.records)
-            ]
-            title, _ = figures.line_sets(("",), False).get(column, ("friction [N]", []))
-            made = figures.curve_figure(column, title, lines)
-            for line, renderer, record in zip(lines, made.figure.renderers, self.records, strict=True):
-                data = {"time": record.curves["time"], line.column: record.curves[column]}
-                renderer.data_source = ColumnDataSource(data)
-            shown.append(made)
+        for column, title in SHOWN.items():
+            for k, (group, records) in enumerate(groups.items()):
+                lines = [
+                    figures.Line(str(i), record.label, SHADES[i % len(SHADES)])
+                    for i, record in enumerate(records)
+                ]
+                made = figures.curve_figure(f"{column}_{k}", f"{group}: {title}", lines)
+                for line, renderer, record in zip(lines, made.figure.renderers, records, strict=True):
+                    data = {"time": record.curves["time"], line.column: record.curves[column]}
+                    renderer.data_source = ColumnDataSource(data)
+                shown.append(made)
         return shown
 
     def html(self, library: str | None = None) -> str:

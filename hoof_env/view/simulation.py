@@ -48,7 +48,7 @@ class Simulation:
     Args:
         env_id: id of an environment of this package.
         arguments: arguments of `gymnasium.make`.
-        policy: policy as `records.find_policy` takes it.
+        policy: policy as `records.find_policy` takes it, or an object with Stable-Baselines3's `predict`.
         seed: seed of the first episode; the next ones follow it.
 
     Attributes:
@@ -67,7 +67,7 @@ class Simulation:
         self,
         env_id: str,
         arguments: Mapping[str, Any] | None = None,
-        policy: str | None = None,
+        policy: Any = None,
         seed: int = 0,
     ) -> None:
         self.env_id = env_id
@@ -77,7 +77,7 @@ class Simulation:
         self.env = records.make_env(env_id, self.arguments)
         self._leg: Any = self.env.unwrapped
         self.setting = records.surroundings(self.env)
-        self._player = records.find_policy(policy, self.env, env_id, self.seed)
+        self._player = self._find(policy, self.seed)
         self.parameters: dict[str, float] = {}
         self.hand: dict[str, float] | None = None
         self.ended = ""
@@ -110,9 +110,15 @@ class Simulation:
             return self.parameters[name]
         return getattr(self._leg.batch.settings, name)
 
+    def _find(self, policy: Any, seed: int) -> Any:
+        """Return a policy by its name, or the policy that is given."""
+        if policy is None or isinstance(policy, str):
+            return records.find_policy(policy, self.env, self.env_id, seed)
+        return policy
+
     # Episodes
 
-    def reset(self, seed: int | None = None, policy: str | None = None) -> Chunk:
+    def reset(self, seed: int | None = None, policy: Any = None) -> Chunk:
         """Start an episode; return its first instant.
 
         Args:
@@ -122,7 +128,7 @@ class Simulation:
         chosen = self.seed if seed is None else count("seed", seed, low=0)
         player = self._player
         if policy is not None:
-            player = records.find_policy(policy, self.env, self.env_id, chosen)
+            player = self._find(policy, chosen)
         options = start_of(player)
         if self.parameters:
             options = options | {"parameters": dict(self.parameters)}
@@ -263,7 +269,8 @@ class Simulation:
 
     def about(self, **more: Any) -> dict[str, Any]:
         """Return the description of a record of this simulation, see `records.describe`."""
-        settings = {"environment": self.env_id, "arguments": self.arguments, "policy": self.policy}
+        policy = self.policy if isinstance(self.policy, str | None) else repr(self.policy)
+        settings = {"environment": self.env_id, "arguments": self.arguments, "policy": policy}
         return records.describe(self.env, **settings, seed=self.seed, **more)
 
 

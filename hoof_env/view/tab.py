@@ -18,7 +18,7 @@ from hoof_env.view.player import Player
 from hoof_env.view.recording import Recording
 from hoof_env.view.simulation import Simulation
 
-TICK = 0.04  # time between two states that are sent [s]
+TICK = 1 / 30  # time between two states that are sent [s]
 CURVES_EVERY = 2  # states between two pieces of the curves
 LONGEST_TICK = 0.1  # time of which a late tick makes up [s]
 POINTS = round(1.15 * figures.SECONDS / 0.002)  # of a curve that the browser keeps
