@@ -25,10 +25,15 @@ function show_frame() {
     scrub.value = scrub.max
   }
   find("#at").textContent = `${row[0].toFixed(2)} s`
-  document.body.dataset.states = String(Number(document.body.dataset.states ?? 0) + 1)
 }
 
-frame.connect(frame.properties.data.change, show_frame)
+// States that come faster than the browser paints are not drawn: the last one is.
+let is_new = false
+
+frame.connect(frame.properties.data.change, () => {
+  is_new = true
+  document.body.dataset.states = String(Number(document.body.dataset.states ?? 0) + 1)
+})
 
 // Figures take their turns, one in each frame of the browser: to paint all at once would make it stutter.
 const turns = []
@@ -184,6 +189,10 @@ if (window.matchMedia("(max-width: 760px)").matches) {
 // Frames of the browser; their number is there to be measured.
 const count = () => {
   document.body.dataset.frames = String(Number(document.body.dataset.frames ?? 0) + 1)
+  if (is_new) {
+    is_new = false
+    show_frame()
+  }
   if (turns.length > 0) {
     refresh(turns.shift())
   }
