@@ -98,6 +98,7 @@ docs: setup
 test-site: docs
 	@echo 'pip install playwright axe' && $(PY) -m pip install -q -c constraints.txt -e '.[site]'
 	@$(PY) -m tests.site.check $(ARGS)
+	@echo 'pytest tests/view/test_browser.py' && $(PY) -m pytest -q tests/view/test_browser.py
 
 test-links: setup
 	@$(PY) -m sphinx -q -b linkcheck -c docs -d build/doctrees . build/links

@@ -94,7 +94,7 @@ def show(app: Sphinx, page: str, template: str, context: dict[str, Any], tree: o
     file, title = app.playbacks[page]  # type: ignore[attr-defined]
     address = "../" * page.count("/") + (FOLDER / file).as_posix()
     frame = f'<iframe class="playback" src="{address}" title="{title}" loading="lazy"></iframe>'
-    film = re.compile(r"<p><img [^>]*film\.gif[^>]*></p>|<img [^>]*film\.gif[^>]*>")
+    film = re.compile(r"<p><img [^>]*film\d*\.gif[^>]*></p>|<img [^>]*film\d*\.gif[^>]*>")
     if film.search(context["body"]):
         context["body"] = film.sub(frame, context["body"], count=1)
     else:
