@@ -19,13 +19,13 @@ import numpy as np
 from numba import carray  # type: ignore[attr-defined]
 
 from hoof_env.dynamics.form import EngineLayout, engine_layout
-from hoof_env.dynamics.hoof import law_of, level_ground, remember_contacts
+from hoof_env.dynamics.hoof import law_of, level_ground, lift_heel, remember_contacts
 from hoof_env.dynamics.layout import PLAIN, Features
-from hoof_env.dynamics.limits import CHECK_EVERY, check_joints, check_trunk, clear_limits
+from hoof_env.dynamics.limits import CHECK_EVERY, check_trunk, clear_limits, joint_check_of
 from hoof_env.dynamics.mechanics import evaluate, keep_still, velocities_to_momenta
 from hoof_env.dynamics.observables import count_stride, keep_account, report_leg, report_trunk
 from hoof_env.dynamics.parts import FIXED, Result
-from hoof_env.dynamics.reactions import LegConstants, Reactions, react
+from hoof_env.dynamics.reactions import reactions_of
 from hoof_env.dynamics.stepping import begin_step, end_step, next_stage, weigh_stage
 from hoof_env.simd import any_lane, block_at, columns, full_like, lane_sum, load_rows, rows, where
 from hoof_env.simd.compile import inline_llvm, inline_source, kernel
@@ -44,9 +44,6 @@ FIRST_LIMIT = float(Result.PITCH)
 
 RESET_REQUESTED = -1.0
 """Mark in the place of a result: the environment is to be started."""
-
-CONSTANTS_SIZE = LegConstants.size
-REACTIONS_SIZE = Reactions.size
 
 MODEL = np.dtype(
     [
@@ -97,6 +94,13 @@ class Model(NamedTuple):
     ground_origin: float
     ground_per_metre: float
     law: Any  # of contact, see `hoof.law_of`
+
+
+class Joints(NamedTuple):
+    """Kernels that belong to the legs' structure: of their reactions, and of their heights."""
+
+    react: Any
+    check: Any
 
 
 @inline_llvm
@@ -160,6 +164,8 @@ def read_leg(leg, memory, form):  # type: ignore[no-untyped-def]
     for k in range(form.springs):
         leg.inverse_damping[k] = 1.0 / leg.settings.hoof_damping[k]
     level_ground(leg)
+    if form.feet == 1:
+        lift_heel(leg, form.springs)
 
 
 @inline_llvm
@@ -197,7 +203,7 @@ def store(memory, rows, count, good):  # type: ignore[no-untyped-def]
 
 @inline_source
 def run_steps(  # type: ignore[no-untyped-def]
-    trunk, legs, leg_count, model, account, constants, reactions, h, steps, keeps_account, reacts
+    trunk, legs, leg_count, model, account, constants, reactions, h, steps, keeps_account, reacts, joints
 ):
     """Advance by `steps` of `h` [s] and evaluate forces and accelerations at the end."""
     stage = 0
@@ -216,9 +222,9 @@ def run_steps(  # type: ignore[no-untyped-def]
                 if model.strides and turn > 0:
                     count_stride(trunk, leg, model.form, h)
                 if reacts and (turn > 0 or steps == 0):
-                    react(trunk, leg, block_at(constants, i), block_at(reactions, i))
+                    joints.react(trunk, leg, block_at(constants, i), block_at(reactions, i))
                 if model.form.has_limits and looks:
-                    check_joints(trunk, leg, block_at(constants, i), model)
+                    joints.check(trunk, leg, block_at(constants, i), model)
             if model.form.has_limits and looks:
                 check_trunk(trunk, model)
         if turn < steps * model.stages:
@@ -260,29 +266,30 @@ def store_legs(trunk, legs, leg_count, good, at, n, row, far, lanes, form):  # t
     for i in range(leg_count):
         leg = block_at(legs, i)
         memory = leg_memory_of(at, i, n, row, far, lanes, form)
-        report_leg(trunk, leg, memory.report)
+        report_leg(trunk, leg, memory.report, form)
         store(memory.state, leg.state, form.leg_state, good)
         store(memory.strides, leg.strides, form.strides, good)
         store(memory.sums, leg.sums, form.sums, good)
 
 
 @inline_source
-def store_reactions(forces, leg_count, reactions, n, row, lanes, lanes_are_legs):  # type: ignore[no-untyped-def]
+def store_reactions(forces, leg_count, reactions, n, row, lanes, lanes_are_legs, form):  # type: ignore[no-untyped-def]
     """Store the joint reactions of all legs."""
     for i in range(leg_count):
-        stride = REACTIONS_SIZE * row if lanes_are_legs else 1
-        out = columns(address(reactions), lanes, Reactions, i * REACTIONS_SIZE * row + n, row, stride)
+        size = form.reactions_size
+        stride = size * row if lanes_are_legs else 1
+        out = columns(address(reactions), lanes, form.reactions, i * size * row + n, row, stride)
         leg_forces = block_at(forces, i)
-        for k in range(REACTIONS_SIZE):
+        for k in range(size):
             out[k] = leg_forces[k]
 
 
 @inline_source
-def read_shapes(shapes, leg_count, constants, lanes, lanes_are_legs):  # type: ignore[no-untyped-def]
-    """Load the `LegConstants` of all legs, which all environments share."""
-    stride = CONSTANTS_SIZE if lanes_are_legs else 0
+def read_shapes(shapes, leg_count, constants, lanes, lanes_are_legs, form):  # type: ignore[no-untyped-def]
+    """Load the constants of all legs, which all environments share."""
+    stride = form.constants_size if lanes_are_legs else 0
     shared = columns(address(constants), lanes, None, 0, 1, stride)
-    for k in range(leg_count * CONSTANTS_SIZE):
+    for k in range(leg_count * form.constants_size):
         shapes[k] = shared[k]
 
 
@@ -312,7 +319,7 @@ def store_trunk(trunk, account, memory, good, keeps_account, form):  # type: ign
 
 
 def advance_of(
-    lanes: int, lanes_are_legs: bool, reacts: bool, law: Any, form: EngineLayout
+    lanes: int, lanes_are_legs: bool, reacts: bool, law: Any, form: EngineLayout, joints: Joints
 ) -> Callable[..., None]:
     """Return the body of a kernel: a function that advances environments `begin` to `end` by substeps of h
     [s]; if their number is negative, environments with the result `RESET_REQUESTED` are started.
@@ -321,6 +328,7 @@ def advance_of(
         lanes: number of environments side by side or, if `lanes_are_legs`, of legs of one environment.
         reacts: false for a kernel without code for joint reactions.
         law, form: law of contact, see `hoof.law_of`, and layouts of the engine.
+        joints: kernels of the legs' structure.
     """
 
     @inline_source
@@ -330,8 +338,8 @@ def advance_of(
         trunk = rows(doubles(form.trunk_size * lanes), lanes, form.trunk)
         legs = rows(doubles(leg_count * form.leg_size * lanes), lanes, form.leg)
         account = rows(doubles(form.account_size * lanes), lanes, form.account)
-        shapes = rows(doubles(leg_count * CONSTANTS_SIZE * lanes), lanes, LegConstants)
-        forces = rows(doubles(leg_count * REACTIONS_SIZE * lanes), lanes, Reactions)
+        shapes = rows(doubles(leg_count * form.constants_size * lanes), lanes, form.constants)
+        forces = rows(doubles(leg_count * form.reactions_size * lanes), lanes, form.reactions)
         unpacked = unpack_model(model, tables, ground, doubles(8 + 3 * form.gait), lanes_are_legs, law, form)
         at = address(data)
         row = data.shape[1]
@@ -340,7 +348,7 @@ def advance_of(
         near = 0 if lanes_are_legs else 1
         far = form.leg_rows * row if lanes_are_legs else 1
         if reacts or form.has_limits:
-            read_shapes(shapes, leg_count, constants, lanes, lanes_are_legs)
+            read_shapes(shapes, leg_count, constants, lanes, lanes_are_legs, form)
         for n in range(begin, end, 1 if lanes_are_legs else lanes):
             memory = columns(at, lanes, form.trunk_memory, n, row, near)
             before = memory.result
@@ -355,14 +363,25 @@ def advance_of(
                 if unpacked.kind != FIXED:
                     velocities_to_momenta(trunk, legs, leg_count, unpacked, starts)
             run_steps(
-                trunk, legs, leg_count, unpacked, account, shapes, forces, h, count, keeps_account, reacts
+                trunk,
+                legs,
+                leg_count,
+                unpacked,
+                account,
+                shapes,
+                forces,
+                h,
+                count,
+                keeps_account,
+                reacts,
+                joints,
             )
             result, good = judge(trunk, legs, leg_count, before, steps < 0, lanes_are_legs, form)
             memory.result = result
             store_trunk(trunk, account, memory, good, keeps_account, form)
             store_legs(trunk, legs, leg_count, good, at, n, row, far, lanes, form)
             if reacts:
-                store_reactions(forces, leg_count, reactions, n, row, lanes, lanes_are_legs)
+                store_reactions(forces, leg_count, reactions, n, row, lanes, lanes_are_legs, form)
 
     return run
 
@@ -398,11 +417,12 @@ def _new_kernels(contact_law: Callable[..., Any] | None, features: Features, ide
     refresh(contact_law)
     law = law_of(contact_law)
     form = engine_layout(features)
+    joints = Joints(reactions_of(features.structure), joint_check_of(features.structure))
     if features != PLAIN:
         identity += f" {tuple(features)}"
 
     def new_kernel(name: str, legs: int, lanes: int, lanes_are_legs: bool, reacts: bool) -> Any:
-        run = advance_of(lanes, lanes_are_legs, reacts, law, form)
+        run = advance_of(lanes, lanes_are_legs, reacts, law, form, joints)
 
         def advance(  # type: ignore[no-untyped-def]
             data, model, tables, ground, constants, reactions, h, steps, keeps_account, begin, end

@@ -45,7 +45,7 @@ from hoof_env.gait import (
     steady_filters,
 )
 from hoof_env.ground.contact import Ground, new_contacts, touch
-from hoof_env.leg.assembly import body_coordinate, check_full_revolution
+from hoof_env.leg.assembly import body_coordinate, check_full_revolution, weld_angles
 from hoof_env.leg.geometry import Geometry
 from hoof_env.leg.kinematics import FrameMotion, mirror, pose
 from hoof_env.leg.mechanism import FRAME
@@ -82,6 +82,7 @@ class Constraints:
         self._place_i = np.array([body_coordinate(geometry, joint.point, joint.i) for joint in joints])
         self._place_j = np.array([body_coordinate(geometry, joint.point, joint.j) for joint in joints])
         self._welds = np.array(mechanism.welds, dtype=np.int64).reshape(-1, 2)
+        self._weld_angles = np.array(weld_angles(geometry))
         self._weld_rows = self.joint_rows + np.arange(len(self._welds))
         constant = np.zeros((self.size, self.size + 3))
         for rows, axis in ((self._x_rows, 0), (self._y_rows, 1)):
@@ -108,7 +109,7 @@ class Constraints:
         gap = centre[i] + arm_i - centre[j] - arm_j
         error[x_rows] = gap.real
         error[y_rows] = gap.imag
-        error[self._weld_rows] = x[self._welds[:, 0], 2] - x[self._welds[:, 1], 2]
+        error[self._weld_rows] = x[self._welds[:, 0], 2] - x[self._welds[:, 1], 2] - self._weld_angles
         error[self.driver_row] = x[self.crank, 2] + motion["theta"] - motion["phi"]
 
         jacobian = self._constant.copy()
@@ -136,8 +137,8 @@ def closed_form(geometry: Geometry, motion: Any) -> tuple[Vector, Vector]:
     angles = p.angles.copy()
     # pose returns angles but for whole turns
     angles[geometry.mechanism.crank] = motion["phi"] - motion["theta"]
-    for one, other in geometry.mechanism.welds:
-        angles[one] = angles[other]
+    for (one, other), angle in zip(geometry.mechanism.welds, weld_angles(geometry), strict=True):
+        angles[one] = angles[other] + angle
     q = np.column_stack([p.centres, angles])
     qd = np.column_stack([p.centre_velocities, p.angular_velocities])
     return q.ravel(), qd.ravel()

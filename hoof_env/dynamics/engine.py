@@ -19,7 +19,6 @@ from hoof_env.constants import GRAVITY
 from hoof_env.dynamics import layout, memory
 from hoof_env.dynamics.advance import BY_LEGS, LANES, RESET_REQUESTED, advance_kernels
 from hoof_env.dynamics.engine_motion import MOST_STEPS, EngineMotion
-from hoof_env.dynamics.layout import Features
 from hoof_env.dynamics.parts import (
     Limb,
     Limits,
@@ -127,7 +126,8 @@ class TrunkEngine(EngineMotion):
         self.trunk = one_of("trunk", trunk, Trunk)
         self.motion_limits = None if limits is None else one_of("limits", limits, Limits)
         order = count("harmonics", harmonics, most=MOST_HARMONICS)
-        self.features = Features(order, self.limbs[0].spring is not None, limits is not None)
+        self.reacts = flag("reactions", reactions)
+        self.features = memory.features_of(self.limbs, order, limits is not None, self.reacts)
         memory.check_limbs(self.trunk, self.limbs, self.features.springs)
         if contact_law is not None and self.features.springs:
             raise ParameterError(
@@ -155,7 +155,6 @@ class TrunkEngine(EngineMotion):
         self.step_limits = length.limits
         asked = None if substeps is None else count("substeps", substeps, most=MOST_STEPS)
         self.substeps = length.choose(self.sim_dt, asked)
-        self.reacts = flag("reactions", reactions)
         self.counts_strides = flag("strides", strides)
         self._allocate()
 

@@ -21,7 +21,7 @@ from hoof_env.dynamics.parts import (
     Result,
     Trunk,
 )
-from hoof_env.dynamics.reactions import Reactions as ReactionRows
+from hoof_env.dynamics.reactions import reactions_layout
 from hoof_env.errors import (
     Floats,
     ParameterError,
@@ -144,9 +144,12 @@ class EngineMemory(Mechanics):
             raise ParameterError("reactions: expected an engine made with reactions=True, got one without")
         rows = self._memory.reactions[:, :, : self.num_envs]
         legs, _, n = rows.shape
-        parts = {name: rows[:, ReactionRows.rows(name)].copy() for name in ReactionRows.fields}
+        layout = reactions_layout(self.features.structure)
+        parts = {name: rows[:, layout.rows(name)].copy() for name in layout.fields}
         joints = parts.pop("joints").reshape(legs, -1, 2, n)
-        return Reactions(joints, **{name: part[:, 0] for name, part in parts.items()})
+        # of one weld or moment the axis is left out
+        moments = {name: part[:, 0] if part.shape[1] == 1 else part for name, part in parts.items()}
+        return Reactions(joints, **moments)
 
     def messages(self) -> list[str]:
         """Return a sentence for each environment: how it ended."""

@@ -18,6 +18,8 @@ from hoof_env.dynamics.layout import (
     TrunkRows,
     TrunkState,
 )
+from hoof_env.dynamics.leg_constants import constants_layout
+from hoof_env.dynamics.reactions import reactions_layout
 from hoof_env.simd.layout import Constants
 
 
@@ -40,6 +42,11 @@ class _EngineLayout(NamedTuple):
     harmonics: int
     springs: int
     has_limits: bool
+    feet: int
+    constants: Any
+    reactions: Any
+    constants_size: int
+    reactions_size: int
 
 
 class EngineLayout(Constants, _EngineLayout):
@@ -53,6 +60,8 @@ class EngineLayout(Constants, _EngineLayout):
         gait: number of gait parameters of a leg.
         harmonics, has_limits: as in `Features`.
         springs: number of rows of a hoof point's spring, 0 or 2.
+        feet: number of points of a hoof.
+        constants, reactions: layouts of a leg's constants and reactions, with their numbers of rows.
     """
 
 
@@ -63,4 +72,6 @@ def engine_layout(features: Features = PLAIN) -> EngineLayout:
     inner = [features.of(layout).size for layout in (TrunkState, LegState, Strides, StrideSums)]
     # in the order of the fields of `_EngineLayout`
     sizes = [*(layout.size for layout in rows), *inner, features.gait_size]
-    return EngineLayout._make([*rows, *sizes, features.harmonics, 2 * features.springs, features.has_limits])
+    flags = [features.harmonics, 2 * features.springs, features.has_limits, features.feet]
+    ofs = [constants_layout(features.structure), reactions_layout(features.structure)]
+    return EngineLayout._make([*rows, *sizes, *flags, *ofs, *(layout.size for layout in ofs)])

@@ -27,6 +27,22 @@ def level_ground(leg):  # type: ignore[no-untyped-def]
 
 
 @inline_llvm
+def lift_heel(leg, springs):  # type: ignore[no-untyped-def]
+    """Set the contact of a heel that is not there, of a hoof with one point, to nothing; it stays so."""
+    leg.heel.penetration = 0.0
+    leg.heel.penetration_rate = 0.0
+    leg.heel.slide = 0.0
+    leg.heel.spring_force = 0.0
+    leg.heel.inverse_approach_speed = 0.0
+    leg.heel.normal = 0.0
+    leg.heel.friction = 0.0
+    for k in range(springs):
+        leg.heel.deflection[k] = 0.0
+        leg.heel.deflection_rate[k] = 0.0
+        leg.heel.mean_deflection_rate[k] = 0.0
+
+
+@inline_llvm
 def meet_ground(trunk, leg, model):  # type: ignore[no-untyped-def]
     """Compute the forces of the ground on toe and heel, and their generalised forces on crank and frame."""
     hip = leg.hip
@@ -38,12 +54,17 @@ def meet_ground(trunk, leg, model):  # type: ignore[no-untyped-def]
     toe_force, toe_theta, toe_beta = meet_point(
         trunk, leg, leg.toe, leg.state.toe, leg.functions.toe, leg.slopes.toe, place, velocity, model
     )
-    force, theta, beta = meet_point(
-        trunk, leg, leg.heel, leg.state.heel, leg.functions.heel, leg.slopes.heel, place, velocity, model
-    )
-    leg.ground_force = toe_force + force
-    leg.ground_moment_theta = toe_theta + theta
-    leg.ground_moment_beta = toe_beta + beta
+    if model.form.feet == 2:
+        force, theta, beta = meet_point(
+            trunk, leg, leg.heel, leg.state.heel, leg.functions.heel, leg.slopes.heel, place, velocity, model
+        )
+        leg.ground_force = toe_force + force
+        leg.ground_moment_theta = toe_theta + theta
+        leg.ground_moment_beta = toe_beta + beta
+    else:
+        leg.ground_force = toe_force
+        leg.ground_moment_theta = toe_theta
+        leg.ground_moment_beta = toe_beta
 
 
 @inline_llvm

@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from typing import Annotated, Any, NamedTuple
 
+from hoof_env.dynamics.leg_constants import PAPER_STRUCTURE, Structure
 from hoof_env.gait import parameter_names
 from hoof_env.leg.profile import Functions, Slopes
 from hoof_env.simd.layout import Block, Layout, Row, Size, Vector
@@ -35,11 +36,16 @@ class Features(NamedTuple):
         springs: true for springs in series with the ground at each hoof point, see `parts.HoofSpring`.
         has_limits: true for limits of the motion, legs of other sizes in some environments, and horizontal
             impulses.
+        structure: of the legs, where kernels find their joints: for limits and joint reactions. Without
+            these it is that of the paper, so that all legs share kernels.
+        feet: number of points of a hoof, 1 or 2.
     """
 
     harmonics: int = 1
     springs: bool = False
     has_limits: bool = False
+    structure: Structure = PAPER_STRUCTURE
+    feet: int = 2
 
     @property
     def gait_size(self) -> int:

@@ -7,10 +7,17 @@ on, and its state is as good as any other.
 
 from __future__ import annotations
 
+from typing import Any
+
+from hoof_env.dynamics.leg_constants import Structure
 from hoof_env.dynamics.parts import Result
 from hoof_env.ground.terrain import surface
-from hoof_env.simd import any_lane, full_like, lane_sum, minimum, sqrt, vector, where
+from hoof_env.leg.closed_form import carry, meet
+from hoof_env.leg.mechanism import Dyad
+from hoof_env.simd import any_lane, full_like, lane_sum, minimum, vector, where
 from hoof_env.simd.compile import inline_llvm
+from hoof_env.simd.types import Lanes
+from hoof_env.simd.unrolled import Traced, call, unrolled
 
 CHECK_EVERY = 5
 """Whole steps from one look to the next: to find all joints takes square roots and quotients."""
@@ -60,44 +67,78 @@ def check_trunk(trunk, model):  # type: ignore[no-untyped-def]
 
 
 @inline_llvm
-def check_joints(trunk, leg, shape, model):  # type: ignore[no-untyped-def]
-    """Check that no joint but the hoof's corners is too near the ground; `shape` are `LegConstants`."""
-    if not (model.is_terrain or any_lane(may_be_low(trunk, leg, shape))):
-        return
-    crank = shape.crank * vector(shape.travel * leg.cosine, -leg.sine)
-    b = meeting(shape.B, shape.pivot, crank)
-    d = shape.pivot + (b - shape.pivot) * shape.D.place
-    f = meeting(shape.F, shape.pivot, crank)
-    e = meeting(shape.E, d, f)
-    a, g = shape.pivot + shape.rocker * (f - shape.pivot), f + shape.shank * (f - e)
-    lowest = clearance(trunk, leg, 0.0 * crank, model)  # O
-    for joint in (crank, shape.pivot, b, d, f, e, a, g):
-        lowest = minimum(lowest, clearance(trunk, leg, joint, model))
-    is_low = where(lowest < trunk.settings.limits[4], 1.0, 0.0)
-    if model.lanes_are_legs:
-        is_low = lane_sum(full_like(trunk, 0.0), is_low)
-    record_violation(trunk, is_low > 0.0, LOW_JOINT)
-
-
-@inline_llvm
-def may_be_low(trunk, leg, shape):  # type: ignore[no-untyped-def]
-    """Return where a joint may be too near level ground; elsewhere the joints need not be found.
-
-    G's place follows from the hoof's corners; of the others only the largest distance from O is used.
-    """
-    toe, heel = leg.functions.toe, leg.functions.heel
-    origin, low = trunk.place.imag + leg.hip.imag, trunk.settings.limits[4] + ROUNDING
-    fetlock = origin + (leg.turn * (toe + shape.fetlock * (heel - toe))).imag
-    return (fetlock < low) | (origin - leg.settings.length_scale[0] * shape.reach < low)
+def moved(turn, place):  # type: ignore[no-untyped-def]
+    """Return the point of the crank at its place in the leg's frame; `turn` is exp(i theta)."""
+    return vector(place.travel * turn.real, -turn.imag) * place.crank
 
 
 @inline_llvm
 def meeting(dyad, first, second):  # type: ignore[no-untyped-def]
-    """Return the hinge of two links with far ends at `first` and `second`; see `reactions.hinge_point`."""
-    span = second - first
-    d2 = span.real * span.real + span.imag * span.imag
-    k = 0.5 * d2 + dyad.half
-    return first + span * (1.0 / d2) * vector(k, dyad.side * sqrt(dyad.one2 * d2 - k * k))
+    """Return the point at two lengths from `first` and `second`."""
+    return meet(first, second, dyad.one2, dyad.excess, dyad.side)
+
+
+@inline_llvm
+def height_of_sole(trunk, leg, place):  # type: ignore[no-untyped-def]
+    """Return the height of a point of the sole, at `place` from the toe towards the heel [m]."""
+    toe, heel = leg.functions.toe, leg.functions.heel
+    return trunk.place.imag + leg.hip.imag + (leg.turn * (toe + place * (heel - toe))).imag
+
+
+@inline_llvm
+def least_height(trunk, leg, reach):  # type: ignore[no-untyped-def]
+    """Return a height that no point within `reach` of O comes below [m]."""
+    return trunk.place.imag + leg.hip.imag - leg.settings.length_scale[0] * reach
+
+
+def joint_check_of(structure: Structure) -> Any:
+    """Return the kernel that checks that no joint of a leg but its feet is too near the ground.
+
+    It takes trunk, leg, the leg's constants (`leg_constants.constants_layout`) and the model.
+    """
+    mechanism = structure.mechanism
+
+    @unrolled(lambda trunk, *others: Lanes(trunk.count))
+    def bound(trunk: Traced, leg: Traced, shape: Traced) -> Traced:
+        """Return a height below which no joint is: their places need not be found for it."""
+        low = call(least_height, trunk, leg, shape.part("reach"))
+        for name in mechanism.sole:
+            low = call(minimum, low, call(height_of_sole, trunk, leg, shape.part(f"sole_{name}")))
+        return low
+
+    @unrolled(lambda trunk, *others: Lanes(trunk.count))
+    def lowest_joint(trunk: Traced, leg: Traced, shape: Traced, model: Traced) -> Traced:
+        """Return the height above the ground of the lowest joint."""
+        crank = call(moved, call(vector, leg.part("cosine"), leg.part("sine")), shape)
+        places = {mechanism.centre: crank * 0.0, mechanism.pin: crank}
+        places |= {name: shape.part(f"pivot_{name}") for name in mechanism.pivots}
+        for step in mechanism.steps:
+            constant = shape.part(f"point_{step.point}")
+            if not isinstance(step, Dyad):
+                places[step.point] = call(carry, places[step.origin], places[step.toward], constant)
+                continue
+            ends = (places[step.first], places[step.second])
+            if mechanism.is_corner(step):
+                places[step.point] = call(carry, *ends, constant.part("place"))
+            else:
+                places[step.point] = call(meeting, constant, *ends)
+        lowest = call(clearance, trunk, leg, places[mechanism.centre], model)
+        for name in mechanism.points[1:]:
+            if name not in mechanism.feet:
+                lowest = call(minimum, lowest, call(clearance, trunk, leg, places[name], model))
+        return lowest
+
+    @inline_llvm
+    def check_joints(trunk, leg, shape, model):  # type: ignore[no-untyped-def]
+        low = trunk.settings.limits[4]
+        if not (model.is_terrain or any_lane(bound((trunk, leg, shape)) < low + ROUNDING)):
+            return
+        is_low = where(lowest_joint((trunk, leg, shape, model)) < low, 1.0, 0.0)
+        if model.lanes_are_legs:
+            is_low = lane_sum(full_like(trunk, 0.0), is_low)
+        record_violation(trunk, is_low > 0.0, LOW_JOINT)
+
+    return check_joints
 
 
 @inline_llvm

@@ -22,6 +22,7 @@ from hoof_env.dynamics.layout import (
     TrunkSettings,
     TrunkState,
 )
+from hoof_env.dynamics.leg_constants import PAPER_STRUCTURE, leg_constants, structure_of
 from hoof_env.dynamics.parts import (
     FREE,
     RAIL,
@@ -33,7 +34,6 @@ from hoof_env.dynamics.parts import (
     Motor,
     Trunk,
 )
-from hoof_env.dynamics.reactions import Reactions, leg_constants
 from hoof_env.dynamics.stepping import SCHEMES
 from hoof_env.errors import Floats, ParameterError, all_of, finite, spread
 from hoof_env.gait import FilterSettings, GaitParameters, gait_array
@@ -69,7 +69,7 @@ class Memory(NamedTuple):
     trunk_report: Floats  # at the end of the last call, (8, n)
     limb_report: Floats  # (legs, 18, n)
     result: Floats  # values of `parts.Result`, (n,); where it is not OK the state is left as it was
-    constants: Floats  # `reactions.LegConstants`, (legs, size)
+    constants: Floats  # `leg_constants.constants_layout`, (legs, size); 0 where nothing needs them
     reactions: Floats  # `reactions.Reactions`, (legs, size, columns)
     features: Features
 
@@ -134,9 +134,11 @@ def copy_of(data: Floats) -> Floats:
 def new_memory(scene: Mechanics, num_envs: int, columns: int, reacts: bool) -> Memory:
     """Allocate the memory of an engine; states are NaN until reset."""
     legs = len(scene.limbs)
-    constants = np.array([leg_constants(limb.geometry) for limb in scene.limbs])
-    reactions = np.zeros((legs, Reactions.size, columns if reacts else 0))
     form = engine_layout(scene.features)
+    constants = np.zeros((legs, form.constants_size))
+    if reacts or scene.features.has_limits:
+        constants = np.array([leg_constants(limb.geometry) for limb in scene.limbs])
+    reactions = np.zeros((legs, form.reactions_size, columns if reacts else 0))
     data = copy_of(np.zeros((form.trunk_rows + legs * form.leg_rows, columns)))
     whole = memory_of(data, columns, constants, reactions, scene.features)
     whole.trunk[:] = np.nan
@@ -207,6 +209,26 @@ def check_shared(scene: Mechanics, trunk: Trunk, ground: Ground, limbs: Sequence
             )
 
 
+def features_of(limbs: Sequence[Limb], harmonics: int, has_limits: bool, reacts: bool) -> Features:
+    """Return the features of an engine with these legs.
+
+    Raises:
+        ParameterError: the legs have different structures.
+    """
+    first = limbs[0].geometry
+    structure = structure_of(first)
+    for k, limb in enumerate(limbs):
+        if structure_of(limb.geometry) != structure:
+            raise ParameterError(
+                f"limbs[{k}].geometry: expected the mechanism of the first leg, {first.name!r}, and the same "
+                f"bodies with a centre of mass of their own, since legs on one trunk share their kernels; "
+                f"{limb.geometry.name!r} has another"
+            )
+    needed = structure if has_limits or reacts else PAPER_STRUCTURE
+    springs = limbs[0].spring is not None
+    return Features(harmonics, springs, has_limits, needed, len(first.mechanism.feet))
+
+
 def check_limbs(trunk: Trunk, limbs: Sequence[Limb], springs: bool) -> None:
     """Raise `ParameterError` if a hip is beyond the trunk, or some hooves have springs and others have
     not."""
@@ -231,9 +253,13 @@ def scales_of(name: str, limb: Limb, own: Limb) -> tuple[float, float]:
     own_shape = own.geometry.to_dict()
     length = shape["hip_height"] / own_shape["hip_height"]
     mass = limb.geometry.mass / own.geometry.mass
-    pairs = {
+    if structure_of(limb.geometry) != structure_of(own.geometry):
+        raise ParameterError(f"{name}.geometry: expected the mechanism of the engine's, got another")
+    scaled = own.geometry.scaled(length)
+    pairs: dict[str, tuple[Any, Any]] = {
         "lengths": (limb.geometry.body_lengths, length * own.geometry.body_lengths),
-        "pivot": (shape["pivot"], length * np.array(own_shape["pivot"])),
+        "pivot": (list(limb.geometry.fixed.values()), list(scaled.fixed.values())),
+        "centres": (limb.geometry.body_centres, own.geometry.body_centres),
         "masses": (limb.geometry.body_masses, mass * own.geometry.body_masses),
         "inertias": (limb.geometry.body_inertias, mass * length**2 * own.geometry.body_inertias),
     }

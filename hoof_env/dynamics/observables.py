@@ -115,8 +115,8 @@ def report_trunk(trunk, report):  # type: ignore[no-untyped-def]
 
 
 @inline_llvm
-def report_leg(trunk, leg, report):  # type: ignore[no-untyped-def]
-    """Fill a `LegReport`."""
+def report_leg(trunk, leg, report, form):  # type: ignore[no-untyped-def]
+    """Fill a `LegReport`. The rows of a heel that is not there stay 0."""
     find_drives(trunk, leg)
     side = leg.settings.side
     k = leg.beta_by_theta
@@ -132,7 +132,8 @@ def report_leg(trunk, leg, report):  # type: ignore[no-untyped-def]
     report.hip_power = leg.swing_power
     hip = trunk.place + leg.hip
     report_point(leg.toe, hip + leg.turn * leg.functions.toe, report.toe)
-    report_point(leg.heel, hip + leg.turn * leg.functions.heel, report.heel)
+    if form.feet == 2:
+        report_point(leg.heel, hip + leg.turn * leg.functions.heel, report.heel)
 
 
 @inline_llvm

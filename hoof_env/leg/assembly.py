@@ -18,6 +18,10 @@ ANGLES = 3600
 """Number of crank angles at which a leg is looked at."""
 
 
+LEAST_TURN = 1e-9
+"""Angle below which two directions are one, up to rounding [rad]."""
+
+
 def coordinate(lengths: Any, text: str) -> float:
     """Return a coordinate of a `BodyPoint` [m]."""
     if not text:
@@ -138,6 +142,32 @@ def check_full_revolution(geometry: Geometry) -> None:
                 f"{float(d[where]):.6g} m apart, are {reach} {miss:.3g} m; "
                 "expected a leg that turns through a full revolution"
             )
+
+
+def weld_angles(geometry: Geometry) -> list[float]:
+    """Return the angle of the first body of each weld from that of the second, before the mirror [rad].
+
+    Raises:
+        GeometryError: the points of the two bodies turn against each other.
+    """
+    mechanism = geometry.mechanism
+    if not mechanism.welds:
+        return []
+    z = solve(geometry, np.linspace(0, 2 * np.pi, 48, endpoint=False))[0]
+    z = z[np.isfinite(z).all(1)]
+    angles = []
+    for one, other in mechanism.welds:
+        axes = [z[:, mechanism.heads[i]] - z[:, mechanism.tails[i]] for i in (one, other)]
+        turns = axes[0] * axes[1].conj()
+        if len(turns) and np.abs(np.angle(turns * turns[0].conj())).max() > LEAST_TURN:
+            names = " and ".join(repr(mechanism.bodies[i].name) for i in (one, other))
+            raise GeometryError(
+                f"mechanism.welds: {names} turn against each other, so they cannot be welded; make the "
+                "points of one points of the other body, or leave the weld out"
+            )
+        angle = float(np.angle(turns[0])) if len(turns) else 0.0
+        angles.append(angle if abs(angle) > LEAST_TURN else 0.0)
+    return angles
 
 
 def transmission_margin(geometry: Geometry) -> float:

@@ -108,8 +108,8 @@ class Geometry:
         lengths = {k: check_number(f"lengths[{k!r}]", self.lengths[k], low=1e-3, high=1e3) for k in names}
         points = [dyad.point for dyad in self.mechanism.dyads]
         check_keys("assembly", self.assembly, points)
-        check_signs({f"assembly[{point!r}]": self.assembly[point] for point in points})
-        check_signs({"travel": self.travel})
+        signs = {f"assembly[{point!r}]": self.assembly[point] for point in points}
+        check_signs(signs | {"travel": self.travel})
         check_feet(self.toe, self.heel, self.mechanism.feet)
         check_texts({"name": self.name, "provenance": self.provenance})
         for name in ("hip_height", "linear_density"):

@@ -240,6 +240,32 @@ class Mechanism:
                 found.append(Group(dyad, self.parts[one[0]], self.parts[two[0]]))
         return tuple(found)
 
+    def is_corner(self, dyad: Dyad) -> bool:
+        """True if the points from which a dyad is found are at a distance that never changes."""
+        return {dyad.first, dyad.second} <= {*self.fixed} or bool(self.bodies_with(dyad.first, dyad.second))
+
+    @cached_property
+    def plates(self) -> tuple[tuple[str, ...], ...]:
+        """Groups of three points or more at distances that never change: triangles of links, and bodies with
+        further points."""
+        corners = [dyad for dyad in self.dyads if self.is_corner(dyad)]
+        triangles = [(dyad.first, dyad.second, dyad.point) for dyad in corners]
+        return (*triangles, *(body.all_points for body in self.bodies if body.points))
+
+    @cached_property
+    def sole(self) -> tuple[str, ...]:
+        """The points that keep their distances from both of two feet."""
+        if len(self.feet) < 2:
+            return ()
+        rigid = [{*plate} for plate in self.plates] + [{body.tail, body.head} for body in self.bodies]
+
+        def keeps(point: str) -> bool:
+            return all(any({point, foot} <= group for group in rigid) for foot in self.feet)
+
+        keep_each_other = any({*self.feet} <= group for group in rigid)
+        others = [point for point in self.points if point not in self.feet]
+        return tuple(point for point in others if keep_each_other and keeps(point))
+
     def body_of_foot(self, foot: str) -> int:
         """Return the body that feels the ground in a foot: one with both feet, or the first that has it."""
         return (self.bodies_with(*self.feet) or self.bodies_with(foot))[0]

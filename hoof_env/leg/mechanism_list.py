@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterator, Mapping, Sequence
+from functools import cache
 from importlib import resources
 from typing import Any
 
@@ -334,11 +335,20 @@ def _coordinate(where: str, given: Any) -> str:
     return given
 
 
-def shipped_mechanism(name: str) -> Mechanism:
-    """Read a mechanism of `hoof_env/data/mechanisms`."""
-    path = resources.files("hoof_env").joinpath("data", "mechanisms", f"{name}.json")
-    return read_mechanism(json.loads(path.read_text(encoding="utf-8"))["mechanism"])
+@cache
+def _paper() -> dict[str, Any]:
+    path = resources.files("hoof_env").joinpath("data", "mechanisms", "paper.json")
+    return dict(json.loads(path.read_text(encoding="utf-8")))
 
 
-PAPER = shipped_mechanism("paper")
+PAPER = read_mechanism(_paper()["mechanism"])
 """The mechanism of the paper's Eq. 2, which a preset without a list has: 14 bodies, 20 joints, a weld."""
+
+Flesh = tuple[str, str, float, float]
+
+
+def flesh_of(mechanism: Mechanism) -> list[Flesh]:
+    """Return the flesh around the links where a horse's leg has its bones: from point, to point, radius at
+    both ends [m]; none of other mechanisms than the paper's."""
+    flesh = _paper()["flesh"] if mechanism == PAPER else []
+    return [(tail, head, float(one), float(other)) for tail, head, one, other in flesh]

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hoof_env.errors import GeometryError
-from hoof_env.leg.assembly import check_full_revolution, solve
+from hoof_env.leg.assembly import check_full_revolution, solve, weld_angles
 from hoof_env.leg.mechanism import FRAME, Mechanism
 from hoof_env.leg.mechanism_list import PAPER
 
@@ -44,6 +44,7 @@ def check_motion(geometry: Geometry) -> None:
     if not len(z):
         return
     _check_bodies(geometry.mechanism, z)
+    weld_angles(geometry)
     _check_rows(geometry.mechanism, z[:: -(-len(z) // RANKED)])
 
 

@@ -16,8 +16,6 @@ from hoof_env.render.instant import Instant
 
 TRUNK_M = (1.05, 0.42, 0.16)  # the trunk about O: half its length, its height above and below [m]
 HOLD_M = 0.1  # height above the trunk of the rail or plate that holds it [m]
-FLESH_M = (("O", "C", 0.13, 0.15), ("C", "F", 0.15, 0.095), ("F", "G", 0.085, 0.055))
-"""Flesh around the rigid links where a horse's leg has its bones: from, to, radius at both ends [m]."""
 HORN_SHARE = 0.45  # part of the hoof triangle, from the sole up, that is horn; above it is the pastern [-]
 
 Part = tuple[tuple[float, float], tuple[float, float], float, float]

@@ -17,6 +17,7 @@ import pygame
 
 from hoof_env.ground.terrain import Terrain
 from hoof_env.leg.geometry import Geometry
+from hoof_env.leg.mechanism_list import flesh_of
 from hoof_env.render.brush import FINE, Brush, arrow, bar
 from hoof_env.render.colours import (
     COAT,
@@ -39,7 +40,7 @@ from hoof_env.render.colours import (
 )
 from hoof_env.render.ground import GroundPainter
 from hoof_env.render.instant import Instant
-from hoof_env.render.outline import FLESH_M, HOLD_M, HORN_SHARE, TRUNK_M, LegOutline, reach
+from hoof_env.render.outline import HOLD_M, HORN_SHARE, TRUNK_M, LegOutline, reach
 from hoof_env.render.panel import KILONEWTONS, Unit
 
 HEIGHT_SLACK_M = 0.2  # how far O may rise or sink from the paper's hip height before the camera follows [m]
@@ -115,9 +116,10 @@ class Scene:
         """Draw an instant; the arrow of a force `full_scale` [N] is `ARROW_M` long."""
         pixels = self.look_at(now)
         canvas.blit(self._sky, (0, 0))
-        self._draw_support(canvas, pixels["O"])
+        hip = pixels[self._geometry.mechanism.centre]
+        self._draw_support(canvas, hip)
         self._ground.draw(canvas, [now], self.corner)
-        self._draw_trunk(canvas, pixels["O"], now.pitch)
+        self._draw_trunk(canvas, hip, now.pitch)
         self._draw_paths(canvas, pixels)
         self._draw_leg(canvas, pixels)
         self._draw_forces(canvas, now, full_scale)
@@ -209,32 +211,45 @@ class Scene:
         crank = self._geometry.crank_length / self._girth
         edge = 1.5 * FINE
         mechanism = self._geometry.mechanism
+        fixed = mechanism.fixed
+        feet = mechanism.feet
+        flesh = flesh_of(mechanism)
+        hoof = [
+            plate for plate in mechanism.plates if len(plate) == 3 and {*feet} < {*plate} and len(feet) == 2
+        ]
 
         def paint(fine: Any, place: Any) -> None:
             at = {name: place(z) for name, z in pixels.items()}
-            horn = [place(pixels[n] + HORN_SHARE * (pixels["G"] - pixels[n])) for n in "JI"]
             for colour, grow in ((COAT_EDGE, edge), (COAT, 0.0)):
-                for a, b, radius_a, radius_b in FLESH_M:
+                for a, b, radius_a, radius_b in flesh:
                     bar(fine, colour, at[a], at[b], radius_a * metre + grow, radius_b * metre + grow)
-            pygame.draw.polygon(fine, PASTERN, [at["G"], at["I"], at["J"]])
-            pygame.draw.polygon(fine, HOOF, [at["I"], at["J"], *horn])
-            pygame.draw.circle(fine, CRANK, at["O"], crank * metre, round(1.3 * FINE))
-            bar(fine, PLATE, at["O"], at["C"], 0.02 * metre, 0.02 * metre)
-            pygame.draw.polygon(fine, PLATE, [at["C"], at["B"], at["D"]])
+            for plate in hoof:
+                ankle = next(name for name in plate if name not in feet)
+                horn = [place(pixels[n] + HORN_SHARE * (pixels[ankle] - pixels[n])) for n in feet]
+                pygame.draw.polygon(fine, PASTERN, [at[ankle], *(at[n] for n in reversed(feet))])
+                pygame.draw.polygon(fine, HOOF, [*(at[n] for n in reversed(feet)), *horn])
+            pygame.draw.circle(fine, CRANK, at[fixed[0]], crank * metre, round(1.3 * FINE))
+            for pivot in fixed[1:]:
+                bar(fine, PLATE, at[fixed[0]], at[pivot], 0.02 * metre, 0.02 * metre)
+            for corners in mechanism.plates:
+                if corners not in hoof:
+                    pygame.draw.polygon(fine, PLATE, [at[name] for name in corners])
             for i, link in enumerate(mechanism.bodies):
                 colour, radius = (CRANK, 0.024 * metre) if i == mechanism.crank else (LINK, 0.015 * metre)
                 bar(fine, colour, at[link.tail], at[link.head], radius, radius)
             for name, where in at.items():
-                radius = (0.038 if name in "OC" else 0.025) * metre
+                radius = (0.038 if name in fixed else 0.025) * metre
                 pygame.draw.circle(fine, INK, where, radius)
                 pygame.draw.circle(fine, PAPER, where, radius - edge)
-            for pivot in "OC":
+            for pivot in fixed:
                 pygame.draw.circle(fine, INK, at[pivot], 0.013 * metre)
 
         turn = self._geometry.crank_length * self._scale * (1 + 1j)
-        box = [*pixels.values(), pixels["O"] - turn, pixels["O"] + turn]
+        hip = pixels[fixed[0]]
+        box = [*pixels.values(), hip - turn, hip + turn]
         self._brush.smooth(canvas, box, 0.16 * self._girth * self._scale + 2, paint)
-        for pivot, side, shift in (("O", "midbottom", -0.05j), ("C", "midleft", 0.06)) if lettered else ():
+        for pivot in fixed if lettered else ():
+            side, shift = ("midbottom", -0.05j) if pivot == fixed[0] else ("midleft", 0.06)
             letter = pixels[pivot] + shift * self._metre
             self._brush.write(canvas, pivot, (letter.real, letter.imag), 18, INK, side)
 
@@ -244,6 +259,8 @@ class Scene:
         times, *paths = zip(*self._paths, strict=True)
         points_now = [pixels[point] for point in reversed(self._geometry.corners)]
         for colour, places, end in zip((HEEL, TOE), paths, points_now, strict=True):
+            if colour == HEEL and self._geometry.heel is None:
+                continue
             line = np.append(self._pixels(np.array(places)), end)
             points = list(zip(line.real.tolist(), line.imag.tolist(), strict=True))
             for first in range(0, len(points) - 1, 10):  # older parts fade into the sky

@@ -124,6 +124,11 @@ def _sized(layout: Any, sizes: tuple[tuple[str, int], ...]) -> Any:
     return _Named(name, (Layout,), {"__annotations__": kept, "__module__": layout.__module__})
 
 
+def new_layout(name: str, fields: dict[str, Any]) -> Any:
+    """Return a layout of fields that are known only at run time; equal names must have equal fields."""
+    return _Named(name, (Layout,), {"__annotations__": fields, "__module__": __name__})
+
+
 def views(layout: Any, data: NDArray[Any]) -> Any:
     """Return the fields of memory by name, as views of an array. Its first axis is the rows; the view of a
     `Row` does not have that axis."""

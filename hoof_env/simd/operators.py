@@ -10,7 +10,7 @@ from numba.core import types
 from numba.core.extending import lower_builtin, make_attribute_wrapper
 from numba.core.typing.templates import AbstractTemplate, infer_global, signature
 
-from hoof_env.simd.types import Code, Lanes, Mask, Plane, count_of, fused, is_real
+from hoof_env.simd.types import DOUBLE, Code, Lanes, Mask, Plane, count_of, fused, is_real, spread
 
 
 def _operation(function: Any, typed: Callable[..., Any], lowered: Callable[..., Any], arity: int = 2) -> None:
@@ -58,8 +58,20 @@ def _both_masks(one: Any, two: Any) -> Any:
     return one if isinstance(one, Mask) and isinstance(two, Mask) else None
 
 
+def _quotient_type(one: Any, two: Any) -> Any:
+    return one if isinstance(one, Plane) and is_real(two) else _of_reals(Lanes)(one, two)
+
+
 def _quotient(code: Code, one: Any, two: Any) -> Any:
-    return code.builder.fdiv(*code.reals(one, two))
+    (left, right) = code.args
+    if not isinstance(left, Plane):
+        return code.builder.fdiv(*code.reals(one, two))
+    # a planar vector is divided by one reciprocal, since a division takes as long as several products
+    per = code.builder.fdiv(
+        spread(code.builder, DOUBLE(1.0), left.count), code.number(right, two, left.count)
+    )
+    (x, y) = code.split(left, one)
+    return code.join(code.builder.fmul(x, per), code.builder.fmul(y, per))
 
 
 def _sum(sign: str) -> Callable[..., Any]:
@@ -114,7 +126,7 @@ def _logic(instruction: str) -> Callable[..., Any]:
 _operation(operator.add, _sum_type, _sum("+"))
 _operation(operator.sub, _sum_type, _sum("-"))
 _operation(operator.mul, _product_type, _product)
-_operation(operator.truediv, _of_reals(Lanes), _quotient)
+_operation(operator.truediv, _quotient_type, _quotient)
 _operation(operator.neg, lambda z: None if isinstance(z, Mask) else z, _negative, arity=1)
 _COMPARISONS = {
     operator.lt: "<",

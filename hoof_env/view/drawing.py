@@ -12,11 +12,11 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from hoof_env.leg.mechanism_list import flesh_of
 from hoof_env.render.instant import HorseInstant, Instant, Surroundings
 from hoof_env.render.outline import (
     BODY,
     EAR,
-    FLESH_M,
     HORN_SHARE,
     HORSE_HIP_M,
     TAIL,
@@ -141,9 +141,10 @@ class Drawing:
         """Find the points of flesh and hooves, of legs that have them."""
         points = self._geometry.mechanism.points
         self._number = {name: k for k, name in enumerate(points)}
-        self._flesh = [part for part in FLESH_M if set(part[:2]) <= set(points)]
+        self._flesh = flesh_of(self._geometry.mechanism)
         self._corners = [self._number[name] for name in self._geometry.corners]
-        self._ankle = self._number.get("G", self._corners[0])
+        sole = self._geometry.mechanism.sole
+        self._ankle = self._number[sole[0]] if sole else self._corners[0]
 
     def _claim(self, source: str, pieces: int, length: int) -> None:
         """Give the outlines of a source their places."""

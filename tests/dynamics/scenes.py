@@ -9,8 +9,8 @@ from hoof_env.dynamics.tally import tally_of
 from hoof_env.gait import load_gait
 from hoof_env.ground.contact import Ground
 from hoof_env.leg.geometry import load_geometry
+from hoof_env.leg.mechanism import FRAME
 from tests.legs import FIRST_FIT
-from tests.linkage import CRANK, FRAME, JOINTS, LOCK, SOLE
 
 LEG = load_geometry(FIRST_FIT)
 RUN, WALK = load_gait("run", FIRST_FIT), load_gait("walk", FIRST_FIT)
@@ -51,27 +51,31 @@ def cross(arms, forces):
 
 
 def loads(geometry, motion, joints, lock, driver, hip, toe, heel):
-    """Forces, shape (15, 2), and moments about the centres, shape (15,), of joints and ground on each body of
-    a leg; the last is the leg's frame, about O."""
-    force, moment = np.zeros((15, 2)), np.zeros(15)
-    centres = np.vstack([motion.centres, motion.point("O")])
+    """Forces, shape (bodies + 1, 2), and moments about the centres, shape (bodies + 1,), of joints and ground
+    on each body of a leg; the last is the leg's frame, about O."""
+    mechanism = geometry.mechanism
+    count = len(mechanism.bodies) + 1
+    force, moment = np.zeros((count, 2)), np.zeros(count)
+    centres = np.vstack([motion.centres, motion.point(mechanism.centre)])
 
     def push(body, point, pushed):
         force[body] += pushed
         moment[body] += cross(motion.point(point) - centres[body], pushed)
 
-    for joint, pushed in zip(JOINTS, joints, strict=True):
+    for joint, pushed in zip(mechanism.joints, joints, strict=True):
         push(joint.i, joint.point, pushed)
         push(joint.j, joint.point, -pushed)
-    push(SOLE, geometry.toe, toe)
-    push(SOLE, geometry.heel, heel)
-    moment[list(LOCK)] += lock, -lock
-    moment[CRANK] += driver
+    for foot, pushed in zip((geometry.toe, geometry.heel), (toe, heel), strict=True):
+        if foot is not None:
+            push(mechanism.body_of_foot(foot), foot, pushed)
+    for weld, turned in zip(mechanism.welds, np.atleast_1d(lock), strict=True):
+        moment[list(weld)] += turned, -turned
+    moment[mechanism.crank] += driver
     moment[FRAME] += hip - driver
     return force, moment
 
 
 def inertia(geometry, motion):
-    """What moves the 14 links against their weight: forces, shape (14, 2), and moments, shape (14,)."""
+    """What moves the links against their weight: forces, shape (bodies, 2), and moments, shape (bodies,)."""
     force = geometry.body_masses[:, None] * np.add(motion.centre_accelerations, (0, GRAVITY))
     return force, geometry.body_inertias * motion.angular_accelerations

@@ -27,11 +27,12 @@ def test_a_preset_by_path_is_the_preset_by_name(tmp_path):
         assert load_geometry(source).replace(name="identified") == LEG
 
 
-def test_every_preset_is_identified_not_published():
+def test_every_preset_says_whether_it_is_identified_or_published():
     assert load_geometry().name == "identified"
-    assert preset_names() == ["identified"]
-    for name in preset_names():
-        assert load_geometry(name).provenance.startswith("Identified, not published")
+    assert preset_names() == ["identified", "jansen", "klann"]
+    assert load_geometry("identified").provenance.startswith("Identified, not published")
+    for name in ("jansen", "klann"):
+        assert load_geometry(name).provenance.startswith("Published: ")
 
 
 def test_a_missing_file_and_an_unknown_name(tmp_path):
@@ -39,7 +40,8 @@ def test_a_missing_file_and_an_unknown_name(tmp_path):
         load_geometry(tmp_path / "none.json")
     with pytest.raises(DataFileError, match="cannot read"):
         load_geometry(tmp_path)  # a folder
-    with pytest.raises(ParameterError, match=r"preset: expected one of identified, got 'first_fit'"):
+    known = "identified, jansen, klann"
+    with pytest.raises(ParameterError, match=f"preset: expected one of {known}, got 'first_fit'"):
         load_geometry("first_fit")
 
 

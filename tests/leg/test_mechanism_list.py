@@ -1,0 +1,161 @@
+"""A list that is no leg is refused by its entry, with what would mend it."""
+
+import copy
+import re
+
+import numpy as np
+import pytest
+
+from hoof_env.dynamics.engine import TrunkEngine
+from hoof_env.dynamics.parts import Limb, Trunk
+from hoof_env.errors import GeometryError, ParameterError
+from hoof_env.leg.geometry import load_geometry, read_preset
+from hoof_env.leg.mechanism_list import PAPER, read_mechanism
+from tests.leg.mechanisms import EVERYTHING, leg_with_everything
+
+JANSEN = read_preset("jansen")["geometry"]["mechanism"]
+
+
+def changed(**changes):
+    return copy.deepcopy(JANSEN) | changes
+
+
+def without(part, *numbers):
+    return changed(**{part: [entry for k, entry in enumerate(JANSEN[part]) if k not in numbers]})
+
+
+WRONG = {
+    "no list": ([], "mechanism: expected an object with fixed, crank, points, bodies, joints, feet, got"),
+    "no joints": (
+        {name: part for name, part in JANSEN.items() if name != "joints"},
+        "mechanism: expected exactly .*; missing joints",
+    ),
+    "unknown": (changed(springs=[]), "mechanism: .*; unknown springs"),
+    "the order": (
+        changed(points=[JANSEN["points"][k] for k in (2, 0, 1, 3, 4)]),
+        r"mechanism.points\[0\]: 'D' lies at a length from 'B', which is not found before it; known are O,",
+    ),
+    "a point twice": (
+        changed(points=[*JANSEN["points"], JANSEN["points"][0]]),
+        r"mechanism.points\[5\]: point 'B' is already there; give it another name",
+    ),
+    "three lengths": (
+        changed(points=[{"point": "B", "dyad": ["C", "P"], "lengths": ["CB", "PB", "CP"]}]),
+        r"mechanism.points\[0\]: expected two points and two lengths",
+    ),
+    "a body that is not there": (
+        changed(points=[{"point": "B", "body": "XY", "along": "XB"}]),
+        r"mechanism.points\[0\]: expected 'dyad' with two points, or 'body' with one of OP, PB, .*'XY'",
+    ),
+    "ends without a length": (
+        changed(bodies=[*JANSEN["bodies"], {"name": "BE", "tail": "B", "head": "E"}]),
+        r"mechanism.bodies\[11\]: 'BE' needs ends whose distance is a length of the list \(B-C, .*'B'",
+    ),
+    "another length": (
+        changed(bodies=[JANSEN["bodies"][0] | {"length": "PB"}, *JANSEN["bodies"][1:]]),
+        r"mechanism.bodies\[0\]: the ends of 'OP' are 'OP' apart by the points.* give 'length': 'OP'",
+    ),
+    "a joint off its body": (
+        changed(joints=[["E", "OP", "frame"], *JANSEN["joints"][1:]]),
+        r"mechanism.joints\[0\]: expected a point of 'OP', one of O, P, got 'E'",
+    ),
+    "a joint of no body": (
+        changed(joints=[["O", "XY", "frame"]]),
+        r"mechanism.joints\[0\]: expected \[point, body, body or 'frame'\] with bodies of the list \(OP, ",
+    ),
+    "two degrees of freedom": (
+        without("joints", 15),
+        "mechanism.joints: 11 bodies have 33 coordinates, and joints, welds and crank give 31 rows: 3 "
+        "degrees of freedom; expected one degree of freedom, so add joints or welds",
+    ),
+    "too many rows": (
+        changed(welds=[["EG", "DE"]]),
+        "mechanism.joints: .* give 34 rows: 1 rows too many; .*leave out joints or welds",
+    ),
+    "bodies apart at a pin": (
+        changed(joints=[j for j in JANSEN["joints"] if j != ["E", "EG", "DE"]] + [["D", "DE", "CD"]]),
+        "mechanism.joints: at 'D' two joints tie the same bodies; leave one of them out",
+    ),
+    "a foot that is no point": (
+        changed(feet=["X"]),
+        "mechanism.feet: 'X' is no moving point of a body; expected of P, B, F, D, E, G",
+    ),
+    "a fixed foot": (changed(feet=["C"]), "mechanism.feet: 'C' is no moving point of a body"),
+    "three feet": (changed(feet=["G", "E", "F"]), "mechanism.feet: expected one point or two, got "),
+    "a driver that is no crank": (
+        changed(crank={"point": "F", "length": "OF"}),
+        "mechanism.points.*'B' lies at a length from 'P', which is not found before it",
+    ),
+    "a crank that slides": (
+        changed(joints=[["P", "OP", "PB"] if j[0] == "O" else j for j in JANSEN["joints"]]),
+        "mechanism.crank: body 'OP' is no crank; expected one joint with the frame, at 'O', and no weld",
+    ),
+    "a crank of another body": (
+        changed(bodies=[{"name": "OP", "tail": "P", "head": "O"}, *JANSEN["bodies"][1:]]),
+        "mechanism.crank: the driver is no crank; expected one body with the tail 'O', a fixed point, and",
+    ),
+    "a dyad without a link": (
+        changed(
+            bodies=[b for b in JANSEN["bodies"] if b["name"] != "DE"],
+            joints=[
+                ["E", "EG", "EF"] if j[0] == "E" else j
+                for j in JANSEN["joints"]
+                if j not in (["D", "DE", "BD"], ["E", "EG", "DE"])
+            ],
+        ),
+        "mechanism",
+    ),
+    "a weld of strangers": (
+        changed(welds=[["EG", "CB"]]),
+        "mechanism.welds: 'EG' and 'CB' need a joint that they share",
+    ),
+    "a coordinate": (
+        {**copy.deepcopy(EVERYTHING), "points": [*EVERYTHING["points"][:4], {"point": "G", "body": "ankle"}]},
+        r"mechanism.points\[4\]: expected 'along' or 'across', else 'G' is 'A' itself",
+    ),
+}
+
+
+@pytest.mark.parametrize("case", WRONG)
+def test_a_list_that_is_no_leg_is_refused_with_words(case):
+    given, message = WRONG[case]
+    with pytest.raises(ParameterError) as caught:
+        read_mechanism(given)
+    assert re.search(message, str(caught.value)), caught.value
+
+
+@pytest.mark.parametrize("given", [JANSEN, EVERYTHING, PAPER.to_mapping()], ids=["jansen", "all", "paper"])
+def test_a_right_list_is_read_and_written(given):
+    mechanism = read_mechanism(copy.deepcopy(given))
+    assert read_mechanism(mechanism.to_mapping()) == mechanism
+    assert 3 * len(mechanism.bodies) == 2 * len(mechanism.joints) + len(mechanism.welds) + 1
+
+
+def test_numbers_must_be_those_that_the_list_names():
+    leg = load_geometry("klann")
+    with pytest.raises(ParameterError, match=r"lengths: expected exactly OP, BH.*missing EG"):
+        leg.__class__.from_dict({**leg.to_dict(), "lengths": {n: 1.0 for n in leg.lengths if n != "EG"}})
+    with pytest.raises(ParameterError, match="pivot: expected the places of B, D by name, got"):
+        leg.replace(pivot=(0.0, 1.0))
+    with pytest.raises(ParameterError, match="toe and heel: expected G and None, got 'G' and 'E'"):
+        leg.replace(heel="E")
+    with pytest.raises(ParameterError, match=r"masses\[3\]: expected"):
+        leg.replace(masses=(1, 1, 1, 0, 1, 1, 1, 1, 1))
+    with pytest.raises(ParameterError, match=r"solids\['plate'\]\['mass'\]: expected"):
+        leg_with_everything(solids={"plate": {"mass": 0.0}})
+    with pytest.raises(ParameterError, match=r"solids: .*unknown XY"):
+        leg_with_everything(solids={"XY": {}})
+
+
+def test_a_leg_that_locks_within_a_turn_says_where():
+    leg = load_geometry("klann")
+    with pytest.raises(GeometryError, match=r"dyad 1 \(B-H-P, .* does not close at crank angle [\d.]+ deg"):
+        leg.replace(lengths={"BH": 0.2})
+    rocks = leg.replace(lengths={"BH": 0.2}, full_turn=False)
+    assert np.isnan(rocks.pose(np.pi).points).any()
+
+
+def test_legs_of_two_structures_on_one_trunk_are_refused():
+    limbs = [Limb(load_geometry("identified")), Limb(load_geometry("jansen"), (0.5, 0.0))]
+    with pytest.raises(ParameterError, match=r"limbs\[1\].geometry: expected the mechanism of the first leg"):
+        TrunkEngine(limbs, Trunk(kind="free", height=1.6))
