@@ -21,7 +21,7 @@ BETWEEN_ANGLES = 1.05
 
 
 class Structure(NamedTuple):
-    """What the kernels of a leg are compiled for.
+    """The structure for which kernels are compiled.
 
     Attributes:
         mechanism: of the leg.
