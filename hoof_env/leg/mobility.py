@@ -44,8 +44,8 @@ def check_motion(geometry: Geometry) -> None:
     if not len(z):
         return
     _check_bodies(geometry.mechanism, z)
-    weld_angles(geometry)
     _check_rows(geometry.mechanism, z[:: -(-len(z) // RANKED)])
+    weld_angles(geometry)
 
 
 def _check_bodies(mechanism: Mechanism, z: NDArray[np.complex128]) -> None:
