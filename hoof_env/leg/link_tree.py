@@ -70,13 +70,13 @@ class LinkTree:
 
     @cached_property
     def loops(self) -> tuple[tuple[str, str, str], ...]:
-        """Pins that close loops, those outside the tree."""
-        carrier = self.carrier
+        """Pins that close loops, those outside the tree. Of several links at a point, each pair that others
+        hold together there already is left out: it would be held twice."""
+        held: dict[str, list[set[str]]] = {}
+        for link, parent, point in self.tree:
+            _join(held.setdefault(point, []), link, parent)
         return tuple(
-            (point, one, two)
-            # A pin of the tree is one between a link and its carrier, whichever way round
-            for point, one, two in self.pins
-            if carrier[one] != (two, point) and carrier.get(two) != (one, point)
+            (point, one, two) for point, one, two in self.pins if _join(held.setdefault(point, []), one, two)
         )
 
     @cached_property
@@ -122,6 +122,17 @@ def link_tree(mechanism: Mechanism, merge: bool = True) -> LinkTree:
             name = CRANK_LINK
         links[name] = tuple(sorted(members))
     return LinkTree(mechanism, links, tuple(_grow(mechanism.joints, links)))
+
+
+def _join(groups: list[set[str]], one: str, two: str) -> bool:
+    """Put the groups of two links together; return False if they are together already."""
+    mine = next((group for group in groups if one in group), {one})
+    others = next((group for group in groups if two in group), {two})
+    if mine is others:
+        return False
+    groups[:] = [group for group in groups if group is not mine and group is not others]
+    groups.append(mine | others)
+    return True
 
 
 def _link_of(links: dict[str, tuple[int, ...]]) -> dict[int, str]:

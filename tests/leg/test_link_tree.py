@@ -1,6 +1,7 @@
 """Links of a leg: what cannot move is one link, and hinges less closed loops leave the crank's freedom."""
 
 from collections import Counter
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -49,6 +50,35 @@ def test_forces_at_pins_are_sums_over_joints(mechanism):
         mine = sum((force for (_, one, _), force in forces.items() if one == link), np.zeros(2))
         others = sum((force for (_, _, two), force in forces.items() if two == link), np.zeros(2))
         assert mine - others == pytest.approx(total, abs=1e-12)
+
+
+def test_links_in_a_ring_at_one_point_are_not_held_twice():
+    """At Q the first and the last rod of a chain of four are sides of one triangle, which is one link."""
+    rods = ("OP", "CQ", "PQ", "OR", "QR", "CT", "QT")
+    dyads = {"Q": ("C", "P"), "R": ("O", "Q"), "T": ("C", "Q")}
+    mechanism = read_mechanism(
+        {
+            "fixed": ["O", "C"],
+            "crank": {"point": "P", "length": "OP"},
+            "points": [
+                {"point": point, "dyad": [*ends], "lengths": [f"{end}{point}" for end in ends]}
+                for point, ends in dyads.items()
+            ],
+            "bodies": [{"name": rod, "tail": rod[0], "head": rod[1]} for rod in rods],
+            "joints": [
+                *(["O", rod, "frame"] for rod in ("OP", "OR")),
+                *(["C", rod, "frame"] for rod in ("CQ", "CT")),
+                ["P", "OP", "PQ"],
+                *(["Q", one, two] for one, two in pairwise(("CQ", "PQ", "QR", "QT"))),
+                ["R", "OR", "QR"],
+                ["T", "CT", "QT"],
+            ],
+            "feet": ["R"],
+        }
+    )
+    tree = link_tree(mechanism)
+    assert (1, 5, 6) in tree.links.values()
+    assert len(tree.links) - 2 * len(tree.loops) == 1
 
 
 @pytest.mark.parametrize("name", ["hoof", "crank", "trunk", "swing", "x", "world"])
