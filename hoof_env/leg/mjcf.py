@@ -2,7 +2,7 @@
 
 The world's x points forward and its z up; what this package calls y is z there. Links are bodies of one tree,
 and loops are closed by `connect` constraints. URDF has no loops and cannot hold such a leg. Coordinates of
-the model are this package's where both have them: `crank` is theta, `swing` is phi, `x` and `z` are the place
+the model are this package's where both have them: `crank` and `swing` are their angles, `x` and `z` the place
 of O; hinges of all other links are 0 in the pose that is written, counter-clockwise if seen with x to the
 right.
 
