@@ -17,6 +17,7 @@ from hoof_env.dynamics.parts import (
     Drive,
     Limb,
     Mechanics,
+    Motor,
     Reactions,
     Result,
     Trunk,
@@ -29,9 +30,11 @@ from hoof_env.errors import (
     count,
     finite,
     one_of,
+    spread,
 )
 from hoof_env.gait import FilterSettings
 from hoof_env.ground.contact import Ground
+from hoof_env.simd.layout import views
 
 
 class EngineMemory(Mechanics):
@@ -218,6 +221,32 @@ class EngineMemory(Mechanics):
         kept = self._copy((*engine_states.STATE, "stride_sums", "result"))
         self._go(0)
         self._put(kept)
+
+    def push(self, forward: ArrayLike, upward: ArrayLike = 0.0, envs: ArrayLike | None = None) -> None:
+        """Push trunks: add an impulse at the trunk's centre of mass to the momentum of all bodies. Reports
+        show the new velocity from the next call on.
+
+        Args:
+            forward, upward: impulses [N s], one number, or one for each environment that is pushed.
+            envs: environments that are pushed, as indices or as a mask of shape (num_envs,); None is all.
+
+        Raises:
+            ParameterError: an impulse is not finite or of the wrong shape, the trunk is fixed, or a crank has
+                a motor, whose speed would change, too.
+        """
+        where = memory.which(envs, self.num_envs)
+        if self.trunk.kind == "fixed" or any(isinstance(limb.drive, Motor) for limb in self.limbs):
+            raise ParameterError("push: expected a trunk that moves, and prescribed cranks")
+        push = np.array([spread("forward", forward, where.shape), spread("upward", upward, where.shape)])
+        m = self._memory
+        moving = views(layout.Moving, m.trunk[layout.TrunkState.rows("moving")])
+        place = views(layout.TrunkReport, m.trunk_report).place[:, where]
+        if self.trunk.kind == "rail":
+            push[1] = 0.0
+        moving.momentum[:, where] += push
+        if self.trunk.kind == "free":
+            off = place - moving.centre[:, where]
+            moving.spin[where] += off[0] * push[1] - off[1] * push[0]
 
     def vary(
         self,

@@ -19,8 +19,12 @@ ADDRESSES = Addresses(
     "actions",
     "observations",
     "rewards",
+    "acted",
+    "past_actions",
+    "frames",
 )
-"""Arrays of a step; the first ones, to `reactions`, are `TrunkEngine.arrays` in their order."""
+"""Arrays of a step; the first ones, to `reactions`, are `TrunkEngine.arrays` in their order. `acted` are the
+actions that act now, the same array as `actions` where nothing delays them."""
 
 AT = ADDRESSES.slots
 BEGIN = ADDRESSES.begin

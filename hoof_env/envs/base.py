@@ -4,7 +4,7 @@ wrong time and for assignments without effect."""
 from __future__ import annotations
 
 import copy
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import gymnasium as gym
@@ -12,9 +12,10 @@ import numpy as np
 from gymnasium import spaces
 from gymnasium.envs.registration import EnvSpec
 from gymnasium.error import ClosedEnvironmentError, ResetNeeded
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from hoof_env.envs.batch import EpisodeBatch
+from hoof_env.envs.batch_pushes import push_now
 from hoof_env.envs.batch_reports import summaries_of
 from hoof_env.envs.batch_states import state_of
 from hoof_env.envs.conditions import CHANGEABLE
@@ -185,8 +186,8 @@ class LegBase(LegProperties):
         return {name: self._each(values) for name, values in figures.items()}
 
     def raw_observation(self) -> dict[str, Any]:
-        """Return the present observation before scaling, by name, in `observation_units`; in a vector
-        environment of shape (num_envs,).
+        """Return what is observed of the present, before scaling and without disturbances, by name, in
+        `observation_units`; in a vector environment of shape (num_envs,).
 
         Raises:
             ResetNeeded: there is no episode yet.
@@ -216,6 +217,27 @@ class LegBase(LegProperties):
             self.batch.body.action_for(gait, self.engine, self.batch.dt)
         )
         return actions
+
+    def push(self, forward: ArrayLike, upward: ArrayLike = 0.0, envs: ArrayLike | None = None) -> None:
+        """Push the trunk now, at its centre of mass; the next step shows its new velocity.
+
+        Args:
+            forward, upward: impulses [N s], one number, or one for each environment that is pushed.
+            envs: environments that are pushed, as indices or as a mask; None for all.
+
+        Raises:
+            ParameterError: an impulse is not finite or of another shape, or the trunk cannot be pushed: it is
+                fixed, or a motor turns the crank.
+            ResetNeeded: there is no episode yet.
+        """
+        self._check_started("push")
+        push_now(self.batch, forward, upward, envs)
+        for recording in self._recordings():
+            recording.replace()
+
+    def _recordings(self) -> Sequence[Any]:
+        """Return the recordings of the environments."""
+        raise NotImplementedError
 
     def _check_open(self, call: str) -> None:
         """Raise `ClosedEnvironmentError` after `close`; `call` is the name of the method."""

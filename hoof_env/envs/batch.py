@@ -17,8 +17,9 @@ from numba.core.errors import NumbaError
 from numpy.typing import NDArray
 
 from hoof_env.dynamics.parts import broken
-from hoof_env.envs.batch_build import check_choices, make_engine, task_record
+from hoof_env.envs.batch_build import check_choices, check_delays, make_engine, make_memory, task_record
 from hoof_env.envs.batch_kernels import BatchKernels
+from hoof_env.envs.batch_pushes import check_disturbances, push_due
 from hoof_env.envs.batch_starts import draw_targets, start
 from hoof_env.envs.conditions import (
     RowConditions,
@@ -29,12 +30,14 @@ from hoof_env.envs.conditions import (
 )
 from hoof_env.envs.outcome import MOVED
 from hoof_env.envs.paper_solver import PaperSolver, check_paper
-from hoof_env.envs.step import NOT_A_NUMBER, SOME_ENDED, SOME_SWITCHED
+from hoof_env.envs.step import NOT_A_NUMBER, SOME_ENDED, SOME_PUSHED, SOME_SWITCHED
 from hoof_env.errors import ParameterError, check_number
 from hoof_env.simd.threads import run_together
 from hoof_env.simd.user_functions import what_cannot_be_compiled
+from hoof_env.tasks.delays import Delay
+from hoof_env.tasks.disturbances import Push
 from hoof_env.tasks.episode import episode_layout
-from hoof_env.tasks.observation import check_groups, groups_of, observed
+from hoof_env.tasks.observation import check_groups, groups_of
 from hoof_env.tasks.parameters import (
     check_drift,
     check_parameters,
@@ -54,11 +57,14 @@ LONGEST_EPISODE = 1e6  # largest `episode_seconds` [s]
 COPIED = (
     "engine",
     "has_overrides",
+    "push_plans",
     "start_values",
     "episode",
     "actions",
     "observations",
     "rewards",
+    "frames",
+    "past_actions",
     "task_record",
 )
 """Attributes of an `EpisodeBatch` that change in place, which a copy must have for itself."""
@@ -67,6 +73,7 @@ FOUND_AGAIN = (
     "addresses",
     "_blocks",
     "entries",
+    "true_entries",
     "kernel",
     "measurements",
     "episode_rows",
@@ -87,10 +94,12 @@ class EpisodeBatch(BatchKernels):
         terms: keys of the reward's terms in infos.
         episode: memory of the episodes, rows as in `episode.Episode`, shape (rows, columns).
         actions, observations, rewards: input and output of a step, of shapes (columns, actions), (columns,
-            entries) and (columns,).
+            numbers) and (columns,).
+        frames, past_actions, acted: see `batch_build.make_memory`.
         task_record: constants of the task that the kernels read, shape (1,), see `episode.task_type`.
         start_values: the body's `start_names`, the gait, and the values drawn by `randomize`, shape (numbers,
             num_envs); NaN where a state does not contain them.
+        push_plans: pushes that were given for the present episode of each row, in the order of their times.
         conditions, changed: conditions of the rows, and a batch with the settings of the next episodes, None
             if `change` was not called.
         paper: solver of the paper, None with the engine's kernels.
@@ -126,6 +135,7 @@ class EpisodeBatch(BatchKernels):
         self.episode_rows.weight[:] = self.engine.weight
         # Columns without an environment never switch, so that they cause no draw.
         self.episode_rows.switch[:] = np.inf
+        self.episode_rows.push_at[:] = np.inf
         if not runs:
             return
         try:
@@ -137,6 +147,7 @@ class EpisodeBatch(BatchKernels):
         """Check the settings, and set the attributes that follow from them."""
         s = self.settings
         task = self.task
+        self.action_delay: Delay
         check_choices(s)
         self.randomize = {} if s.randomize is None else check_parameters("randomize", s.randomize, s)
         self.terrain = make_terrain(s.terrain)
@@ -162,6 +173,8 @@ class EpisodeBatch(BatchKernels):
         self.speed_changes = self.target_speed is not None and self.target_speed[0] < self.target_speed[1]
         shortest = self.dt if self.speed_changes else 0.0
         self.target_seconds = check_range("target_seconds", s.target_seconds, shortest)
+        check_disturbances(self)
+        check_delays(self)
         for group, needed in (("target", "target_speed"), ("ground", "terrain")):
             value = getattr(s, needed)
             if group in self.groups and value in (None, {}):
@@ -171,29 +184,23 @@ class EpisodeBatch(BatchKernels):
 
     def _allocate(self) -> None:
         """Make the arrays of all episodes."""
-        s = self.settings
         self.has_overrides = np.zeros(self.num_envs, bool)
+        self.push_plans: list[tuple[Push, ...]] = [()] * self.num_envs
         self.start_values = np.full((self.start_row_count + len(self.randomize), self.num_envs), np.nan)
-        self.names = [entry.name for entry in observed(self.groups, s.trunk, s.drive, self.task.entries)]
-        if not self.names:
-            raise ParameterError(f"observation: nothing of {s.observation!r} is observed on a fixed trunk")
         columns = self.engine.columns
         self.episode = np.zeros((self.layout.size, columns))
-        self.actions = np.zeros((columns, len(self.body.action_names)), np.float32)
-        self.observations = np.zeros((columns, len(self.names)), np.float32)
         self.rewards = np.zeros(columns)
+        make_memory(self)
         self.task_record = task_record(self)
+
+    start_row_count = property(lambda self: len(self.body.start_names) + len(self.body.gait_names))
+    """Number of the start values of an episode, without those drawn by `randomize`."""
 
     @property
     def layout(self) -> Any:
         """Layout of an episode's memory."""
         terms = len(self.task.terms)
         return episode_layout(self.body.kernels.episode, terms, self.engine.features, self.legs)
-
-    @property
-    def start_row_count(self) -> int:
-        """Number of the start values of an episode, without those drawn by `randomize`."""
-        return len(self.body.start_names) + len(self.body.gait_names)
 
     # Conditions
 
@@ -286,10 +293,13 @@ class EpisodeBatch(BatchKernels):
                 under_each(self, put_back, self._observe_broken)
             elif put_back.size:
                 self._observe_broken(put_back)
-        if happened & SOME_SWITCHED:
-            due = (self.episode_rows.steps >= self.episode_rows.switch)[: self.num_envs]
-            due = np.flatnonzero(due if idle is None else due & ~idle)
-            draw_targets(self, due, [generators[env] for env in due.tolist()])
+        rows = self.episode_rows
+        each = (SOME_SWITCHED, rows.switch, draw_targets), (SOME_PUSHED, rows.push_at, push_due)
+        for code, at, act in each:
+            if happened & code:
+                due = (rows.steps >= at)[: self.num_envs]
+                due = np.flatnonzero(due if idle is None else due & ~idle)
+                act(self, due, [generators[env] for env in due.tolist()])
         return bool(happened & SOME_ENDED)
 
     # State
@@ -307,6 +317,8 @@ class EpisodeBatch(BatchKernels):
     def __setstate__(self, state: dict[str, Any]) -> None:
         """Set the attributes, and find kernels and arrays of this process."""
         vars(self).update(state)
+        # A pickle keeps no identity of arrays that are equal.
+        self.acted = self.acted if self.past_actions.size else self.actions
         self.conditions = self.conditions.copied()
         self._open()
 
@@ -316,6 +328,7 @@ class EpisodeBatch(BatchKernels):
         vars(made).update(vars(self))
         for name in COPIED:
             setattr(made, name, copy.deepcopy(getattr(self, name), memo))
+        made.acted = made.actions if self.acted is self.actions else self.acted.copy()
         # The solver refers to the engine, and the kernel is a method of the batch: both to those of the copy.
         if self.paper:
             made.paper = copy.deepcopy(self.paper, memo | {id(self.engine): made.engine})

@@ -15,9 +15,11 @@ from hoof_env.dynamics.parts import LARGEST
 from hoof_env.dynamics.step_length import StepLength
 from hoof_env.dynamics.stepping import SCHEMES
 from hoof_env.envs.observation_kernel import slots_of
-from hoof_env.errors import check_choice, check_number
+from hoof_env.errors import ParameterError, check_choice, check_number
 from hoof_env.leg.profile import leg_profile
+from hoof_env.tasks.delays import check_delay, check_kept, parts_of
 from hoof_env.tasks.episode import ACTIONS, task_type
+from hoof_env.tasks.observation import check_groups, groups_of, observed
 from hoof_env.tasks.parameters import extremes
 from hoof_env.tasks.settings import Settings
 
@@ -112,7 +114,101 @@ def task_record(batch: Any) -> NDArray[Any]:
     task["observation_size"] = len(batch.names)
     # One kernel serves all choices of groups: it skips entries without a column.
     task["observation_columns"] = -1
+    task["privileged_columns"] = -1
+    frame = [entry.name for entry in batch.entries]
+    behind = len(batch.names) - len(batch.true_entries)
+    privileged = [entry.name for entry in batch.true_entries]
     for entry, slot in zip(entries, slots, strict=True):
-        if entry.name in batch.names:
-            task["observation_columns"][slot] = batch.names.index(entry.name)
+        if entry.name in frame:
+            task["observation_columns"][slot] = frame.index(entry.name)
+            task["noise"][slot] = batch.noise.get(entry.group, 0.0)
+            task["bias"][slot] = batch.bias.get(entry.group, 0.0)
+        if entry.name in privileged:
+            task["privileged_columns"][slot] = behind + privileged.index(entry.name)
+    task["is_noisy"] = bool(task["noise"].any() or task["bias"].any())
+    task["has_privileged"] = bool(privileged)
+    fill_delays(batch, task)
     return constants
+
+
+def fill_delays(batch: Any, task: Any) -> None:
+    """Fill in the part of the task's record that is about frames, actions and parts of a step."""
+    task["frame_size"] = len(batch.entries)
+    task["frames"] = batch.frames.shape[1]
+    task["first_frame"] = int(batch.observation_delay.substeps > 0)
+    task["history"] = batch.history
+    task["action_size"] = batch.actions.shape[1]
+    task["kept_actions"] = batch.past_actions.shape[1]
+    task["keeps_actions"] = bool(batch.past_actions.size)
+    task["last_actions"] = batch.last_actions
+    parts = parts_of(batch.substeps, batch.action_delay.substeps, batch.observation_delay.substeps)
+    task["parts"] = len(parts.substeps)
+    task["part_substeps"][: len(parts.substeps)] = np.array(parts.substeps) * batch.engine.substeps
+    task["acting_part"] = parts.acting
+    task["seeing_part"] = parts.seeing
+
+
+def check_delays(batch: Any) -> None:
+    """Check the settings of delays, histories and true numbers of an `EpisodeBatch`, and set the attributes
+    that follow from them.
+
+    Raises:
+        ParameterError: a setting is out of range.
+    """
+    s = batch.settings
+    for name in ("observation_delay", "action_delay"):
+        delay = check_delay(name, getattr(s, name), batch.substeps, batch.steps_per_episode)
+        if delay.substeps and s.solver == "paper":
+            raise ParameterError(
+                f'{name}: expected whole steps with solver="paper", got {getattr(s, name)!r}'
+            )
+        setattr(batch, name, delay)
+    batch.history = check_kept("observation_history", s.observation_history, 1)
+    batch.last_actions = check_kept("last_actions", s.last_actions, 0)
+    batch.privileged = ()
+    if len(s.privileged):
+        batch.privileged = check_groups(s.privileged, groups_of(batch.task.entries), "privileged")
+
+
+def find_entries(batch: Any) -> None:
+    """Find the entries that an `EpisodeBatch` observes, and those of which it observes the true numbers."""
+    s = batch.settings
+    for name, groups in (("entries", batch.groups), ("true_entries", batch.privileged)):
+        setattr(batch, name, observed(groups, s.trunk, s.drive, batch.task.entries))
+
+
+def _ago(steps: int) -> str:
+    return "1 step ago" if steps == 1 else f"{steps} steps ago"
+
+
+def make_memory(batch: Any) -> None:
+    """Make the arrays of an `EpisodeBatch` that hold actions and observations, and name its columns.
+
+    `frames`, shape (columns, number, entries), are observations of one instant each, `past_actions`, shape
+    (columns, number, actions), the last actions; both the newest first, and empty if none are kept. `acted`
+    are the actions that act now, shape (columns, actions); it is `actions` where nothing delays them.
+    """
+    find_entries(batch)
+    frame = [entry.name for entry in batch.entries]
+    if not frame:
+        raise ParameterError(f"observation: nothing of {list(batch.groups)} is observed on a fixed trunk")
+    actions = batch.body.action_names
+    batch.names = [
+        *frame,
+        *(f"{name}, {_ago(k)}" for k in range(1, batch.history) for name in frame),
+        *(f"action {_ago(k)}: {name}" for k in range(1, batch.last_actions + 1) for name in actions),
+        *(f"true {entry.name}" for entry in batch.true_entries),
+    ]
+    columns = batch.engine.columns
+    batch.actions = np.zeros((columns, len(actions)), np.float32)
+    batch.observations = np.zeros((columns, len(batch.names)), np.float32)
+    delay = batch.observation_delay
+    kept = int(delay.substeps > 0) + delay.most + batch.history
+    # One frame that is not kept is the observation itself; with anything behind it, it has columns in it.
+    has_frames = kept > 1
+    batch.frames = np.zeros((columns, kept if has_frames else 0, len(frame)), np.float32)
+    delay = batch.action_delay
+    keeps_actions = bool(delay.most or delay.substeps or batch.last_actions)
+    kept = max(delay.most + 1, batch.last_actions) if keeps_actions else 0
+    batch.past_actions = np.zeros((columns, kept, len(actions)), np.float32)
+    batch.acted = np.zeros_like(batch.actions) if keeps_actions else batch.actions

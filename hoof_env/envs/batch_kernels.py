@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from hoof_env.dynamics.engine import TrunkEngine
 from hoof_env.dynamics.form import engine_layout
 from hoof_env.envs.addresses import ADDRESSES, END
+from hoof_env.envs.batch_build import find_entries
 from hoof_env.envs.conditions import (
     under_each,
 )
@@ -17,7 +18,7 @@ from hoof_env.envs.infos import InfoLayout
 from hoof_env.envs.step import NOT_A_NUMBER, step_kernels
 from hoof_env.gait import GaitParameters
 from hoof_env.simd.layout import views
-from hoof_env.tasks.observation import MIDDLE, observed
+from hoof_env.tasks.observation import MIDDLE
 
 Floats = NDArray[np.float64]
 
@@ -49,14 +50,17 @@ class BatchKernels:
     layout: Any
     episode: Any
     task_record: Any
+    entries: Any
     actions: Any
+    acted: Any
+    past_actions: Any
+    frames: Any
     observations: Any
     rewards: Any
 
     def _open(self) -> None:
         """Find the kernels, and the addresses of the arrays in this process."""
-        s = self.settings
-        self.entries = observed(self.groups, s.trunk, s.drive, self.task.entries)
+        find_entries(self)
         self.measurements = InfoLayout(self.engine.features, self.body.leg_prefixes)
         self.kernels = k = step_kernels(
             self.task.terms, self.task.entries, self.task.contact_law, self.engine.features, self.body.kernels
@@ -82,6 +86,9 @@ class BatchKernels:
             self.actions,
             self.observations,
             self.rewards,
+            self.acted,
+            self.past_actions,
+            self.frames,
         )
         self.addresses = ADDRESSES.of(*arrays, columns=range(self.engine.columns))
         # A block of columns for each thread; the paper's solver runs on one, with all of them.
@@ -130,8 +137,9 @@ class BatchKernels:
         return happened
 
     def measured(self) -> dict[str, Floats]:
-        """Return the present observation before scaling: entries by name, shape (num_envs,) each."""
-        out = np.zeros((len(self.names), self.num_envs))
+        """Return what is observed, true and before scaling: entries by name, shape (num_envs,) each."""
+        names = [entry.name for entry in self.entries]
+        out = np.zeros((len(names), self.num_envs))
         if self.conditions.are_mixed:
             # The kernel measures all rows; only those under the present conditions are right.
             def measure(rows: NDArray[np.int64]) -> None:
@@ -142,7 +150,7 @@ class BatchKernels:
             under_each(self, np.arange(self.num_envs), measure)
         else:
             self.kernels.observers.measure_one(self.addresses, out)
-        return dict(zip(self.names, out, strict=True))
+        return dict(zip(names, out, strict=True))
 
     def alone(self, env: int) -> TrunkEngine:
         """Make an engine of one environment, under the conditions of the environment `env`."""

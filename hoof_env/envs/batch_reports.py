@@ -12,7 +12,7 @@ from hoof_env.dynamics.layout import stride_sums
 from hoof_env.dynamics.names import NamedColumns
 from hoof_env.dynamics.parts import Result, broken
 from hoof_env.envs.infos import name_columns
-from hoof_env.tasks.episode import FAILED
+from hoof_env.tasks.episode import FAILED, TRUNCATED
 
 Floats = NDArray[np.float64]
 
@@ -61,8 +61,9 @@ def summaries_of(batch: Any, envs: Sequence[int] | NDArray[np.int64]) -> dict[st
     time), stance_peak_sum_n, stances, loading_rate_n_s (mean over stances), duty_factor,
     positive_work_j (braking is not recovered), cost_of_transport (work per weight and distance; infinite
     without forward progress), weight_share (mean normal force over weight: the leg's share), support_share
-    (the rest: the share of rail or suspension), slip_m (mean over stances), failed (0 or 1). A horse's mean
-    force and sum of peaks are sums over its legs, its duty factor is the mean of its legs.
+    (the rest: the share of rail or suspension), slip_m (mean over stances), failed (0 or 1), success (0 or 1,
+    see `SUCCESS_SPEED`). A horse's mean force and sum of peaks are sums over its legs, its duty factor is the
+    mean of its legs.
     """
     seconds = batch.episode_rows.time[envs]
     distance = batch.episode_rows.distance[envs]
@@ -95,7 +96,39 @@ def summaries_of(batch: Any, envs: Sequence[int] | NDArray[np.int64]) -> dict[st
         "weight_share": mean / weight,
         "support_share": 1 - mean / weight,
         "failed": (batch.episode_rows.ended[envs] == FAILED).astype(np.float64),
+        "success": is_success(batch, envs).astype(np.float64),
     }
+
+
+SUCCESS_SPEED = 0.9
+"""Least distance of a successful episode over the commanded distance, where a speed is commanded [-]."""
+
+
+def is_success(batch: Any, envs: Sequence[int] | NDArray[np.int64]) -> NDArray[np.bool_]:
+    """Return a mask of the environments whose episodes ended at the time limit, at `SUCCESS_SPEED` of the
+    commanded speed or more, in the mean; where a target is only the speed up to which progress is paid, it
+    counts as commanded."""
+    lasted = batch.episode_rows.ended[envs] == TRUNCATED
+    commanded = batch.episode_rows.commanded[envs]
+    asked = SUCCESS_SPEED * np.where(np.isfinite(commanded), commanded, -np.inf)
+    successful: NDArray[np.bool_] = lasted & (batch.episode_rows.distance[envs] >= asked)
+    return successful
+
+
+TIME_LIMIT = "time limit"
+"""Value of `info["end"]` of an episode that did not fail."""
+
+
+def end_of(batch: Any, env: int) -> str:
+    """Return why an episode ended, in words."""
+    return failure_of(batch, env) if batch.episode_rows.ended[env] == FAILED else TIME_LIMIT
+
+
+def ending_of(batch: Any, env: int) -> dict[str, Any]:
+    """Return the entries of the info of one environment whose episode ends."""
+    summary = summary_of(batch, env)
+    ending = {"episode_summary": summary, "end": end_of(batch, env), "is_success": bool(summary["success"])}
+    return ending | ({"failure": ending["end"]} if summary["failed"] else {})
 
 
 def failure_of(batch: Any, env: int) -> str:
@@ -122,9 +155,14 @@ def endings_of(batch: Any, done: NDArray[np.bool_], terminated: NDArray[np.bool_
         figures[f"_{name}"] = done.copy()
         figures[name][done] = values
     endings = {"episode_summary": figures, "_episode_summary": done.copy()}
+    ends = np.full(batch.num_envs, None, dtype=object)
+    for env in np.flatnonzero(done).tolist():
+        ends[env] = end_of(batch, env)
+    success = is_success(batch, np.arange(batch.num_envs)) & done
+    endings |= {"end": ends, "_end": done.copy(), "is_success": success, "_is_success": done.copy()}
     if terminated.any():
         reasons = np.full(batch.num_envs, None, dtype=object)
         for env in np.flatnonzero(terminated).tolist():
-            reasons[env] = failure_of(batch, env)
+            reasons[env] = ends[env]
         endings |= {"failure": reasons, "_failure": terminated.copy()}
     return endings

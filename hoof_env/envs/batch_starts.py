@@ -13,7 +13,9 @@ from hoof_env.constants import GRAVITY
 from hoof_env.dynamics.advance import LANES
 from hoof_env.envs.addresses import BEGIN, END
 from hoof_env.envs.batch_build import substeps_under
+from hoof_env.envs.batch_pushes import begin_disturbances, check_can_be_pushed
 from hoof_env.errors import ParameterError
+from hoof_env.tasks.disturbances import check_pushes
 from hoof_env.tasks.parameters import draw_parameters, extremes
 from hoof_env.tasks.reward import BEARING, LONGEST_STRIDE
 
@@ -41,6 +43,11 @@ def check_options(batch: Any, options: Any) -> dict[str, Any]:
             f"options['gait']: expected one gait or {batch.num_envs}, one for each environment, got"
             f" {len(gaits)}"
         )
+    if "pushes" in checked:
+        given = check_pushes("options['pushes']", checked["pushes"], batch.dt, batch.steps_per_episode)
+        if given:
+            check_can_be_pushed("options['pushes']", batch, any(upward for _, _, upward in given))
+        checked["pushes"] = given
     check_extremes(batch, batch.randomize | checked.get("parameters", {}))
     return checked
 
@@ -83,14 +90,43 @@ def start(
     if np.ndim(gaits) == 2:
         options = {**options, "gait": gaits[which]}
     start = batch.body.draw(options, generators, batch.engine)
-    episode.steps[which] = 0.0
-    episode.time[which] = 0.0
-    episode.distance[which] = 0.0
-    episode.sums[:, which] = 0.0
+    for row in (episode.steps, episode.time, episode.distance, episode.commanded, episode.ended):
+        row[which] = 0.0
     batch.rewards[which] = 0.0
     # The full allowance: a leg can bear its weight from the first step on.
     episode.allowance[which] = BEARING * LONGEST_STRIDE
     episode.terms[:, which] = 0.0
+    episode.sums[:, which] = 0.0
+    begin_targets(batch, which, generators, options)
+    begin_disturbances(batch, which, generators, options)
+    batch.body.complete_start(start, episode.target[which], options, batch.engine)
+    batch.engine.reset(start.commands, start.theta, envs=which, **start.trunk)
+    start_values = [*(start.values[name] for name in batch.body.start_names), *start.gaits.T]
+    batch.start_values[:, which] = [*start_values, *(drawn[name] for name in batch.randomize)]
+    episode.x_before[which] = start.trunk["x"]
+    batch.body.begin_episodes(episode, which, start)
+    if batch.paper:
+        batch.paper.start(which.tolist(), start.gaits, *(start.values[name] for name in ("crank_angle", "x")))
+    # Whole groups of lanes, from that of the first environment to that of the last: kernels take no parts.
+    groups = batch.addresses.copy()
+    groups[BEGIN] = which.min() // LANES * LANES
+    groups[END] = min(batch.engine.columns, (which.max() // LANES + 1) * LANES)
+    batch.observe_kernel(groups)
+    if batch.frames.size or batch.past_actions.size:
+        fill_past(batch, which)
+        # Again, with what the first one saw as all that was ever seen.
+        batch.observe_kernel(groups)
+    return drawn
+
+
+def begin_targets(
+    batch: Any,
+    which: NDArray[np.int64],
+    generators: Sequence[np.random.Generator],
+    options: Mapping[str, Any],
+) -> None:
+    """Draw or set the first commanded speeds of some rows."""
+    episode = batch.episode_rows
     episode.target[which] = np.inf
     episode.switch[which] = np.inf
     if batch.target_speed:
@@ -102,21 +138,12 @@ def start(
     if "target_speed" in options:
         episode.target[which] = options["target_speed"]
         episode.switch[which] = np.inf
-    batch.body.complete_start(start, episode.target[which], options, batch.engine)
-    batch.engine.reset(start.commands, start.theta, envs=which, **start.trunk)
-    start_values = [*(start.values[name] for name in batch.body.start_names), *start.gaits.T]
-    batch.start_values[:, which] = [*start_values, *(drawn[name] for name in batch.randomize)]
-    episode.x_before[which] = start.trunk["x"]
-    episode.ended[which] = 0.0
-    batch.body.begin_episodes(episode, which, start)
-    if batch.paper:
-        batch.paper.start(which.tolist(), start.gaits, start.values["crank_angle"], start.values["x"])
-    # Whole groups of lanes, from that of the first environment to that of the last: kernels take no parts.
-    groups = batch.addresses.copy()
-    groups[BEGIN] = which.min() // LANES * LANES
-    groups[END] = min(batch.engine.columns, (which.max() // LANES + 1) * LANES)
-    batch.observe_kernel(groups)
-    return drawn
+
+
+def fill_past(batch: Any, which: NDArray[np.int64]) -> None:
+    """Fill what some rows keep of before with their first frame, and with zeros for actions."""
+    batch.past_actions[which] = 0.0
+    batch.frames[which] = batch.frames[which, :1]
 
 
 def vary(batch: Any, env: int, values: Mapping[str, float]) -> None:

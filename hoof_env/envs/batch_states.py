@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hoof_env.errors import ParameterError
+from hoof_env.tasks.disturbances import Push
 
 Floats = NDArray[np.float64]
 
@@ -26,6 +27,11 @@ def state_of(batch: Any) -> dict[str, Any]:
         )
     state = {"engine": batch.engine.get_state(), "episode": batch.episode[:, : batch.num_envs].copy()}
     state["start_values"] = batch.start_values.copy()
+    # As they were seen: a push since then shows in the state alone.
+    state["observations"] = batch.observations[: batch.num_envs].copy()
+    state |= {name: getattr(batch, name)[: batch.num_envs].copy() for name in kept_arrays(batch)}
+    if any(batch.push_plans):
+        state["pushes"] = [*batch.push_plans]
     return state | ({"paper": batch.paper.get_state()} if batch.paper else {})
 
 
@@ -60,6 +66,8 @@ def spread_state(batch: Any, state: Mapping[str, Any]) -> dict[str, Any]:
         parts = {name: repeated(values) for name, values in engine.items() if name != "layout"}
         spread = {**state, "engine": {**parts, "layout": {**layout, "num_envs": n}}}
         spread |= {name: repeated(state[name]) for name in ("episode", "start_values") if name in state}
+        of_rows = ("pushes", "observations", "frames", "past_actions")
+        spread |= {name: [*state[name]] * n for name in of_rows if name in state}
         if "paper" in state:
             paper = state["paper"]
             spread["paper"] = {"legs": [*paper["legs"]] * n} | {
@@ -107,14 +115,60 @@ def set_state(batch: Any, state: Mapping[str, Any]) -> None:
             f"state['start_values']: expected numbers, shape {batch.start_values.shape}, got"
             f" {state['start_values']!r:.60}"
         )
+    plans = _read_plans(batch, state.get("pushes"))
+    seen = {name: _read_seen(batch, name, state.get(name)) for name in ("observations", *kept_arrays(batch))}
     of_paper = batch.paper.read_state(state.get("paper")) if batch.paper else None
     batch.engine.set_state(state["engine"])
     if batch.paper and of_paper:
         batch.paper.set_state(*of_paper)
     batch.episode[:, : batch.num_envs] = episode
     batch.start_values[:] = start_values
+    batch.push_plans = plans
     # The state's engine may have drawn parameters, which the next reset must replace.
     batch.has_overrides[:] = True
     if batch.conditions.all:
         batch.conditions.start(np.arange(batch.num_envs))
     batch.observe_kernel(batch.addresses)
+    for name, values in seen.items():
+        if values is not None:
+            getattr(batch, name)[: batch.num_envs] = values
+
+
+def kept_arrays(batch: Any) -> list[str]:
+    """Return the names of the arrays in which a batch keeps frames and actions, if it does."""
+    return [name for name in ("frames", "past_actions") if getattr(batch, name).size]
+
+
+def _read_plans(batch: Any, given: Any) -> list[tuple[Push, ...]]:
+    """Return the pushes that are given in a state for each row.
+
+    Raises:
+        ParameterError: not such pushes.
+    """
+    if given is None:
+        return [()] * batch.num_envs
+    try:
+        plans = [tuple((int(at), float(x), float(y)) for at, x, y in plan) for plan in given]
+    except (TypeError, ValueError, OverflowError):
+        plans = []
+    if len(plans) != batch.num_envs or not np.isfinite([push for plan in plans for push in plan]).all():
+        raise ParameterError(f"state['pushes']: expected the pushes of each environment, got {given!r:.60}")
+    return plans
+
+
+def _read_seen(batch: Any, name: str, given: Any) -> NDArray[np.float32] | None:
+    """Return what was observed or asked for in a state; None for observations of an older version's state.
+
+    Raises:
+        ParameterError: numbers out of range, or another shape.
+    """
+    if given is None and name == "observations":
+        return None
+    expected = (batch.num_envs, *getattr(batch, name).shape[1:])
+    try:
+        values = np.asarray(given, np.float32)
+    except (TypeError, ValueError):
+        values = np.array(np.nan, np.float32)
+    if values.shape != expected or not (np.abs(values) <= 1.0).all():
+        raise ParameterError(f"state[{name!r}]: expected numbers in [-1, 1], shape {expected}")
+    return values

@@ -18,7 +18,19 @@ from numpy.typing import NDArray
 
 Conditions = dict[str, Any]
 
-CHANGEABLE = ("target_speed", "target_seconds", "terrain", "reward_weights", "randomize")
+CHANGEABLE = (
+    "target_speed",
+    "target_seconds",
+    "terrain",
+    "reward_weights",
+    "randomize",
+    "noise",
+    "bias",
+    "push_impulse",
+    "push_seconds",
+    "pushes",
+    "strength",
+)
 """Settings that may change: none of them changes the observation's entries, the meaning of actions, or the
 length of an episode."""
 
@@ -32,6 +44,12 @@ OF_BATCH = (
     "target_speed",
     "speed_changes",
     "target_seconds",
+    "noise",
+    "bias",
+    "push_impulse",
+    "push_seconds",
+    "given_pushes",
+    "strength",
     "task_record",
 )
 OF_ENGINE = ("terrain", "substeps", "step_limits", "_model")
@@ -161,4 +179,5 @@ def _arrays(batch: Any) -> tuple[list[NDArray[Any]], list[NDArray[Any]]]:
     on the first."""
     data, _, _, _, _, reactions = batch.engine.arrays
     by_column = [data, batch.episode, *([reactions] if reactions.size else [])]
-    return by_column, [batch.observations, batch.rewards]
+    by_row = [batch.observations, batch.rewards, batch.past_actions, batch.frames]
+    return by_column, by_row if batch.acted is batch.actions else [*by_row, batch.acted]

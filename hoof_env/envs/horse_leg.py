@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from hoof_env.dynamics.parts import broken
 from hoof_env.envs.arguments import EnvArguments, takes
 from hoof_env.envs.base import LegBase, array_of, generator_of
-from hoof_env.envs.batch_reports import failure_of, summary_of
+from hoof_env.envs.batch_reports import ending_of
 from hoof_env.envs.batch_starts import check_options
 from hoof_env.envs.batch_states import check_single, set_state
 from hoof_env.envs.infos import name_columns
@@ -105,6 +105,9 @@ class HorseLegEnv(LegBase, gym.Env[NDArray[np.float32], NDArray[np.float32]]):
             self._recording = Recording(self.batch)
         return self._recording.last()
 
+    def _recordings(self) -> list[Recording]:
+        return [] if self._recording is None else [self._recording]
+
     # Gymnasium
 
     def reset(
@@ -152,7 +155,7 @@ class HorseLegEnv(LegBase, gym.Env[NDArray[np.float32], NDArray[np.float32]]):
 
         Returns:
             Observation, reward, terminated, truncated, and the info with the terms of the reward by name; at
-            the end of an episode also "episode_summary" and, if it failed, "failure". Later steps warn.
+            the end of an episode also what `ending_of` gives. Later steps warn.
 
         Raises:
             ParameterError: the action has a wrong shape or is not finite; nothing has happened then.
@@ -182,9 +185,7 @@ class HorseLegEnv(LegBase, gym.Env[NDArray[np.float32], NDArray[np.float32]]):
             truncated = not failed
             if self._phase == "running":
                 self._phase = "ended"
-            info["episode_summary"] = summary_of(self.batch, 0)
-            if failed:
-                info["failure"] = failure_of(self.batch, 0)
+            info |= ending_of(self.batch, 0)
             if broken(self.batch.engine.results)[0]:  # the step was taken back: it has no sums
                 info["measured"][self.batch.measurements.last_step] = 0.0
         if self._recording is not None:
@@ -230,7 +231,7 @@ class HorseLegEnv(LegBase, gym.Env[NDArray[np.float32], NDArray[np.float32]]):
 
     def render(self) -> NDArray[np.uint8] | None:
         """Draw the present state, a uint8 array of shape (H, W, 3) or a window; warn without a mode."""
-        if self.render_mode is None:
+        if self.render_mode is None or self._recording is None:
             gym.logger.warn("render() was called without a render_mode: pass 'rgb_array' or 'human'")
             return None
         self._check_started("render")

@@ -161,7 +161,8 @@ class HorsePage(BodyPage):
     def settings(self, s: Settings, defaults: Mapping[str, str]) -> list[tuple[str, ...]]:
         """Return the rows of the settings that a horse accepts, with those defaults."""
         of_horse = TABLES["horse_settings"]
-        contexts = (s, replace(s, hoof_stiffness=None))  # some settings need a rigid hoof
+        # Some settings need a rigid hoof, or pushes.
+        contexts = (s, replace(s, hoof_stiffness=None), replace(s, push_impulse=1.0))
         rows: list[tuple[str, ...]] = []
         for name, cells in TABLES["settings"].items():
             if name not in horse.LEG_ONLY_SETTINGS and any(_can_be(name, each) for each in contexts):

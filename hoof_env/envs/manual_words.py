@@ -11,15 +11,17 @@ from typing import Any
 from hoof_env.dynamics.constrained import INTEGRATORS
 from hoof_env.dynamics.parts import ONE_LEG
 from hoof_env.dynamics.stepping import SCHEMES
+from hoof_env.envs.batch_reports import SUCCESS_SPEED
 from hoof_env.gait import WIDEST, FilterSettings
 from hoof_env.ground.laws import FRICTION_LAWS, NORMAL_LAWS
 from hoof_env.leg.geometry import preset_names
 from hoof_env.tasks import horse, leg_starts
+from hoof_env.tasks.body_settings import About
 from hoof_env.tasks.horse_gaits import FASTEST, FOLLOWED, SIZES, horse_gaits
 from hoof_env.tasks.one_leg import CARRIED
-from hoof_env.tasks.parameters import SPACING
+from hoof_env.tasks.parameters import BUMPS, SPACING
 from hoof_env.tasks.reward import BEARING, LONGEST_STRIDE
-from hoof_env.tasks.settings import ABOUT, About
+from hoof_env.tasks.settings import ABOUT
 
 HERE = Path(__file__).parent
 
@@ -42,6 +44,7 @@ def tables() -> dict[str, dict[str, Any]]:
         "lowest": leg_starts.LOWEST,
         "highest": leg_starts.HIGHEST,
         "spacing": SPACING,
+        "bumps": BUMPS,
         "margin": leg_starts.MARGIN,
         "start_speed": leg_starts.START_SPEED,
         "horse_mass": horse.MASS,
@@ -59,6 +62,7 @@ def tables() -> dict[str, dict[str, Any]]:
         "carried": round(100 * CARRIED),
         "crank_bound": FilterSettings().crank_rate,
         "swing_bound": FilterSettings().swing_rate,
+        "success_speed": SUCCESS_SPEED,
         "bearing": BEARING,
         "full_allowance": BEARING * LONGEST_STRIDE,
     }

@@ -9,11 +9,13 @@ from typing import Any
 from hoof_env.dynamics.advance import LANES, MODEL
 from hoof_env.dynamics.layout import Features
 from hoof_env.envs.addresses import AT, BEGIN, END, memories
-from hoof_env.simd import rows, set_lane, write
+from hoof_env.envs.frames_kernel import publisher
+from hoof_env.simd import full_like, rows, set_lane, where, write
 from hoof_env.simd.compile import inline_llvm, inline_source, kernel
 from hoof_env.simd.kept import Kept, Kernels
 from hoof_env.simd.math import clip, tanh
-from hoof_env.simd.memory import address, doubles, matrix_at, record_at, singles_at
+from hoof_env.simd.memory import address, doubles, matrix_at, offset, record_at, singles_at
+from hoof_env.simd.noise import uniform
 from hoof_env.simd.reach import fingerprint
 from hoof_env.simd.user_functions import number_of
 from hoof_env.tasks.body import BodyKernels
@@ -30,6 +32,12 @@ def slots_of(entries: tuple[Entry, ...]) -> tuple[list[int], int, int]:
     slots = {k: slot for slot, k in enumerate(saturating)}
     slots |= {k: vectors * LANES + slot for slot, k in enumerate(others)}
     return [slots[k] for k in range(len(entries))], vectors, vectors * LANES + len(others)
+
+
+def room_of(slots: int) -> int:
+    """Return the room for the numbers of all slots, whole vectors, so that what follows is aligned, too. An
+    observation needs it twice."""
+    return -(-slots // LANES) * LANES
 
 
 def _with_entries(entries: tuple[Entry, ...], layouts: Memories, scaled: bool) -> Callable[..., Any]:
@@ -147,6 +155,7 @@ def _made(entries: tuple[Entry, ...], terms: int, features: Features, body: Body
     """Make the kernels; numba compiles them when they are called."""
     layouts = memories_of(body.episode, terms, features, body.legs)
     slots = slots_of(entries)[2]
+    room = room_of(slots)
     task_record = task_type(terms, slots, layouts.gait, body.task_fields)
     flags = [(entry.scalar, entry.scale.saturates) for entry in entries], (terms, features, body.legs)
     parts = [part for entry in entries for part in functions_of(entry)]
@@ -159,9 +168,9 @@ def _made(entries: tuple[Entry, ...], terms: int, features: Features, body: Body
     @inline_source
     def observe_all(addresses, lanes):  # type: ignore[no-untyped-def]
         task = task_at(addresses[AT.task])[0]
-        memory = doubles(slots * lanes)
+        memory = doubles(2 * room * lanes)
         for n in range(addresses[BEGIN], addresses[END], lanes):
-            observe(addresses, lanes, task, n, memory)
+            observe(addresses, lanes, task, n, memory, 0)
 
     def observe_one(addresses):  # type: ignore[no-untyped-def]
         observe_all(addresses, 1)
@@ -200,33 +209,103 @@ def _inputs(layouts: Memories) -> Callable[..., Any]:
     return inputs_of
 
 
-def _observe(
-    entries: tuple[Entry, ...], layouts: Memories, inputs_of: Callable[..., Any]
-) -> Callable[..., Any]:
-    """Return a part of kernels that writes the observation of row n and, with lanes, of its neighbours."""
-    _, vectors, slots = slots_of(entries)
-    put_scaled = _with_entries(entries, layouts, scaled=True)
+def _add_noise(slots: int, layouts: Memories) -> Callable[..., Any]:
+    """Return a part of kernels that adds noise and bias to the numbers in all slots, before they saturate."""
 
     @inline_source
-    def observe(addresses, lanes, task, n, memory):  # type: ignore[no-untyped-def]
-        numbers = rows(memory, lanes, None)
-        # Entries that are not observed, and the slots that fill up vectors, also go through tanh.
+    def add_noise(addresses, lanes, task, n, numbers, ahead):  # type: ignore[no-untyped-def]
+        _, _, episode = memories(addresses, lanes, layouts, n)
+        key = full_like(numbers, episode.noise_key)
+        now = full_like(numbers, episode.steps + ahead)
+        strength = full_like(numbers, episode.strength)
         for slot in range(slots):
-            numbers[slot] = 0.0
-        put_scaled(addresses, lanes, inputs_of(addresses, lanes, task, n), numbers, n)
+            if task.noise[slot] + task.bias[slot] > 0.0:
+                # A bias is the noise of a time that never comes.
+                error = task.noise[slot] * uniform(key, now, slot)
+                error = error + task.bias[slot] * uniform(key, -1.0, slot)
+                numbers[slot] = numbers[slot] + strength * error
+
+    return add_noise
+
+
+def _saturate(vectors: int) -> Callable[..., Any]:
+    """Return a part of kernels that takes tanh of the first vectors of slots."""
+
+    @inline_llvm
+    def saturate(memory, lanes):  # type: ignore[no-untyped-def]
         # All entries that saturate come first, so that one environment takes their tanh in vectors, too.
         if lanes == 1:
             together = rows(memory, LANES, None)
             for k in range(vectors):
                 together[k] = tanh(together[k])
         else:
+            numbers = rows(memory, lanes, None)
             for k in range(vectors * LANES):
                 numbers[k] = tanh(numbers[k])
+
+    return saturate
+
+
+def _write_true(slots: int, saturate: Callable[..., Any]) -> Callable[..., Any]:
+    """Return a part of kernels that observes true numbers, of which `spare` is room for a copy."""
+
+    @inline_source
+    def write_true(addresses, lanes, task, n, numbers, spare):  # type: ignore[no-untyped-def]
+        true_numbers = rows(spare, lanes, None)
+        for slot in range(slots):
+            true_numbers[slot] = numbers[slot]
+        saturate(spare, lanes)
         observations = singles_at(addresses[AT.observations])
         size = task.observation_size
         for slot in range(slots):
+            column = task.privileged_columns[slot]
+            if column >= 0:
+                write(clip(true_numbers[slot], 1.0), observations, n * size + column, size)
+
+    return write_true
+
+
+def _observe(
+    entries: tuple[Entry, ...], layouts: Memories, inputs_of: Callable[..., Any]
+) -> Callable[..., Any]:
+    """Return a part of kernels that writes the observation of row n and, with lanes, of its neighbours. Its
+    last argument is 0 at the end of a control step, 1 within it: then only a frame is kept."""
+    _, vectors, slots = slots_of(entries)
+    put_scaled = _with_entries(entries, layouts, scaled=True)
+    add_noise = _add_noise(slots, layouts)
+    publish = publisher(layouts)
+    room = room_of(slots)
+    saturate = _saturate(vectors)
+    write_true = _write_true(slots, saturate)
+
+    @inline_source
+    def observe(addresses, lanes, task, n, memory, within):  # type: ignore[no-untyped-def]
+        numbers = rows(memory, lanes, None)
+        # Entries that are not observed, and the slots that fill up vectors, also go through tanh.
+        for slot in range(slots):
+            numbers[slot] = 0.0
+        put_scaled(addresses, lanes, inputs_of(addresses, lanes, task, n), numbers, n)
+        if task.has_privileged and within == 0:
+            write_true(addresses, lanes, task, n, numbers, offset(memory, room * lanes))
+        if task.is_noisy:
+            add_noise(addresses, lanes, task, n, numbers, within)
+        saturate(memory, lanes)
+        to = singles_at(addresses[AT.observations])
+        size = task.observation_size
+        begin = n * size
+        if task.frames > 0:
+            to = singles_at(addresses[AT.frames])
+            size = task.frames * task.frame_size
+            begin = n * size + within * task.frame_size
+        for slot in range(slots):
             column = task.observation_columns[slot]
             if column >= 0:
-                write(clip(numbers[slot], 1.0), observations, n * size + column, size)
+                number = clip(numbers[slot], 1.0)
+                # A state within a step that cannot be simulated is observed again only at its end.
+                if within > 0:
+                    number = where(number == number, number, 0.0)
+                write(number, to, begin + column, size)
+        if within == 0:
+            publish(addresses, lanes, task, n)
 
     return observe

@@ -83,14 +83,15 @@ def add_up(outcome, episode, layouts):  # type: ignore[no-untyped-def]
     """Add the step to the sums of the episode."""
     episode.time = episode.time + outcome.seconds
     episode.distance = episode.distance + outcome.progress
+    episode.commanded = episode.commanded + outcome.commanded_progress
     for k in range(layouts.sums):
         episode.sums[k] = put_together(layouts, k, episode.sums[k], outcome.sums[k])
 
 
 @inline_llvm
 def decide(task, outcome, episode):  # type: ignore[no-untyped-def]
-    """Count the step, and return masks of the rows in which the episode ends, and in which another speed is
-    commanded from the next step on."""
+    """Count the step, and return masks of the rows in which the episode ends, in which another speed is
+    commanded from the next step on, and in which the trunk is pushed after this step."""
     steps = episode.steps + 1.0
     late = where(steps >= task.episode_steps, float(TRUNCATED), 0.0)
     # A failure in the last step counts as a failure, not as the end of the time.
@@ -99,7 +100,7 @@ def decide(task, outcome, episode):  # type: ignore[no-untyped-def]
     episode.steps = steps
     episode.ended = ended
     episode.target = where(switched, episode.next_target, episode.target)
-    return ended > 0.0, switched
+    return ended > 0.0, switched, steps >= episode.push_at
 
 
 @inline_llvm

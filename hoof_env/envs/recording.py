@@ -73,6 +73,11 @@ class Recording:
         self._ends.append(self._end())
         self._unseen += 1
 
+    def replace(self) -> None:
+        """Keep the present memory in place of the last end: a push changed it between two steps."""
+        if self._ends:
+            self._ends[-1] = self._end()
+
     def last(self) -> Record:
         """Return state and report by name at each substep of the last control step; after a reset, or a step
         that could not be simulated, of the present instant only."""
@@ -90,16 +95,27 @@ class Recording:
         # The first end has no predecessor, and a failed step did not lead to its end: no substeps.
         if k == -len(self._ends) or broken(end[form.trunk_memory.rows("result")])[0]:
             return self._run(end, None, 0)
-        command = self.batch.engine.command_in(end)
-        record = self._run(self._ends[k - 1], command, self.batch.substeps)
-        # Without the first instant, which is the end of the step before.
-        return NamedColumns({name: values[1:] for name, values in record.items()})
+        commands = [self.batch.engine.command_in(each) for each in (self._ends[k - 1], end)]
+        late = self.batch.action_delay.substeps
+        # Until the step's action acts, the command before it stands.
+        parts = [(commands[0], late), (commands[1], self.batch.substeps - late)] if late else []
+        (command, steps), *rest = parts or [(commands[1], self.batch.substeps)]
+        records = [self._run(self._ends[k - 1], command, steps)]
+        records += [self._go_on(*part) for part in rest]
+        # Without the first instant, which is the end of the step or the part before.
+        joined = {name: np.concatenate([record[name][1:] for record in records]) for name in records[0]}
+        return NamedColumns(joined)
 
     def _run(self, column: NDArray[np.float64], command: Any, steps: int) -> Record:
         """Run substeps from a column of the engine's memory, under a command."""
         if self._engine is None:
             self._engine = self.batch.alone(self.env)
         self._engine.set_column(0, column)
+        return self._go_on(command, steps)
+
+    def _go_on(self, command: Any, steps: int) -> Record:
+        """Run substeps from where `_run` ended, under a command."""
+        assert self._engine is not None
         record = self._engine.run(command, steps, continue_past_limits=True)
         record.pop("result")
         return record

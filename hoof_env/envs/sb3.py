@@ -25,8 +25,9 @@ class Sb3VecEnv(VecEnv):
     """`num_envs` environments of an id for Stable-Baselines3, all stepped in one call.
 
     Wrap it in `VecMonitor` for episode returns. When an episode ends its info has "terminal_observation",
-    "TimeLimit.truncated" and "episode_summary". Infos contain nothing else, because a dictionary for each
-    environment and step costs more than the simulation: `terms` and `measured` are those of the last step.
+    "TimeLimit.truncated", "episode_summary", "end" and "is_success". Infos contain nothing else, because a
+    dictionary for each environment and step costs more than the simulation: `terms` and `measured` are those
+    of the last step.
     `reset_infos` contains the info of the reset of each environment's present episode, drawn parameters
     included.
 
@@ -132,6 +133,8 @@ class Sb3VecEnv(VecEnv):
                     "terminal_observation": infos["final_obs"][env],
                     "TimeLimit.truncated": bool(truncated[env]),
                     "episode_summary": {name: float(figures[name][env]) for name in names},
+                    "end": final["end"][env],
+                    "is_success": bool(final["is_success"][env]),
                 }
         return observations, rewards.astype(np.float32), dones, each
 

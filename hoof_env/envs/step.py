@@ -15,11 +15,20 @@ import numpy as np
 
 from hoof_env.dynamics.advance import BY_LEGS, LANES, MODEL, advance_kernels
 from hoof_env.dynamics.layout import PLAIN, Features
+from hoof_env.dynamics.limits import PITCH, has_moved
 from hoof_env.envs.addresses import AT, BEGIN, END, memories
-from hoof_env.envs.observation_kernel import Observers, from_outside, functions_of, observers_of, slots_of
-from hoof_env.envs.outcome import add_up, decide, find_outcome
+from hoof_env.envs.frames_kernel import delayed_actions, remember
+from hoof_env.envs.observation_kernel import (
+    Observers,
+    from_outside,
+    functions_of,
+    observers_of,
+    room_of,
+    slots_of,
+)
+from hoof_env.envs.outcome import add_up, decide, find_outcome, put_together
 from hoof_env.envs.reward_kernel import is_user_term, sum_of_terms
-from hoof_env.simd import absolute, any_lane, full_like, rows, write
+from hoof_env.simd import absolute, any_lane, block_at, full_like, rows, where, write
 from hoof_env.simd.compile import inline_source, kernel
 from hoof_env.simd.kept import Kept, Kernels
 from hoof_env.simd.memory import (
@@ -42,8 +51,10 @@ from hoof_env.tasks.reward import Term
 NOT_A_NUMBER = -1
 SOME_ENDED = 1
 SOME_SWITCHED = 2
+SOME_PUSHED = 4
 """Return codes of a step. NOT_A_NUMBER: an action was NaN or infinite and no environment was advanced.
-Otherwise the code is a sum of SOME_ENDED (an episode ended) and SOME_SWITCHED (a new commanded speed)."""
+Otherwise the code is a sum of SOME_ENDED (an episode ended), SOME_SWITCHED (a new commanded speed) and
+SOME_PUSHED (a push is due)."""
 
 
 class StepKernels(Kernels):
@@ -122,14 +133,14 @@ def _made(
     identity = fingerprint(*functions, _flags(terms, entries), layouts.episode.names, (FAILED, TRUNCATED))
     identity += f" {tuple(features)} {body.legs} legs, {task_record.descr}"
     observers = observers_of(entries, len(terms), features, body)
-    apply = _apply(layouts, body)
-    finish = _finish(terms, layouts, body, observers)
+    parts = (apply, finish, observe) = _apply(layouts, body), _finish(terms, layouts, body), observers.observe
     advance = advance_kernels(contact_law, features)
     # Bodies without a kernel of their own run side by side: nothing calls their `step_one`.
     advance_one = getattr(advance, f"advance_{BY_LEGS.get(body.legs, 'batch')}")
     advance_batch = advance.advance_batch
     sums_size = layouts.sums
-    step = _step(task_record, slots, sums_size, body, apply, finish)
+    room = room_of(slots)
+    step = _step(task_record, room, layouts, body, parts)
     task_at = record_at(task_record)
 
     def step_one(addresses):  # type: ignore[no-untyped-def]
@@ -147,20 +158,22 @@ def _made(
         good = are_numbers(addresses)
         if good:
             for n in range(addresses[BEGIN], addresses[END]):
+                remember(addresses, 1, task, n)
                 apply(addresses, 1, task, n, scratch)
         return good
 
     def finish_one(addresses):  # type: ignore[no-untyped-def]
         task = task_at(addresses[AT.task])[0]
-        memory = doubles(slots)
+        memory = doubles(2 * room)
         sums = doubles(sums_size * 2)
         happened = 0
         for n in range(addresses[BEGIN], addresses[END]):
-            happened |= finish(addresses, 1, task, n, memory, sums)
+            happened |= finish(addresses, 1, task, n, sums)
+            observe(addresses, 1, task, n, memory, 0)
         return happened
 
-    parts = (step_one, step_batch, apply_one, finish_one)
-    kernels = {function.__name__: kernel(function, identity, function is step_batch) for function in parts}
+    of_task = (step_one, step_batch, apply_one, finish_one)
+    kernels = {function.__name__: kernel(function, identity, function is step_batch) for function in of_task}
     return StepKernels(observers=observers, **kernels)
 
 
@@ -193,33 +206,32 @@ def _apply(layouts: Memories, body: BodyKernels) -> Callable[..., Any]:
     """Return a part of kernels that turns the actions of row n and, with lanes, of its neighbours into
     commands."""
     command = body.command
+    put_action = delayed_actions(layouts)
 
     @inline_source
     def apply(addresses, lanes, task, n, scratch):  # type: ignore[no-untyped-def]
+        put_action(addresses, lanes, task, n)
         _, leg, episode = memories(addresses, lanes, layouts, n)
-        actions = singles_at(addresses[AT.actions])
+        actions = singles_at(addresses[AT.acted])
         command(task, actions, episode, leg, layouts.gait, n, rows(scratch, lanes, None))
 
     return apply
 
 
-def _finish(
-    terms: tuple[Term, ...], layouts: Memories, body: BodyKernels, observers: Observers
-) -> Callable[..., Any]:
-    """Return a part of kernels that does what follows the engine: reward, end and observation."""
+def _finish(terms: tuple[Term, ...], layouts: Memories, body: BodyKernels) -> Callable[..., Any]:
+    """Return a part of kernels that does what follows the engine, but for the observation: reward and end."""
     compute_reward = sum_of_terms(terms, layouts)
-    observe = observers.observe
     on_switch = body.on_switch
 
     @inline_source
-    def finish(addresses, lanes, task, n, memory, sums):  # type: ignore[no-untyped-def]
+    def finish(addresses, lanes, task, n, sums):  # type: ignore[no-untyped-def]
         happened = 0
         trunk, leg, episode = memories(addresses, lanes, layouts, n)
         of_step = rows(sums, lanes, layouts.stride_sums)
         outcome = find_outcome(task, trunk, leg, episode, layouts, of_step)
         add_up(outcome, episode, layouts)
         # Before the observation, which shows the speed that is commanded in the next step.
-        ended, switched = decide(task, outcome, episode)
+        ended, switched, pushed = decide(task, outcome, episode)
         on_switch(task, episode, switched)
         nothing = full_like(episode, 0.0)
         # Memory behind the sums, for those of one lane.
@@ -230,21 +242,52 @@ def _finish(
             happened |= SOME_ENDED
         if any_lane(switched):
             happened |= SOME_SWITCHED
-        observe(addresses, lanes, task, n, memory)
+        if any_lane(pushed):
+            happened |= SOME_PUSHED
         return happened
 
     return finish
 
 
+def _keep_sums(layouts: Memories) -> Callable[..., Any]:
+    """Return a part of kernels that puts together the sums and results of the parts of a step."""
+    size = layouts.sums
+    legs = layouts.legs
+
+    @inline_source
+    def keep_sums(addresses, lanes, n, memory, is_first):  # type: ignore[no-untyped-def]
+        trunk, first_leg, _ = memories(addresses, lanes, layouts, n)
+        kept = rows(memory, lanes, None)
+        if not is_first:
+            for i in range(legs):
+                leg = block_at(first_leg, i)
+                for k in range(size):
+                    leg.sums[k] = put_together(layouts, k, kept[i * size + k], leg.sums[k])
+            before = kept[legs * size]
+            now = trunk.result
+            # A failure stays, and so does a limit unless a failure follows.
+            has_failed = (before > 0.0) & (before < PITCH)
+            trunk.result = where(has_failed | ((before >= PITCH) & has_moved(now)), before, now)
+        for i in range(legs):
+            leg = block_at(first_leg, i)
+            for k in range(size):
+                kept[i * size + k] = leg.sums[k]
+        kept[legs * size] = trunk.result
+
+    return keep_sums
+
+
 def _step(
     task_record: np.dtype[Any],
-    slots: int,
-    sums_size: int,
+    room: int,
+    layouts: Memories,
     body: BodyKernels,
-    apply: Callable[..., Any],
-    finish: Callable[..., Any],
+    parts: tuple[Callable[..., Any], ...],
 ) -> Callable[..., Any]:
-    """Return a part of kernels that is a whole control step."""
+    """Return a part of kernels that is a whole control step, made of `parts`: apply, finish and observe."""
+    (apply, finish, observe) = parts
+    sums_size = layouts.sums
+    keep_sums = _keep_sums(layouts)
     are_numbers = _are_numbers(body)
     scratch_size = body.scratch_size
     task_at = record_at(task_record)
@@ -257,26 +300,37 @@ def _step(
         task = task_at(addresses[AT.task])[0]
         happened = 0
         scratch = doubles(scratch_size * lanes)
-        memory = doubles(slots * lanes)
+        memory = doubles(2 * room * lanes)
         # Also for the sums of one lane, for terms that take no lanes.
         sums = doubles(sums_size * (lanes + 1))
+        kept = doubles((body.legs * sums_size + 1) * lanes)
         # One group of lanes after the other: its memory stays in the cache from action to observation.
         for n in range(addresses[BEGIN], addresses[END], lanes):
-            apply(addresses, lanes, task, n, scratch)
-            advance(
-                matrix_at(addresses, AT.data),
-                model_at(addresses[AT.model]),
-                matrix_at(addresses, AT.tables),
-                matrix_at(addresses, AT.ground),
-                matrix_at(addresses, AT.constants),
-                cube_at(addresses, AT.reactions),
-                task.h,
-                task.substeps,
-                False,
-                n,
-                n + lanes,
-            )
-            happened |= finish(addresses, lanes, task, n, memory, sums)
+            remember(addresses, lanes, task, n)
+            # One part, but for delays by fractions of a step.
+            for part in range(task.parts):
+                if part == task.acting_part:
+                    apply(addresses, lanes, task, n, scratch)
+                advance(
+                    matrix_at(addresses, AT.data),
+                    model_at(addresses[AT.model]),
+                    matrix_at(addresses, AT.tables),
+                    matrix_at(addresses, AT.ground),
+                    matrix_at(addresses, AT.constants),
+                    cube_at(addresses, AT.reactions),
+                    task.h,
+                    task.part_substeps[part],
+                    False,
+                    n,
+                    n + lanes,
+                )
+                if task.parts > 1:
+                    keep_sums(addresses, lanes, n, kept, part == 0)
+                is_last = part == task.parts - 1
+                if is_last:
+                    happened |= finish(addresses, lanes, task, n, sums)
+                if is_last or part == task.seeing_part:
+                    observe(addresses, lanes, task, n, memory, 0 if is_last else 1)
         return happened
 
     return step

@@ -6,6 +6,7 @@ from collections.abc import Iterable
 from typing import Any
 
 from hoof_env.errors import ParameterError
+from hoof_env.tasks.body_settings import GIVEN
 from hoof_env.tasks.settings import NEEDED, Settings
 
 
@@ -29,16 +30,24 @@ def check_effect(name: str, settings: Settings, within: str = "") -> None:
         )
     needed, values = NEEDED.get(name, ("", ()))
     present: Any = getattr(settings, needed, None)
-    if needed and (present not in values if values else _is_one(present)):
+    if needed and not _has_effect(present, values):
         good = " or ".join(f"{needed}={value!r}" for value in values) or f"a range of {needed}"
+        good = f"a {needed}" if values == GIVEN else good
         named = f"{within}: {name!r}" if within else name
         # The trunk is part of the task: the message cannot ask for another one.
-        if needed == "trunk" and "free" in (present, *values):
+        if needed == "trunk" and "free" in (present, *values) and present != "fixed":
             body = "a horse" if present == "free" else "one leg"
             raise ParameterError(f"{named}: expected none of {body}, where it has no effect")
         raise ParameterError(
             f"{named}: expected {good} beside it, without which it has no effect, got {needed}={present!r}"
         )
+
+
+def _has_effect(present: Any, values: tuple[str, ...]) -> bool:
+    """True if a needed setting has one of the values that `About.needs` names."""
+    if values == GIVEN:
+        return present is not None
+    return present in values if values else not _is_one(present)
 
 
 def _is_one(value: Any) -> bool:

@@ -11,7 +11,7 @@ import numpy as np
 from hoof_env.dynamics.form import engine_layout
 from hoof_env.dynamics.layout import PLAIN, Features, StrideSums, stride_peaks
 from hoof_env.gait import PARAMETERS
-from hoof_env.simd.layout import Block, Constants, Layout, Row, Size
+from hoof_env.simd.layout import Block, Constants, Layout, Row, Size, Vector
 from hoof_env.tasks.reward import TERMS
 
 ACTIONS = len(PARAMETERS)
@@ -23,6 +23,9 @@ TRUNCATED = 2
 
 ACTION = Size("action", ACTIONS)
 REWARD = Size("reward", len(TERMS))
+
+MOST_PARTS = 3
+"""Largest number of parts of a control step: an action and an observation may each divide it."""
 
 
 class Episode(Layout):
@@ -41,6 +44,13 @@ class Episode(Layout):
     ended: Row  # 0, `FAILED` or `TRUNCATED`
     switch: Row  # control step after which another speed is commanded
     next_target: Row  # that speed [m/s]
+    commanded: Row  # distance at the commanded speeds so far [m]; infinite without a command
+    strength: Row  # factor of all disturbances [-]
+    observation_delay: Row  # whole control steps
+    action_delay: Row  # whole control steps
+    noise_key: Row  # key of the random numbers of noise and bias, see `simd.noise`
+    push_at: Row  # control step after which the trunk is pushed next; infinite if it is not
+    next_push: Vector  # impulse of that push [N s]
 
 
 @cache
@@ -134,6 +144,23 @@ def task_type(terms: int, entries: int, gait: int = ACTIONS, more: tuple[Any, ..
             ("stays", "?"),  # True for a fixed trunk
             ("observation_size", "i8"),
             ("observation_columns", "i8", (entries,)),  # column of the entry in each slot; -1: not observed
+            ("frame_size", "i8"),  # numbers that are observed of one instant, a frame
+            ("frames", "i8"),  # frames that are kept of a row; 0: none, frames are the observation
+            ("first_frame", "i8"),  # kept frame that is observed without delay, 1 if it is one within a step
+            ("history", "i8"),  # frames that are observed
+            ("keeps_actions", "?"),
+            ("action_size", "i8"),  # numbers of an action
+            ("kept_actions", "i8"),  # actions that are kept of a row
+            ("last_actions", "i8"),  # actions that are observed
+            ("has_privileged", "?"),
+            ("privileged_columns", "i8", (entries,)),  # column of the true number of each slot; -1: none
+            ("parts", "i8"),  # parts of a control step, see `tasks.delays.Parts`
+            ("part_substeps", "i8", (MOST_PARTS,)),
+            ("acting_part", "i8"),  # part at whose begin an action acts
+            ("seeing_part", "i8"),  # part after which a frame within the step is observed; -1: none
+            ("is_noisy", "?"),  # True with noise or bias
+            ("noise", "f8", (entries,)),  # largest error of each slot in a step
+            ("bias", "f8", (entries,)),  # largest error of each slot that stays for an episode
             *more,
         ],
         # The kernels read every field with one aligned load.

@@ -34,6 +34,7 @@ from hoof_env.leg.geometry import Geometry, load_geometry
 from hoof_env.leg.limb_masses import with_limb_masses
 from hoof_env.simd.layout import Block
 from hoof_env.tasks.body import BodyKernels
+from hoof_env.tasks.disturbances import MOST_STRENGTH
 from hoof_env.tasks.episode import ACTION, Episode
 from hoof_env.tasks.horse_gaits import (
     ACTED,
@@ -105,9 +106,10 @@ OPTIONS = {
     "pitch": (-0.4, 0.4),
     "x": (-1e5, 1e5),
     "target_speed": (0.1, 20.0),
+    "strength": (0.0, MOST_STRENGTH),
 }
-"""Numeric reset options and their ranges [strides, m/s, rad, m, m/s]; "gait" and "parameters" are the
-others."""
+"""Numeric reset options and their ranges [strides, m/s, rad, m, m/s, -]; "gait", "parameters" and "pushes"
+are the others."""
 
 COMMAND_STEP = 0.5
 """Largest change from one commanded speed to the next [m/s]: the reference gait changes at once with the

@@ -15,6 +15,7 @@ from hoof_env.errors import ParameterError, check_choice, check_number
 from hoof_env.gait import GaitParameters, gait_array, paper_gaits
 from hoof_env.ground.terrain import Terrain
 from hoof_env.leg.profile import LegProfile, by_name
+from hoof_env.tasks.disturbances import MOST_STRENGTH
 from hoof_env.tasks.parameters import check_parameters
 from hoof_env.tasks.settings import Settings
 
@@ -33,8 +34,10 @@ OPTIONS = {
     "height": (0.0, np.inf),
     "x": (-1e5, 1e5),
     "target_speed": (-20.0, 20.0),
+    "strength": (0.0, MOST_STRENGTH),
 }
-"""Numeric reset options and their ranges [rad, m/s, m, m, m/s]; "gait" and "parameters" are the others."""
+"""Numeric reset options and their ranges [rad, m/s, m, m, m/s, -]; "gait", "parameters" and "pushes" are the
+others."""
 
 # Minari passes its own option on to the environment.
 FOREIGN_OPTIONS = ("minari_autoseed",)
@@ -195,7 +198,7 @@ def checked_options(options: Any, numbers: Mapping[str, tuple[float, float]]) ->
     Raises:
         ParameterError: an unknown option, or a number out of range.
     """
-    known = ("gait", "parameters", *numbers)
+    known = ("gait", "parameters", "pushes", *numbers)
     if options is None:
         return {}
     if isinstance(options, Mapping):

@@ -264,8 +264,8 @@ def observed(
     return [entry for group in groups for entry in entries if entry.group == group and is_observed(entry)]
 
 
-def check_groups(groups: Any, known: Iterable[str]) -> tuple[str, ...]:
-    """Check the setting `observation`; return it as a tuple.
+def check_groups(groups: Any, known: Iterable[str], name: str = "observation") -> tuple[str, ...]:
+    """Check a setting of groups, by default `observation`; return it as a tuple.
 
     Raises:
         ParameterError: not a list of known groups, or a group is named twice.
@@ -273,5 +273,5 @@ def check_groups(groups: Any, known: Iterable[str]) -> tuple[str, ...]:
     names = tuple(known)
     chosen = tuple(groups) if isinstance(groups, (list, tuple)) else ()
     if not chosen or not all(group in names and chosen.count(group) == 1 for group in chosen):
-        raise ParameterError(f"observation: expected a list of some of {', '.join(names)}, got {groups!r}")
+        raise ParameterError(f"{name}: expected a list of some of {', '.join(names)}, got {groups!r}")
     return chosen

@@ -224,7 +224,8 @@ def check_drift(terrain: Terrain, description: Any, trunk: str, hip_height: floa
         " the ground; slopes are for hoof_env/Horse-v0, whose trunk follows them"
     )
     if isinstance(description, Mapping) and description.get("kind") == "hills":
-        rise = float({**HILLS, **description}["rise"])
+        hills = {**HILLS, **description}
+        rise = float(hills["rise"] + hills["roughness"]) * max(float(hills["begin"]), 1.0)
         most = HIGHEST_HILLS * hip_height
         if rise > most:
             raise ParameterError(f"terrain['rise']: expected at most {most:.3g} m {remedy}; got {rise:.3g} m")
@@ -275,9 +276,15 @@ HILLS: dict[str, Any] = {
     "patch": 2.0,
     "stiffness": (0.25, 4.0),
     "friction": (0.5, 1.5),
+    "roughness": 0.0,
+    "begin": 1.0,
 }
 """Defaults of `hills`: seed; length [m]; largest absolute height [m]; steepest slope [-]; mean length of a
-patch [m]; ranges of the factors of stiffness and friction."""
+patch [m]; ranges of the factors of stiffness and friction; largest height of bumps on the hills [m]; factor
+of all heights at the begin, from which it goes steadily to 1 at the end [-]."""
+
+BUMPS = 0.5
+"""Distance of the random heights of bumps, between which the ground is straight [m]."""
 
 
 def make_terrain(description: Any) -> Terrain:
@@ -344,4 +351,11 @@ def _hills(values: dict[str, Any]) -> Terrain:
             factor[k : k + count] = np.exp(generator.uniform(low, high))
             k += count
         factors[name] = tuple(factor.tolist())
+    roughness = check_number("terrain['roughness']", values["roughness"], low=0.0, high=10.0)
+    begin = check_number("terrain['begin']", values["begin"], low=0.0, high=100.0)
+    if roughness:
+        each = round(BUMPS / SPACING)
+        bumps = roughness * generator.uniform(-1.0, 1.0, knots // each + 2)
+        row += np.interp(np.arange(knots), each * np.arange(len(bumps)), bumps)
+    row *= np.linspace(begin, 1.0, knots)
     return Terrain(tuple(row.tolist()), factors["stiffness"], factors["friction"], 0.0, SPACING)

@@ -6,224 +6,21 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields
 from types import MappingProxyType
-from typing import Annotated, Any, NamedTuple, get_type_hints
+from typing import Annotated, Any, get_type_hints
 
-from hoof_env.leg.geometry import DEFAULT_PRESET, Preset
+from hoof_env.tasks.body_settings import GIVEN, About, BodySettings, Range
 
 PRINTED_BETA = math.sqrt(2 * 15.0)
 """Baumgarte's beta as the paper's Table 1 prints it, sqrt(2 alpha) [1/s]; sqrt(2) alpha = 21.2 is probably
 meant."""
 
-Range = float | Sequence[float]
-"""Lowest and highest value, or one number for both."""
-
 SOLVERS = ("exact", "paper")  # the closed form, and Eq. 8 as the paper solves it
 
 
-class About(NamedTuple):
-    """Description of a setting.
-
-    Attributes:
-        unit: unit of the value, "" for none.
-        text: meaning, for the manual; $names stand for numbers and choices, see `envs.manual_words`.
-        of_horse: meaning for a horse, if it differs.
-        per_episode: True if `reset(options={"parameters": ...})` and `randomize` can change the setting.
-        needs: another setting, and the values of it with which this one has an effect; () for any range.
-        span: values that a slider offers; None for a setting without one.
-    """
-
-    unit: str
-    text: str
-    of_horse: str = ""
-    per_episode: bool = False
-    needs: tuple[str, tuple[str, ...]] | None = None
-    span: tuple[float, float] | None = None
-
-
 @dataclass(frozen=True, kw_only=True)
-class Settings:
-    """Settings of an environment, plain values that JSON can hold, each with its default and its `About`.
+class TaskSettings(BodySettings):
+    """Settings of what is asked and how it is simulated, each with its default and its `About`."""
 
-    The types are those that callers may pass: the fields are keyword arguments of the environments, too, see
-    `envs.arguments`.
-    """
-
-    # Leg and gait, trunk
-    preset: Annotated[
-        Preset,
-        About(
-            "",
-            (
-                "leg and gaits: $presets, or [one's own](../own_task.md#a-leg-of-your-own): a mapping or a "
-                "JSON file"
-            ),
-            of_horse=(
-                "the legs' linkage: $presets, or [one's own](../own_task.md#a-leg-of-your-own): a mapping "
-                "or a JSON file"
-            ),
-        ),
-    ] = DEFAULT_PRESET
-    gait: Annotated[
-        str | None,
-        About(
-            "",
-            "gait of the preset that episodes start in; None for one between walk and run",
-            of_horse=(
-                "gait from which actions make offsets whatever speed is commanded: $horse_gaits; None for "
-                "the reference gait of the commanded speed"
-            ),
-        ),
-    ] = None
-    trunk: Annotated[str, About("", "$trunks; a fixed one stays where it is")] = "suspended"
-    hip_height: Annotated[
-        float | None,
-        About(
-            "m",
-            (
-                "nominal height of O, the crank centre, $lowest to $highest times the geometry's own; None"
-                " for that"
-            ),
-        ),
-    ] = None
-    trunk_mass: Annotated[
-        float,
-        About(
-            "kg",
-            "of the trunk that goes with this leg",
-            of_horse="of the trunk without the limbs; at `size` 1",
-            per_episode=True,
-            span=(10.0, 200.0),
-        ),
-    ] = 50.0
-    trunk_share: Annotated[
-        float,
-        About(
-            "-",
-            "part of the weight of trunk and leg that the leg must bear; suspended",
-            per_episode=True,
-            needs=("trunk", ("suspended",)),
-            span=(0.1, 1.0),
-        ),
-    ] = 0.8
-    trunk_stiffness: Annotated[
-        float,
-        About(
-            "N/m",
-            "of the suspension's spring; suspended",
-            per_episode=True,
-            needs=("trunk", ("suspended",)),
-        ),
-    ] = 12000.0
-    trunk_damping: Annotated[
-        float,
-        About(
-            "N s/m",
-            "of the suspension's damper; suspended",
-            per_episode=True,
-            needs=("trunk", ("suspended",)),
-        ),
-    ] = 1590.0
-    trunk_drag: Annotated[
-        float,
-        About(
-            "N s/m",
-            "resistance to forward motion",
-            per_episode=True,
-            needs=("trunk", ("suspended", "rail")),
-        ),
-    ] = 20.0
-    # Ground and hoof
-    stiffness: Annotated[
-        float | None,
-        About(
-            "N/m^n",
-            "K of the contact law (Eq. 14); None for the preset's",
-            per_episode=True,
-            span=(2e3, 1e6),
-        ),
-    ] = None
-    exponent: Annotated[
-        float | None,
-        About("-", "n of the contact law, 1 to 3 in steps of 1/8; None for the preset's", span=(1.0, 3.0)),
-    ] = None
-    normal_law: Annotated[str, About("", "$normal_laws")] = "lankarani-nikravesh"
-    restitution: Annotated[
-        float,
-        About("-", "nominal coefficient of restitution, 0 to 1", per_episode=True, span=(0.0, 1.0)),
-    ] = 0.5
-    approach_floor: Annotated[
-        float,
-        About(
-            "m/s",
-            "smallest approach speed in the damping term",
-            of_horse="smallest approach speed in the damping term; at `size` 1",
-            per_episode=True,
-        ),
-    ] = 0.1
-    friction_law: Annotated[
-        str,
-        About(
-            "",
-            "$friction_laws",
-            of_horse="$friction_laws; of a rigid hoof",
-        ),
-    ] = "ambrosio"
-    friction: Annotated[float, About("-", "mu_k", per_episode=True, span=(0.0, 1.2))] = 0.4
-    friction_slow: Annotated[
-        float,
-        About(
-            "m/s",
-            "lower threshold of the friction law",
-            of_horse="lower threshold of the friction law; of a rigid hoof, at `size` 1",
-            per_episode=True,
-            needs=("friction_law", ("ambrosio",)),
-        ),
-    ] = 1e-3
-    friction_fast: Annotated[
-        float,
-        About(
-            "m/s",
-            "upper threshold of the friction law",
-            of_horse="upper threshold of the friction law; of a rigid hoof, at `size` 1",
-            per_episode=True,
-        ),
-    ] = 5e-2
-    hoof_stiffness: Annotated[
-        float | None,
-        About(
-            "N/m",
-            (
-                "of a spring at each hoof point, along the ground's normal and tangent; with one friction is "
-                "Coulomb's, without thresholds; None for a rigid hoof"
-            ),
-            of_horse=(
-                "of a spring at each hoof point, along the ground's normal and tangent, at `size` 1; with "
-                "one friction is Coulomb's, without thresholds; None for a rigid hoof"
-            ),
-        ),
-    ] = None
-    hoof_damping: Annotated[
-        float | None,
-        About(
-            "N s/m",
-            "of its damper; None for a tenth of the critical one under the trunk; needs `hoof_stiffness`",
-            of_horse=(
-                "of its damper, at `size` 1; None for a tenth of the critical one under a fourth of "
-                "$horse_mass kg; needs `hoof_stiffness`"
-            ),
-        ),
-    ] = None
-    terrain: Annotated[
-        Mapping[str, Any] | None,
-        About(
-            "",
-            (
-                'None for level ground, {"kind": "slope", "angle": rad}, {"kind": "hills", ...} as in '
-                "[HorseLegTerrain](HorseLegTerrain.md#terrain), or what `Terrain.to_dict` gives; ground that "
-                "drifts from y = 0 is refused under a suspended trunk and a rail, which keep their height"
-            ),
-        ),
-    ] = None
     # Actions and drive
     crank_rate: Annotated[
         float,
@@ -414,6 +211,80 @@ class Settings:
         ),
     ] = None
 
+
+@dataclass(frozen=True, kw_only=True)
+class Settings(TaskSettings):
+    """Settings of an environment, plain values that JSON can hold, each with its default and its `About`.
+
+    The types are those that callers may pass: the fields are keyword arguments of the environments, too, see
+    `envs.arguments`.
+    """
+
+    # Disturbances
+    noise: Annotated[
+        Mapping[str, float] | None,
+        About(
+            "-",
+            (
+                "largest error of every number of a group in each step, by the names of groups; before it "
+                "saturates, so that 0.02 of tanh(x / 5) is 0.1 of its unit; None for none"
+            ),
+        ),
+    ] = None
+    bias: Annotated[
+        Mapping[str, float] | None,
+        About("-", "likewise, largest error that stays for an episode"),
+    ] = None
+    push_impulse: Annotated[
+        Range | None,
+        About(
+            "N s",
+            "impulse forward on the trunk at random times, drawn from this range; None for none",
+            needs=("trunk", ("suspended", "rail", "free")),
+        ),
+    ] = None
+    push_seconds: Annotated[
+        Range,
+        About("s", "shortest and longest time from one push to the next", needs=("push_impulse", GIVEN)),
+    ] = (2.0, 4.0)
+    pushes: Annotated[
+        Sequence[Sequence[float]] | None,
+        About(
+            "s, N s",
+            "pushes of every episode instead: time, impulse forward and impulse upward of each",
+            needs=("trunk", ("suspended", "rail", "free")),
+        ),
+    ] = None
+    strength: Annotated[
+        float, About("-", "factor of noise, bias and pushes, 0 to 10; a reset option, too")
+    ] = 1.0
+
+    # What a policy knows late, and what it knows of before
+    observation_delay: Annotated[
+        Range,
+        About(
+            "control steps",
+            (
+                "age of what is observed, a whole number of substeps; of two whole numbers each episode "
+                "draws one from the first to the second"
+            ),
+        ),
+    ] = 0.0
+    action_delay: Annotated[
+        Range,
+        About("control steps", "likewise, time after which an action acts; until the first one zeros do"),
+    ] = 0.0
+    observation_history: Annotated[
+        int, About("-", "number of observations of successive steps that are seen, the newest first")
+    ] = 1
+    last_actions: Annotated[
+        int, About("-", "number of last actions that are observed behind these, the newest first")
+    ] = 0
+    privileged: Annotated[
+        Sequence[str],
+        About("", "groups of which the present, true numbers stand last in the observation, for a critic"),
+    ] = ()
+
     def __deepcopy__(self, memo: Any) -> Settings:
         """Return the settings themselves, which never change."""
         return self
@@ -442,4 +313,5 @@ PER_EPISODE = tuple(name for name, about in ABOUT.items() if about.per_episode)
 NEEDED: Mapping[str, tuple[str, tuple[str, ...]]] = MappingProxyType(
     {name: about.needs for name, about in ABOUT.items() if about.needs}
 )
-"""Settings that have an effect only with certain values of another one; () stands for any range."""
+"""Settings that have an effect only with certain values of another one; () stands for any range, `GIVEN` for
+whatever is not None."""

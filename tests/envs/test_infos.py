@@ -40,7 +40,11 @@ def test_reset_and_step_have_the_same_keys_of_numpys_numbers(env_id, settings):
             assert value.dtype == np.float64
         for key in (*start, "gait", *(["parameters"] if settings else [])):
             same(info[key], first[key])
-    assert {*env.step(actions(0, env_id=env_id))[4]} - {*first} == {"episode_summary"}
+    assert {*env.step(actions(0, env_id=env_id))[4]} - {*first} == {
+        "episode_summary",
+        "end",
+        "is_success",
+    }
 
 
 @pytest.mark.parametrize("kind", [SyncVectorEnv, AsyncVectorEnv])

@@ -222,11 +222,14 @@ CHANGED = OTHER | {
     "drive": "motor", "solver": "paper", "baumgarte_alpha": 10.0, "baumgarte_beta": 10.0,
     "integrator": "rk3", "sim_dt": 5e-4, "dt": 0.01, "episode_seconds": 5.0, "target_speed": 2.0,
     "target_seconds": (1.0, 2.0), "observation": ("crank",), "reward_weights": {"peak": 2.0},
-    "randomize": {"friction": 0.5},
+    "randomize": {"friction": 0.5}, "noise": {"trunk": 0.1}, "bias": {"trunk": 0.1}, "push_impulse": 9.0,
+    "push_seconds": (1.0, 2.0), "pushes": [[1.0, 9.0, 0.0]], "strength": 0.5, "observation_delay": 1.0,
+    "action_delay": 1.0, "observation_history": 2, "last_actions": 1, "privileged": ["trunk"],
 }  # fmt: skip
 BESIDE = {name: {"drive": "motor"} for name in ("motor_gain", "motor_torque", "motor_inertia")} | {
     f"friction_{name}": {"hoof_stiffness": None} for name in ("law", "slow", "fast")
 }
+BESIDE["push_seconds"] = {"push_impulse": 9.0}
 
 
 def test_the_page_of_the_horse_lists_what_a_horse_takes():
@@ -280,7 +283,7 @@ def test_sentences_are_apart():
 
 def test_the_tables_have_what_there_is_and_nothing_else():
     assert list(TABLES["settings"]) == [item.name for item in fields(Settings)]
-    assert set(TABLES["options"]) == {"gait", "parameters", *OPTIONS}
+    assert set(TABLES["options"]) == {"gait", "parameters", "pushes", *OPTIONS}
     assert list(TABLES["hills"]) == list(HILLS)
     known = inspect.signature(HorseLegVectorEnv).parameters
     assert set(TABLES["vector"]) == {*known} - {"num_envs", "task", "settings"}
@@ -301,9 +304,9 @@ def test_rewards_options_and_figures_are_those_of_the_environment(page):
     assert figures == list(info["episode_summary"])
     told = {row[0].strip("`") for row in [*table, *rows(section(text, "Infos"))]}
     assert set(started) == told
-    assert set(info) == told - {"parameters"} | {"episode_summary"}
+    assert set(info) == told - {"parameters"} | {"episode_summary", "end", "is_success"}
     start = section(text, "Starting State")
-    assert {row[0].strip("`") for row in rows(start)} == {*options, "gait", "parameters"}
+    assert {row[0].strip("`") for row in rows(start)} == {*options, "gait", "parameters", "pushes"}
     suspended = {"trunk_share", "trunk_stiffness", "trunk_damping", "trunk_drag"}
     refused = suspended | {"friction_slow", "friction_fast"} if page == "horse" else set()
     for name in PER_EPISODE:

@@ -1,0 +1,75 @@
+"""Disturbances of an episode: checks of their settings, and when the trunk is pushed."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from hoof_env.errors import ParameterError, check_number
+
+MOST_NOISE = 10.0
+"""Largest error of a number that is observed, of which the scale has mapped the usual range to [-1, 1]."""
+
+MOST_STRENGTH = 10.0
+"""Largest factor of all disturbances."""
+
+MOST_IMPULSE = 1e6  # [N s]
+
+Push = tuple[int, float, float]
+"""Control step after which the trunk is pushed, impulse forward and upward [N s]."""
+
+
+def check_noise(name: str, given: Any, groups: Sequence[str]) -> dict[str, float]:
+    """Return the largest errors of groups of the observation, by group.
+
+    Args:
+        name: name of the setting, for messages.
+        given: the setting; None for no errors.
+        groups: groups that are observed.
+
+    Raises:
+        ParameterError: not a mapping, a group that is not observed, or an error out of range.
+    """
+    if given is None:
+        return {}
+    if not isinstance(given, Mapping) or not set(given) <= set(groups):
+        raise ParameterError(
+            f"{name}: expected a mapping with some of the groups that are observed, {', '.join(groups)}; got"
+            f" {given!r}"
+        )
+    return {
+        group: check_number(f"{name}[{group!r}]", value, low=0, high=MOST_NOISE)
+        for group, value in given.items()
+    }
+
+
+def check_pushes(name: str, given: Any, dt: float, steps: int) -> tuple[Push, ...]:
+    """Return given pushes in the order of their times.
+
+    Args:
+        name: name of the setting or option, for messages.
+        given: rows of time [s], impulse forward and impulse upward [N s]; None for none.
+        dt: control step [s], to which times are rounded.
+        steps: number of control steps of an episode.
+
+    Raises:
+        ParameterError: not such rows, or a time that is not within the episode.
+    """
+    if given is None:
+        return ()
+    rows = list(given) if isinstance(given, Iterable) and not isinstance(given, (str, Mapping)) else [given]
+    pushes = []
+    for k, row in enumerate(rows):
+        if not isinstance(row, (list, tuple, np.ndarray)) or len(row) != 3:
+            raise ParameterError(f"{name}[{k}]: expected [s, N s forward, N s upward], got {row!r}")
+        last = (steps - 1) * dt
+        seconds = check_number(f"{name}[{k}], time", row[0], low=0.0, high=last)
+        forward, upward = (
+            check_number(f"{name}[{k}], impulse", value, low=-MOST_IMPULSE, high=MOST_IMPULSE)
+            for value in row[1:]
+        )
+        # A push at the very start comes after the first step: the start has a speed of its own.
+        pushes.append((max(round(seconds / dt), 1), forward, upward))
+    return tuple(sorted(pushes))

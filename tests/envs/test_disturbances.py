@@ -1,0 +1,295 @@
+"""Noise, bias and pushes: what they are, that they have the same bits everywhere, and what is refused."""
+
+from __future__ import annotations
+
+import copy
+import pickle
+
+import gymnasium as gym
+import numpy as np
+import pytest
+from family import HORSE, actions, make, same, steps
+
+from hoof_env import Sb3VecEnv
+from hoof_env.errors import FixedSettingError, ParameterError
+from hoof_env.simd import threads
+from hoof_env.tasks.disturbances import check_pushes
+
+LEG, RAIL, FIXED = (f"hoof_env/HorseLeg{name}-v0" for name in ("", "Rail", "Fixed"))
+
+NOISY = {"noise": {"gait": 0.03, "trunk": 0.05}, "bias": {"hoof": 0.04, "gait": 0.02}}
+PUSHED = {"push_impulse": (-20.0, 30.0), "push_seconds": (0.04, 0.1)}
+ALL = {**NOISY, **PUSHED, "strength": 0.7, "episode_seconds": 0.5}
+
+
+def alone(env_id, seed, taken, **settings):
+    """What a single environment gives, started again by itself after each episode."""
+    env = make(env_id, **settings)
+    found, over = [env.reset(seed=seed)[0]], False
+    for action in taken:
+        if over:
+            found.append(env.reset()[0])
+            over = False
+            continue
+        observation, reward, terminated, truncated, _ = env.step(action)
+        found += [observation, reward, terminated, truncated]
+        over = terminated or truncated
+    return found
+
+
+@pytest.mark.parametrize("env_id", [LEG, RAIL, HORSE])
+def test_a_row_has_the_bits_of_one_environment_on_any_number_of_threads(env_id, monkeypatch):
+    monkeypatch.setattr(threads, "available", lambda: 8)
+    n, count = 19, 60
+    taken = actions(1, count, n, env_id=env_id)
+    rollouts = []
+    for num_threads in (1, 3):
+        envs = make(env_id, n, num_threads=num_threads, **ALL)
+        rollouts.append([envs.reset(seed=5)[0], *(envs.step(each)[:4] for each in taken)])
+    same(*rollouts)
+    for row in (0, 7, 18):
+        wanted = alone(env_id, 5 + row, taken[:, row], **ALL)
+        found = [rollouts[0][0][row]]
+        over = False
+        for observation, reward, terminated, truncated in rollouts[0][1:]:
+            found += [observation[row]] if over else [part[row] for part in (observation, reward)]
+            found += [] if over else [bool(terminated[row]), bool(truncated[row])]
+            over = not over and (terminated[row] or truncated[row])
+        same([np.asarray(x).tobytes() for x in found], [np.asarray(x).tobytes() for x in wanted])
+
+
+def test_noise_and_bias_are_within_their_bounds_and_change_nothing_else():
+    """Of numbers that do not saturate the error is the difference from an environment without noise, in which
+    the episode is the same."""
+    noise, bias = 0.03, 0.02
+    n, count = 64, 40
+    noisy = make(LEG, n, noise={"gait": noise}, bias={"gait": bias, "hoof": 0.1})
+    plain = make(LEG, n)
+    names = list(plain.observation_names)
+    gait = [names.index(name) for name in names if name.startswith("swing")]
+    seen, clean = noisy.reset(seed=3)[0], plain.reset(seed=3)[0]
+    errors = [(seen - clean)[:, gait]]
+    for taken in actions(2, count, n):
+        one, other = noisy.step(taken), plain.step(taken)
+        same(one[1:4], other[1:4])
+        inside = np.abs(other[0][:, gait]) < 0.9
+        errors.append(np.where(inside, (one[0] - other[0])[:, gait], np.nan))
+        for name in ("forward speed", "sin(crank angle)"):
+            assert np.array_equal(one[0][:, names.index(name)], other[0][:, names.index(name)])
+        contact = names.index("toe contact")
+        assert (np.abs(one[0] - other[0])[:, contact] <= 0.1 + 1e-6).all()
+    errors = np.array(errors)
+    assert np.nanmax(np.abs(errors)) <= noise + bias + 1e-6
+    mean = np.nanmean(errors, axis=0)
+    # The mean over time is the bias, up to what noise of so many steps leaves.
+    assert np.nanmax(np.abs(mean)) <= bias + 5 * noise / np.sqrt(3 * count)
+    assert bias / 2 < np.nanmax(np.abs(mean))
+    around = errors - mean
+    assert abs(np.nanstd(around) - noise / np.sqrt(3)) < 0.1 * noise
+    same(noisy.raw_observation(), plain.raw_observation())
+
+
+def test_strength_is_a_factor_and_zero_is_none():
+    none = make(LEG, **{**ALL, "strength": 0.0})
+    plain = make(LEG, episode_seconds=0.5)
+    same(none.reset(seed=2)[0], plain.reset(seed=2)[0])
+    same(none.step(actions(0, 1)[0])[:4], plain.step(actions(0, 1)[0])[:4])
+    half = make(LEG, **ALL)
+    option = make(LEG, **{**ALL, "strength": 1.0})
+    same(half.reset(seed=2)[0], option.reset(seed=2, options={"strength": 0.7})[0])
+    same([s[:4] for s in steps(half, 20)], [s[:4] for s in steps(option, 20)])
+
+
+@pytest.mark.parametrize("env_id", [LEG, RAIL, HORSE])
+def test_a_push_adds_its_impulse_to_the_momentum_and_nothing_else(env_id):
+    env = make(env_id, 9)
+    env.reset(seed=1)
+    steps(env, 5)
+    before, place = env.engine.state, env.engine.report
+    upward = 0.0 if env_id == RAIL else 7.0
+    env.push(20.0, upward, envs=[2, 5])
+    after = env.engine.state
+    changed = {name for name in before if not np.array_equal(before[name], after[name])}
+    pushed = np.isin(np.arange(9), [2, 5])
+    expected = {"momentum_x"} | ({"momentum_y"} if upward else set())
+    if env_id == HORSE:
+        expected.add("spin")
+        # About the centre of mass of all, which is not the trunk's.
+        off = [place[axis] - before[f"centre_{axis}"] for axis in "xy"]
+        moment = off[0] * upward - off[1] * 20.0
+        np.testing.assert_allclose((after["spin"] - before["spin"])[pushed], moment[pushed], rtol=1e-9)
+    assert changed == expected
+    for name, impulse in (("momentum_x", 20.0), ("momentum_y", upward)):
+        np.testing.assert_allclose((after[name] - before[name]), impulse * pushed, atol=1e-9)
+
+
+def test_an_impulse_is_what_a_short_force_leaves():
+    """Independent of `push`: the same change as by a constant force, here a change of weight, over a time
+    that goes to 0. The difference goes with the time."""
+    impulse = 15.0
+    errors = []
+    for seconds in (4e-4, 2e-4):
+        state = []
+        for how in ("push", "force"):
+            env = make(LEG, trunk_drag=0.0, sim_dt=1e-4, dt=0.02)
+            env.reset(seed=4, options={"gait": "run", "height": 2.5, "speed": 1.0})
+            engine = env.engine
+            rows = engine._memory.trunk_settings
+            support = rows[3].copy()
+            engine.advance(None, 5)
+            if how == "push":
+                env.push(0.0, impulse)
+            else:
+                rows[3] += impulse / seconds
+            engine.advance(None, round(seconds / 1e-4))
+            rows[3] = support
+            state.append(engine.report["vy"][0])
+            engine.advance(None, 0)
+            state[-1] = engine.report["vy"][0]
+        errors.append(abs(state[0] - state[1]))
+    assert errors[1] < 0.6 * errors[0] + 1e-9
+    assert errors[1] < 5e-3 * impulse / env.batch.engine.total_mass
+
+
+def test_given_pushes_come_at_their_times():
+    given = [[0.2, 10.0, -4.0], [0.1, 5.0, 0.0]]
+    env, plain, option = make(LEG, pushes=given), make(LEG), make(LEG)
+    for one in (env, plain):
+        one.reset(seed=3)
+    option.reset(seed=3, options={"pushes": given})
+    for k, action in enumerate(actions(0, 14), 1):
+        results = [one.step(action) for one in (env, option)]
+        same(results[0][:4], results[1][:4])
+        plain.step(action)
+        difference = {
+            n: env.engine.state[n][0] - plain.engine.state[n][0] for n in ("momentum_x", "momentum_y")
+        }
+        if k < 5:
+            assert difference == {"momentum_x": 0.0, "momentum_y": 0.0}
+        if k == 5:
+            assert difference["momentum_x"] == pytest.approx(5.0)
+            assert env.batch.episode_rows.push_at[0] == 10
+    assert np.isinf(env.batch.episode_rows.push_at[0])
+    env.reset(seed=3)
+    option.reset(seed=3)
+    assert env.batch.episode_rows.push_at[0] == 5
+    assert np.isinf(option.batch.episode_rows.push_at[0]), "the option was for one episode"
+
+
+def test_records_follow_pushes():
+    """Substeps that are run again for a record end where the step ended."""
+    env = make(HORSE, **PUSHED)
+    env.reset(seed=0)
+    env.record()
+    steps(env, 12)
+    for action in actions(3, 6, env_id=HORSE):
+        env.push(30.0)
+        info = env.step(action)[-1]
+        record = env.record()
+        assert record["vx"][-1, 0] == info["measured"]["vx"]
+        assert record["crank_angle"][-1, 2, 0] == info["measured"]["left_hind_crank_angle"]
+
+
+@pytest.mark.parametrize("env_id", [LEG, HORSE])
+def test_states_pickles_and_copies_continue_with_the_same_bits(env_id):
+    given = {**NOISY, "episode_seconds": 2.0}
+    env, other = make(env_id, **given), make(env_id, **given)
+    env.reset(seed=1, options={"pushes": [[0.1, 9.0, 0.0], [0.3, -9.0, 3.0]]})
+    seen = steps(env, 7)[-1][0]
+    state = env.get_state()
+    other.reset(seed=9)
+    same(other.set_state(state), seen)
+    env.push(4.0)
+    state = env.get_state()
+    same(other.set_state(state), seen)
+    many = make(env_id, 3, **given)
+    same(many.set_state(state)[1], seen)
+    twins = [other, copy.deepcopy(env), pickle.loads(pickle.dumps(env))]
+    rolled = [s[:4] for s in steps(env, 20)]
+    for twin in twins:
+        same([s[:4] for s in steps(twin, 20)], rolled)
+    taken = actions(5, 20, env_id=env_id)
+    for action, step in zip(taken, rolled, strict=True):
+        same(many.step(np.repeat(action[None], 3, 0))[0][2], step[0])
+
+
+def test_an_end_has_its_reason_and_says_whether_it_was_a_success():
+    env = make(LEG, episode_seconds=0.1)
+    env.reset(seed=0, options={"gait": "run", "speed": 2.6})
+    info = steps(env, 5)[-1][-1]
+    assert (info["end"], info["is_success"]) == ("time limit", True)
+    env.reset(seed=0, options={"gait": "run", "speed": 0.5})
+    info = steps(env, 5)[-1][-1]
+    assert (info["end"], info["is_success"], info["episode_summary"]["success"]) == ("time limit", False, 0.0)
+    falls = {"trunk_share": 1.0, "trunk_stiffness": 0.0, "trunk_damping": 0.0}
+    envs = make(LEG, 2, **falls)
+    envs.reset(seed=0)
+    *_, terminated, _, infos = next(step for step in steps(envs, 200) if step[2].any())
+    row = int(np.argmax(terminated))
+    assert infos["end"][row] == infos["failure"][row] != "time limit"
+    assert not infos["is_success"][row]
+    learners = Sb3VecEnv(num_envs=2, episode_seconds=0.1)
+    learners.reset()
+    for _ in range(5):
+        *_, infos = learners.step(np.zeros((2, 4), np.float32))
+    assert {type(info["is_success"]) for info in infos} == {bool}
+    assert [info["end"] for info in infos] == ["time limit"] * 2
+
+
+REFUSED = [
+    (LEG, {"noise": {"target": 0.1}}, "noise: expected a mapping with some of the groups that are observed"),
+    (LEG, {"noise": 0.1}, "noise: expected a mapping"),
+    (LEG, {"bias": {"trunk": -0.1}}, r"bias\['trunk'\]: expected a finite number"),
+    (LEG, {"noise": {"trunk": float("nan")}}, r"noise\['trunk'\]: expected"),
+    (LEG, {"strength": 11.0}, "strength: expected"),
+    (LEG, {"push_seconds": (1.0, 2.0)}, "push_seconds: expected a push_impulse"),
+    (LEG, {"push_impulse": 10.0, "push_seconds": 0.001}, r"push_seconds\[0\]: expected"),
+    (LEG, {"push_impulse": (3.0, -3.0)}, r"push_impulse\[1\]: expected"),
+    (LEG, {"push_impulse": 3.0, "pushes": [[1.0, 2.0, 0.0]]}, "pushes: expected none beside a push_impulse"),
+    (LEG, {"pushes": [[1.0, 2.0]]}, r"pushes\[0\]: expected \[s, N s forward, N s upward\]"),
+    (LEG, {"pushes": [[10.0, 2.0, 0.0]]}, r"pushes\[0\], time: expected"),
+    (LEG, {"drive": "motor", "push_impulse": 3.0}, 'push_impulse: expected none with drive="motor"'),
+    (RAIL, {"pushes": [[1.0, 2.0, 1.0]]}, "pushes: expected no impulse upward on a rail"),
+    (FIXED, {"push_impulse": 3.0}, "push_impulse: expected"),
+    (FIXED, {"pushes": [[0.5, 2.0, 0.0]]}, "pushes: expected"),
+    (FIXED, {"solver": "paper", "pushes": [[0.5, 2.0, 0.0]]}, "pushes: expected"),
+]
+
+
+@pytest.mark.parametrize(("env_id", "settings", "words"), REFUSED, ids=str)
+def test_what_cannot_be_is_refused_in_words(env_id, settings, words):
+    with pytest.raises(ParameterError, match=words):
+        gym.make(env_id, **settings)
+
+
+def test_calls_and_options_that_cannot_be_are_refused_and_change_nothing():
+    fixed, rail, leg = make(FIXED), make(RAIL), make(LEG, 3)
+    for env in (fixed, rail, leg):
+        env.reset(seed=0)
+    with pytest.raises(ParameterError, match="push: expected none on a fixed trunk"):
+        fixed.push(1.0)
+    with pytest.raises(ParameterError, match="push: expected no impulse upward on a rail"):
+        rail.push(1.0, 1.0)
+    before = leg.get_state()
+    for bad in ((np.nan,), ("far",), (np.zeros(2),), (1.0, np.inf), (1.0, 0.0, [7])):
+        with pytest.raises(ParameterError):
+            leg.push(*bad)
+    for options in ({"strength": -1.0}, {"pushes": [[99.0, 1.0, 1.0]]}, {"pushes": "often"}):
+        with pytest.raises(ParameterError):
+            leg.reset(options=options)
+    with pytest.raises(ParameterError, match="fixed trunk"):
+        fixed.reset(options={"pushes": [[0.2, 1.0, 0.0]]})
+    same(leg.get_state(), before)
+    with pytest.raises(FixedSettingError, match="change_settings"):
+        leg.strength = 0.5
+    broken = copy.deepcopy(before)
+    broken["observations"] = np.full_like(before["observations"], np.nan)
+    with pytest.raises(ParameterError, match=r"state\['observations'\]"):
+        leg.set_state(broken)
+    with pytest.raises(ParameterError, match=r"state\['pushes'\]"):
+        leg.set_state({**before, "pushes": [[1]]})
+    same(leg.get_state(), before)
+
+
+def test_a_push_is_rounded_to_control_steps_and_sorted():
+    assert check_pushes("pushes", [[0.051, 1, 0], [0.0, 2, 3]], 0.02, 10) == ((1, 2.0, 3.0), (3, 1.0, 0.0))
