@@ -198,7 +198,7 @@ def checked_options(options: Any, numbers: Mapping[str, tuple[float, float]]) ->
     Raises:
         ParameterError: an unknown option, or a number out of range.
     """
-    known = ("gait", "parameters", "pushes", *numbers)
+    known = ("gait", "parameters", *numbers, "pushes")
     if options is None:
         return {}
     if isinstance(options, Mapping):

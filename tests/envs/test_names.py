@@ -44,6 +44,7 @@ OF_EPISODES = {
     "weight_share": "mean_normal_n over the weight",
     "support_share": "1 less weight_share",
     "failed": "1 after a failure",
+    "success": "1 if it lasted, at nearly the commanded speed",
 }
 """Statistics of episodes, with what they are made of; the other figures are sums with their unit."""
 
