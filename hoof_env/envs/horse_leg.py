@@ -231,7 +231,7 @@ class HorseLegEnv(LegBase, gym.Env[NDArray[np.float32], NDArray[np.float32]]):
 
     def render(self) -> NDArray[np.uint8] | None:
         """Draw the present state, a uint8 array of shape (H, W, 3) or a window; warn without a mode."""
-        if self.render_mode is None or self._recording is None:
+        if self.render_mode is None:
             gym.logger.warn("render() was called without a render_mode: pass 'rgb_array' or 'human'")
             return None
         self._check_started("render")

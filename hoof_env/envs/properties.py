@@ -77,7 +77,7 @@ class LegProperties:
 
     @property
     def observation_units(self) -> tuple[str, ...]:
-        """Units of `raw_observation`, in the order of the observation."""
+        """Units of `raw_observation`, in the order of its names."""
         return tuple(entry.unit for entry in self.batch.entries)
 
     @property

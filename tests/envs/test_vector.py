@@ -57,7 +57,9 @@ def test_every_call_returns_fresh_arrays(mode):
             return [found for item in value.values() for found in arrays(item)]
         if isinstance(value, np.ndarray) and value.dtype.kind != "O":
             return [value]
-        return [] if value is None or isinstance(value, str) else [found for item in value for found in arrays(item)]
+        if value is None or isinstance(value, str):
+            return []
+        return [found for item in value for found in arrays(item)]
 
     seen = arrays(env.reset(seed=0))
     for k in range(5):
