@@ -154,8 +154,7 @@ class HorseLegEnv(LegBase, gym.Env[NDArray[np.float32], NDArray[np.float32]]):
                 finite numbers, clipped to [-1, 1].
 
         Returns:
-            Observation, reward, terminated, truncated, and the info with the terms of the reward by name; at
-            the end of an episode also what `ending_of` gives. Later steps warn.
+            Observation, reward, terminated, truncated, and the info, at an end with `ending_of`'s entries.
 
         Raises:
             ParameterError: the action has a wrong shape or is not finite; nothing has happened then.
