@@ -73,3 +73,34 @@ def check_pushes(name: str, given: Any, dt: float, steps: int) -> tuple[Push, ..
         # A push at the very start comes after the first step: the start has a speed of its own.
         pushes.append((max(round(seconds / dt), 1), forward, upward))
     return tuple(sorted(pushes))
+
+
+ROUGH_PUSH = 1.5
+ROUGH_SLOPE = 0.1
+ROUGHNESS = 0.05
+"""Strengths of a horse's rough ground: largest push over the mass [m/s], steepest slope [-], largest bumps
+[m]. The push is that of legged_gym, 1 m/s for a robot with hips at 0.55 m, at the same Froude number; the
+bumps are those of its rough ground; the slope is that of a steep road."""
+
+
+def rough_ground(strength: float, mass: float) -> dict[str, Any]:
+    """Return the settings of a horse's rough ground.
+
+    Args:
+        strength: factor of all disturbances.
+        mass: mass of the horse [kg].
+    """
+    return {
+        "terrain": {
+            "kind": "hills",
+            "length": 2000.0,
+            "rise": 10 * ROUGH_SLOPE * strength,
+            "slope": ROUGH_SLOPE * strength,
+            "roughness": ROUGHNESS * strength,
+            "stiffness": [1.0, 1.0],
+            "friction": [1.0, 1.0],
+        },
+        "push_impulse": [-ROUGH_PUSH * mass, ROUGH_PUSH * mass],
+        "push_seconds": [2.0, 4.0],
+        "strength": strength,
+    }

@@ -1,0 +1,82 @@
+"""Falls of a horse on rough ground under pushes, at several strengths, from the same starts for every policy.
+
+    python -m agents.falls reference agents/policies/Horse-v0
+    python -m agents.falls runs/ppo_flat-Horse-v0-s0 --strengths 1 --episodes 200
+
+A policy is what agents.score takes. The strengths are factors of those that `hoof_env.tasks.disturbances` has
+in units: slopes, bumps, and pushes on the trunk. Episode i of every policy has the same ground, start,
+commands and, as long as it lasts, pushes.
+"""
+
+from __future__ import annotations
+
+import sys
+from dataclasses import dataclass
+
+import numpy as np
+from tyro.conf import Positional
+
+from agents.command import run
+from agents.score import score_vector
+from hoof_env._output import markdown_table
+from hoof_env.errors import check_number, count
+from hoof_env.tasks.disturbances import MOST_STRENGTH, rough_ground
+from hoof_env.tasks.horse import MASS
+
+ENV_ID = "hoof_env/Horse-v0"
+FIRST_SEED = 2_000_000  # on which nothing else is played
+
+
+@dataclass(frozen=True)
+class Args:
+    """Arguments of the command."""
+
+    policies: Positional[tuple[str, ...]] = ("reference",)
+    """names of scripted policies, and paths of trained models"""
+    strengths: tuple[float, ...] = (0.5, 1.0, 2.0)
+    """factors of all disturbances"""
+    episodes: int = 1000
+    """of each policy at each strength"""
+
+
+def falls_of(policy: str, strength: float, episodes: int) -> tuple[float, float]:
+    """Return the share of episodes in which a policy falls, and that of those which succeed, see
+    `hoof_env.envs.batch_reports.is_success`.
+
+    Args:
+        policy: name or path of the policy.
+        strength: factor of all disturbances.
+        episodes: number of episodes.
+    """
+    seeds = range(FIRST_SEED, FIRST_SEED + episodes)
+    found = score_vector(policy, ENV_ID, seeds, **rough_ground(strength, MASS))
+    falls, successes = (float(np.mean([each[name] for each in found])) for name in ("failed", "success"))
+    return falls, successes
+
+
+def table(policies: tuple[str, ...], strengths: tuple[float, ...], episodes: int) -> str:
+    """Return the table of falls and successes in Markdown, a row for each policy."""
+    rows = []
+    for policy in policies:
+        cells = [policy]
+        for strength in strengths:
+            falls, successes = falls_of(policy, strength, episodes)
+            cells += [f"{100 * falls:.1f} %", f"{100 * successes:.1f} %"]
+            print(f"{policy} at strength {strength:g}: falls {cells[-2]}", file=sys.stderr, flush=True)
+        rows.append(cells)
+    head = [f"{what} at {strength:g}" for strength in strengths for what in ("falls", "success")]
+    return markdown_table(["policy", *head], rows)
+
+
+def main(argv: list[str] | None = None) -> None:
+    """Play and print."""
+    import tyro
+
+    args = tyro.cli(Args, args=argv, prog="python -m agents.falls", description=__doc__)
+    for strength in args.strengths:
+        check_number("--strengths", strength, low=0.0, high=MOST_STRENGTH)
+    print(table(args.policies, args.strengths, count("--episodes", args.episodes)))
+
+
+if __name__ == "__main__":
+    run(main)
