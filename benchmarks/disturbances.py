@@ -51,7 +51,7 @@ def times(args: Args) -> dict[str, float]:
     """Return the least time of a step of one environment by case [us]."""
     cases = CASES | {"all of the first six": {k: v for name in TOGETHER for k, v in CASES[name].items()}}
     envs = {name: gym.make_vec(args.env_id, num_envs=args.num_envs, **given) for name, given in cases.items()}
-    shape = envs["none"].action_space.shape
+    shape = envs["none"].action_space.shape or ()
     actions = np.random.default_rng(0).uniform(-1, 1, (args.steps, *shape)).astype(np.float32)
     for each in envs.values():
         each.reset(seed=0)

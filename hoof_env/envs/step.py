@@ -122,8 +122,7 @@ def _made(
     features: Features,
     body: BodyKernels,
 ) -> StepKernels:
-    """Make the kernels; numba compiles them when they are called."""
-    # Helpers that a user's functions call are compiled anew if they have changed.
+    """Make the kernels, helpers of a user's functions anew; numba compiles them when they are called."""
     refresh(*foreign)
     layouts = memories_of(body.episode, len(terms), features, body.legs)
     slots = slots_of(entries)[2]

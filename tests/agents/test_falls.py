@@ -1,4 +1,4 @@
-"""Falls of a horse under disturbances: more with their strength, none without, the same episodes each time."""
+"""Falls of a horse under disturbances: more with their strength, none without, in the same episodes."""
 
 import pytest
 
