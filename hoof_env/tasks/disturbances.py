@@ -95,7 +95,8 @@ def rough_ground(strength: float, mass: float) -> dict[str, Any]:
             "kind": "hills",
             "length": 2000.0,
             "rise": 10 * ROUGH_SLOPE * strength,
-            "slope": ROUGH_SLOPE * strength,
+            # Hills take no slope of 0; those of no height have none.
+            "slope": max(ROUGH_SLOPE * strength, 1e-3),
             "roughness": ROUGHNESS * strength,
             "stiffness": [1.0, 1.0],
             "friction": [1.0, 1.0],
