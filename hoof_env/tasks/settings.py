@@ -225,33 +225,30 @@ class Settings(TaskSettings):
         Mapping[str, float] | None,
         About(
             "-",
-            (
-                "largest error of every number of a group in each step, by the names of groups; before it "
-                "saturates, so that 0.02 of tanh(x / 5) is 0.1 of its unit; None for none"
-            ),
+            "largest error in each step, by group, before a number saturates",
         ),
     ] = None
     bias: Annotated[
         Mapping[str, float] | None,
-        About("-", "likewise, largest error that stays for an episode"),
+        About("-", "likewise, for an episode"),
     ] = None
     push_impulse: Annotated[
         Range | None,
         About(
             "N s",
-            "impulse forward on the trunk at random times, drawn from this range; None for none",
+            "range of random pushes forward",
             needs=("trunk", ("suspended", "rail", "free")),
         ),
     ] = None
     push_seconds: Annotated[
         Range,
-        About("s", "shortest and longest time from one push to the next", needs=("push_impulse", GIVEN)),
+        About("s", "time between pushes", needs=("push_impulse", GIVEN)),
     ] = (2.0, 4.0)
     pushes: Annotated[
         Sequence[Sequence[float]] | None,
         About(
             "s, N s",
-            "pushes of every episode instead: time, impulse forward and impulse upward of each",
+            "given ones: time, forward, upward",
             needs=("trunk", ("suspended", "rail", "free")),
         ),
     ] = None
@@ -264,25 +261,18 @@ class Settings(TaskSettings):
         Range,
         About(
             "control steps",
-            (
-                "age of what is observed, a whole number of substeps; of two whole numbers each episode "
-                "draws one from the first to the second"
-            ),
+            "number, or two to draw between",
         ),
     ] = 0.0
     action_delay: Annotated[
         Range,
-        About("control steps", "likewise, time after which an action acts; until the first one zeros do"),
+        About("control steps", "likewise"),
     ] = 0.0
-    observation_history: Annotated[
-        int, About("-", "number of observations of successive steps that are seen, the newest first")
-    ] = 1
-    last_actions: Annotated[
-        int, About("-", "number of last actions that are observed behind these, the newest first")
-    ] = 0
+    observation_history: Annotated[int, About("-", "observations that are seen, newest first")] = 1
+    last_actions: Annotated[int, About("-", "actions that follow, newest first")] = 0
     privileged: Annotated[
         Sequence[str],
-        About("", "groups of which the present, true numbers stand last in the observation, for a critic"),
+        About("", "groups whose true numbers stand last"),
     ] = ()
 
     def __deepcopy__(self, memo: Any) -> Settings:
