@@ -60,3 +60,12 @@ class NamedColumns(dict[str, Any]):
         """Raise a `KeyError`."""
         new = present_name(key, self) if isinstance(key, str) else None
         raise KeyError(f"{key!r} is called {new!r} now" if new else key)
+
+    def get(self, key: Any, default: Any = None) -> Any:
+        """Return the quantity, or `default` if there is none of this name.
+
+        Raises:
+            KeyError: an old name, which would pass for one that is not there.
+        """
+        is_old = key not in self and isinstance(key, str) and present_name(key, self)
+        return self[key] if is_old or key in self else default

@@ -137,8 +137,10 @@ class NamedArray(np.ndarray[Any, np.dtype[np.float64]]):
         return html_table(("name", "shape"), [(name, self[name].shape) for name in self.names])
 
     def get(self, key: str, default: Any = None) -> Any:
-        """Return the numbers of a name, or `default` if there is no such name."""
-        return self[key] if key in self.names else default
+        """Return the numbers of a name, or `default` if there is no such name; an old name raises a
+        `KeyError`."""
+        is_old = isinstance(key, str) and present_name(key, self.names)
+        return self[key] if is_old or key in self.names else default
 
     def _mapping(self) -> dict[str, Any]:
         return {name: self[name] for name in self.names}

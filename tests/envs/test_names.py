@@ -128,7 +128,10 @@ def test_old_names_are_refused_with_the_present_ones():
     ):
         with pytest.raises(KeyError, match=f"'{old}' is called '{new}' now"):
             columns[old]
+        with pytest.raises(KeyError, match=f"'{old}' is called '{new}' now"):
+            columns.get(old)
         assert columns[new] is not None
+        assert (columns.get("nothing", 3), columns.get(new) is None) == (3, False)
     with pytest.raises(KeyError, match=r"^'thet'$"):
         env.record()["thet"]
     with pytest.raises(KeyError, match=r"^3$"):
