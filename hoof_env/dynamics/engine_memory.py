@@ -14,6 +14,7 @@ from hoof_env.dynamics import engine_states, layout, memory
 from hoof_env.dynamics.form import engine_layout
 from hoof_env.dynamics.names import NamedColumns
 from hoof_env.dynamics.parts import (
+    MOST_IMPULSE,
     Drive,
     Limb,
     Mechanics,
@@ -223,21 +224,25 @@ class EngineMemory(Mechanics):
         self._put(kept)
 
     def push(self, forward: ArrayLike, upward: ArrayLike = 0.0, envs: ArrayLike | None = None) -> None:
-        """Push trunks: add an impulse at the trunk's centre of mass to the momentum of all bodies. Reports
-        show the new velocity from the next call on.
+        """Push trunks at their centres of mass. Reports show the new velocity from the next call on.
 
         Args:
             forward, upward: impulses [N s], one number, or one for each environment that is pushed.
             envs: environments that are pushed, as indices or as a mask of shape (num_envs,); None is all.
 
         Raises:
-            ParameterError: an impulse is not finite or of the wrong shape, the trunk is fixed, or a crank has
-                a motor, whose speed would change, too.
+            ParameterError: an impulse beyond `MOST_IMPULSE` or of the wrong shape, a fixed trunk, or a crank
+                with a motor, whose speed would change, too.
         """
         where = memory.which(envs, self.num_envs)
         if self.trunk.kind == "fixed" or any(isinstance(limb.drive, Motor) for limb in self.limbs):
             raise ParameterError("push: expected a trunk that moves, and prescribed cranks")
         push = np.array([spread("forward", forward, where.shape), spread("upward", upward, where.shape)])
+        if np.abs(push).max(initial=0.0) > MOST_IMPULSE:
+            most = f"{MOST_IMPULSE:g}"
+            raise ParameterError(
+                f"push: expected impulses from -{most} to {most} N s, got {np.abs(push).max():g}"
+            )
         m = self._memory
         moving = views(layout.Moving, m.trunk[layout.TrunkState.rows("moving")])
         place = views(layout.TrunkReport, m.trunk_report).place[:, where]

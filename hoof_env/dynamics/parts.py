@@ -82,6 +82,9 @@ class Prescribed:
     """Drive of a crank that follows the filtered command exactly (the paper's driver, row 42 of Eq. 2)."""
 
 
+MOST_IMPULSE = 1e6
+"""Largest impulse of a push [N s]."""
+
 LARGEST = 1e9
 """Largest motor parameter; its square must stay finite."""
 

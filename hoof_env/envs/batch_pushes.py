@@ -9,9 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hoof_env.dynamics.engine import TrunkEngine
+from hoof_env.dynamics.parts import MOST_IMPULSE
 from hoof_env.errors import ParameterError, check_number
 from hoof_env.tasks.disturbances import (
-    MOST_IMPULSE,
     MOST_STRENGTH,
     Push,
     check_noise,

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from hoof_env.dynamics.parts import MOST_IMPULSE
 from hoof_env.errors import ParameterError, check_number
 
 MOST_NOISE = 10.0
@@ -14,8 +15,6 @@ MOST_NOISE = 10.0
 
 MOST_STRENGTH = 10.0
 """Largest factor of all disturbances."""
-
-MOST_IMPULSE = 1e6  # [N s]
 
 Push = tuple[int, float, float]
 """Control step after which the trunk is pushed, impulse forward and upward [N s]."""

@@ -263,9 +263,9 @@ class Simulation:
             impulse: impulse at the trunk [N s].
 
         Raises:
-            ParameterError: the environment cannot be pushed.
+            ParameterError: the trunk cannot be pushed, or the impulse is no number.
         """
-        raise ParameterError(f"push: expected an environment that can be pushed, got {self.env_id}")
+        self._leg.push(check_number("push", impulse))
 
     def about(self, **more: Any) -> dict[str, Any]:
         """Return the description of a record of this simulation, see `records.describe`."""

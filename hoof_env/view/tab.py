@@ -209,18 +209,13 @@ class Tab:
     def push(self, value: Any) -> None:
         """Push the trunk [N s]."""
         self.player.simulation.push(value)
+        self._tell(status=f"Pushed by {value:g} N s.")
 
     def condition(self, value: str) -> None:
         """Go to one of the paper's four conditions."""
         arguments = {"episode_seconds": controls.TURNS_ON} | controls.CONDITIONS[value]
-        self._go(
-            {
-                "env_id": controls.PAPER_ID,
-                "arguments": arguments,
-                "policy": controls.CONDITIONS[value]["gait"],
-                "seed": 0,
-            }
-        )
+        gait = controls.CONDITIONS[value]["gait"]
+        self._go({"env_id": controls.PAPER_ID, "arguments": arguments, "policy": gait, "seed": 0})
 
     def setup(self, env_id: str, arguments: str, preset: str, policy: str, seed: Any) -> None:
         """Go to another environment, preset, policy or seed."""

@@ -116,6 +116,14 @@ def test_a_slider_moves_the_ground_and_the_next_episode_keeps_it(page):
     assert page.kept[-1]["arguments"]["exponent"] == 1.5
 
 
+def test_a_push_adds_its_impulse_over_the_mass(page):
+    page.tick(0.1)
+    leg = page.tab.player.simulation.env.unwrapped
+    before = leg.batch.engine.state["momentum_x"].item()
+    assert "60 N s" in page.ask("push", value=60)["status"]
+    assert leg.batch.engine.state["momentum_x"].item() == pytest.approx(before + 60)
+
+
 @pytest.mark.parametrize(
     ("request_", "words"),
     [
@@ -129,7 +137,8 @@ def test_a_slider_moves_the_ground_and_the_next_episode_keeps_it(page):
         ({"name": "reset", "policy": "tests/view"}, "tests/view"),
         ({"name": "condition", "value": "fly"}, "fly"),
         ({"name": "record", "suffix": ".doc"}, "format"),
-        ({"name": "push", "value": 30}, "push"),
+        ({"name": "push", "value": None}, "push"),
+        ({"name": "push", "value": 1e9}, "push"),
         ({"name": "stop everything"}, "request"),
         ({"name": "touch"}, "request"),
     ],
