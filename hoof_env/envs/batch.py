@@ -100,6 +100,7 @@ class EpisodeBatch(BatchKernels):
         start_values: the body's `start_names`, the gait, and the values drawn by `randomize`, shape (numbers,
             num_envs); NaN where a state does not contain them.
         push_plans: pushes that were given for the present episode of each row, in the order of their times.
+        is_push_unseen: True if a trunk was pushed since the last step, which no observation shows yet.
         conditions, changed: conditions of the rows, and a batch with the settings of the next episodes, None
             if `change` was not called.
         paper: solver of the paper, None with the engine's kernels.
@@ -186,6 +187,7 @@ class EpisodeBatch(BatchKernels):
         """Make the arrays of all episodes."""
         self.has_overrides = np.zeros(self.num_envs, bool)
         self.push_plans: list[tuple[Push, ...]] = [()] * self.num_envs
+        self.is_push_unseen = False
         self.start_values = np.full((self.start_row_count + len(self.randomize), self.num_envs), np.nan)
         columns = self.engine.columns
         self.episode = np.zeros((self.layout.size, columns))
@@ -293,6 +295,7 @@ class EpisodeBatch(BatchKernels):
                 under_each(self, put_back, self._observe_broken)
             elif put_back.size:
                 self._observe_broken(put_back)
+        self.is_push_unseen = False
         rows = self.episode_rows
         each = (SOME_SWITCHED, rows.switch, draw_targets), (SOME_PUSHED, rows.push_at, push_due)
         for code, at, act in each:

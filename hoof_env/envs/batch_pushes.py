@@ -38,7 +38,9 @@ def check_disturbances(batch: Any) -> None:
     batch.push_impulse = None
     if s.push_impulse is not None:
         batch.push_impulse = check_range("push_impulse", s.push_impulse, -MOST_IMPULSE)
-    batch.push_seconds = check_range("push_seconds", s.push_seconds, batch.dt)
+    # Intervals shorter than a control step do no harm where nothing is pushed
+    shortest = batch.dt if batch.push_impulse else 0.0
+    batch.push_seconds = check_range("push_seconds", s.push_seconds, shortest)
     if batch.given_pushes and batch.push_impulse:
         raise ParameterError(f"pushes: expected none beside a push_impulse, got {s.pushes!r}")
     if batch.push_impulse:
@@ -112,6 +114,7 @@ def push_due(batch: Any, due: Rows, generators: Generators) -> None:
     """Push the trunks of some rows as planned, and plan their next pushes."""
     episode = batch.episode_rows
     batch.engine.push(*(episode.strength[due] * episode.next_push[:, due]), due)
+    batch.is_push_unseen = True
     plan_pushes(batch, due, generators)
 
 
@@ -124,3 +127,4 @@ def push_now(batch: Any, forward: Any, upward: Any, envs: Any) -> None:
     engine: TrunkEngine = batch.engine
     check_can_be_pushed("push", batch, bool(np.any(upward)))
     engine.push(forward, upward, envs)
+    batch.is_push_unseen = True

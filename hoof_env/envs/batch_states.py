@@ -27,8 +27,9 @@ def state_of(batch: Any) -> dict[str, Any]:
         )
     state = {"engine": batch.engine.get_state(), "episode": batch.episode[:, : batch.num_envs].copy()}
     state["start_values"] = batch.start_values.copy()
-    # As they were seen: a push since then shows in the state alone.
-    state["observations"] = batch.observations[: batch.num_envs].copy()
+    if batch.is_push_unseen:
+        # As they were seen: the push shows in the state of the engine alone
+        state["observations"] = batch.observations[: batch.num_envs].copy()
     state |= {name: getattr(batch, name)[: batch.num_envs].copy() for name in kept_arrays(batch)}
     if any(batch.push_plans):
         state["pushes"] = [*batch.push_plans]
@@ -124,6 +125,7 @@ def set_state(batch: Any, state: Mapping[str, Any]) -> None:
     batch.episode[:, : batch.num_envs] = episode
     batch.start_values[:] = start_values
     batch.push_plans = plans
+    batch.is_push_unseen = "observations" in state
     # The state's engine may have drawn parameters, which the next reset must replace.
     batch.has_overrides[:] = True
     if batch.conditions.all:
@@ -157,7 +159,7 @@ def _read_plans(batch: Any, given: Any) -> list[tuple[Push, ...]]:
 
 
 def _read_seen(batch: Any, name: str, given: Any) -> NDArray[np.float32] | None:
-    """Return what was observed or asked for in a state; None for observations of an older version's state.
+    """Return what was observed or asked for in a state; None for observations that a state has not.
 
     Raises:
         ParameterError: numbers out of range, or another shape.

@@ -9,6 +9,7 @@ from __future__ import annotations
 import hashlib
 import json
 import warnings
+from collections.abc import Mapping
 from dataclasses import dataclass, fields, replace
 from pathlib import Path
 
@@ -57,8 +58,11 @@ class Case:
     def fingerprint(self):
         """Changes with any number that the reference depends on."""
         leg = self.limb.geometry
-        words = ("full_turn", "name", "provenance")
+        # the presets here have the paper's mechanism, whose bodies are rods
+        words = ("full_turn", "name", "provenance", "mechanism", "solids")
         numbers = [getattr(leg, part.name) for part in fields(leg) if part.name not in words]
+        # the order of a mapping is no number
+        numbers = [dict(sorted(each.items())) if isinstance(each, Mapping) else each for each in numbers]
         parts = (numbers, Motor(), self.gait, GROUNDS[self.ground], self.height, DURATION)
         return hashlib.sha256(repr(parts).encode()).hexdigest()[:16]
 

@@ -8,10 +8,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from hoof_env.dynamics.engine import TrunkEngine
+from hoof_env.dynamics.leg_constants import constants_layout, leg_constants, structure_of
 from hoof_env.dynamics.memory import LIFT_OFF
 from hoof_env.dynamics.observables import stance_figures
 from hoof_env.dynamics.parts import HoofSpring, Limb, Limits, Motor, Prescribed, Result, Trunk
-from hoof_env.dynamics.reactions import LegConstants, leg_constants
 from hoof_env.gait import GaitParameters, HarmonicGait
 from hoof_env.ground.contact import Ground
 from hoof_env.ground.terrain import Terrain
@@ -82,7 +82,7 @@ def test_of_a_larger_leg_the_farthest_joint_is_the_lowest():
 def test_no_joint_is_farther_from_the_crank_centre_than_limits_take_it_to_be(leg):
     z = places(leg, np.random.default_rng(0).uniform(0, 2 * np.pi, 10**5))[0]
     others = [k for k, point in enumerate(POINTS) if point not in "GIJ"]
-    reach = leg_constants(leg)[LegConstants.rows("reach")][0]
+    reach = leg_constants(leg)[constants_layout(structure_of(leg)).rows("reach")][0]
     assert 0.9 * reach < np.nanmax(np.abs(z[:, others])) < 0.99 * reach
 
 

@@ -75,12 +75,12 @@ def test_types_and_infos_of_a_step(env_id, settings):
         _, reward, terminated, truncated, info = env.step(env.action_space.sample())
         assert (type(reward), type(terminated), type(truncated)) == (float, bool, bool)
         assert reward == sum(value for key, value in info.items() if key.startswith("reward_"))
-        assert len(info) <= 9 + len(env.unwrapped.task.terms)
         done = terminated or truncated
+        ended = {"episode_summary", "end", "is_success"} if done else set()
+        ended |= {"failure"} if terminated else set()
+        assert len(info) <= 9 + len(env.unwrapped.task.terms) + len(ended)
         assert set(started) <= set(info)
-        assert set(info) - set(started) == (
-            ({"episode_summary", "failure"} if terminated else {"episode_summary"}) if done else set()
-        )
+        assert set(info) - set(started) == ended
     assert all(type(value) is float for value in info["episode_summary"].values())
 
 

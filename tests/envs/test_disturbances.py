@@ -283,7 +283,7 @@ def test_calls_and_options_that_cannot_be_are_refused_and_change_nothing():
     with pytest.raises(FixedSettingError, match="change_settings"):
         leg.strength = 0.5
     broken = copy.deepcopy(before)
-    broken["observations"] = np.full_like(before["observations"], np.nan)
+    broken["observations"] = np.full((3, leg.single_observation_space.shape[0]), np.nan)
     with pytest.raises(ParameterError, match=r"state\['observations'\]"):
         leg.set_state(broken)
     with pytest.raises(ParameterError, match=r"state\['pushes'\]"):
