@@ -27,8 +27,8 @@ def state_of(batch: Any) -> dict[str, Any]:
         )
     state = {"engine": batch.engine.get_state(), "episode": batch.episode[:, : batch.num_envs].copy()}
     state["start_values"] = batch.start_values.copy()
-    if batch.is_push_unseen:
-        # As they were seen: the push shows in the state of the engine alone
+    if batch.is_push_unseen or batch.frames.size:
+        # As they were seen: a push shows in the state of the engine alone, and frames are of the past
         state["observations"] = batch.observations[: batch.num_envs].copy()
     state |= {name: getattr(batch, name)[: batch.num_envs].copy() for name in kept_arrays(batch)}
     if any(batch.push_plans):
