@@ -108,20 +108,27 @@ def make_env(env_id: str, arguments: Mapping[str, Any] | None = None) -> gym.Env
     return env
 
 
+def default_policy(env: gym.Env[Any, Any]) -> str:
+    """Return the name of the policy that plays if none is named."""
+    names = policy_names(env)
+    return next((name for name in ("reference", "run") if name in names), names[0])
+
+
 def find_policy(name: str | None, env: gym.Env[Any, Any], env_id: str, seed: int = 0) -> Any:
     """Return a policy for an environment; raise `ParameterError` for an unknown name, and `DataFileError`
     for a file that cannot be read or does not fit.
 
     The name is that of a gait or of another scripted policy; "6.28,0.7,-0.2,-0.3" (crank speed [rad/s], swing
     offset, sine and cosine coefficient [rad]); "open-loop", the best gait that this package has for the id;
-    or a path. None is "run", or "reference" of a horse. `seed` is that of the policy "random".
+    or a path. None is "reference" of a horse, else "run", or the first gait of a preset without one.
+    `seed` is that of the policy "random".
 
     The .zip or run folder of a model is a pickle: it can run code. An .onnx file, the folder of a shipped
     policy and a gait's .json are data.
     """
     names = policy_names(env)
     if name is None:
-        name = "reference" if "reference" in names else "run"
+        name = default_policy(env)
     if name in names:
         return make_policy(name, env, seed)
     if name.endswith(".json"):

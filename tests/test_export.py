@@ -14,7 +14,7 @@ import pytest
 from hoof_env import __version__, cli, records
 from hoof_env.constants import GRAVITY
 from hoof_env.dynamics.layout import TRUNK_STATE
-from hoof_env.envs.policies import GAITS, make_policy, open_loop_record
+from hoof_env.envs.policies import GAITS, make_policy, open_loop_record, start_of
 from hoof_env.errors import MissingExtraError, OutputError, ParameterError, parse_pairs
 from hoof_env.gait import PARAMETERS, load_gait
 from hoof_env.lab.opensim import MOT_COLUMNS
@@ -22,6 +22,7 @@ from hoof_env.lab.read import read_record
 from hoof_env.leg.geometry import load_geometry
 from hoof_env.records import (
     RECORD,
+    default_policy,
     describe,
     export_episode,
     find_policy,
@@ -214,6 +215,19 @@ def test_policies_by_name_and_by_four_numbers():
 def column_of(table, name):
     """Of a .csv, whose header has the units."""
     return next(table[key] for key in table.dtype.names if key.startswith(f"{name}_["))
+
+
+@pytest.mark.parametrize(
+    ("env_id", "given", "name"),
+    [(LEG, {}, "run"), (LEG, {"preset": "klann"}, "walk"), ("hoof_env/Horse-v0", {}, "reference")],
+)
+def test_the_policy_that_plays_if_none_is_named(env_id, given, name):
+    with make_env(env_id, given) as env:
+        assert default_policy(env) == name
+        played = [find_policy(each, env, env_id) for each in (None, name)]
+        assert start_of(played[0]) == start_of(played[1])
+        seen, _ = env.reset(seed=0, options=start_of(played[0]))
+        np.testing.assert_array_equal(*(policy.predict(seen)[0] for policy in played))
 
 
 @pytest.mark.parametrize("env_id", [LEG, FIXED])

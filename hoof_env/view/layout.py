@@ -8,6 +8,7 @@ from typing import Any, NamedTuple
 from bokeh.models import ColumnDataSource, CustomJS
 from jinja2 import Environment, FileSystemLoader, Template
 
+from hoof_env.records import default_policy
 from hoof_env.view import controls, figures
 from hoof_env.view.drawing import ARROW_M, HEAD
 from hoof_env.view.history import STANCE
@@ -138,7 +139,7 @@ def variables(player: Player, shown: list[figures.Curves]) -> dict[str, Any]:
         "presets": controls.known_presets(),
         "preset": env.settings.preset,
         "policies": controls.known_policies(simulation),
-        "policy": simulation.policy or ("reference" if len(player.legs) > 1 else "run"),
+        "policy": simulation.policy or default_policy(env),
         "arguments": controls.as_text(arguments),
         "groups": controls.setting_sliders(simulation),
         "gait": controls.gait_sliders(simulation),
