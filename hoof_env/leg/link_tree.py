@@ -157,27 +157,24 @@ def _grow(joints: Iterable[Joint], links: dict[str, tuple[int, ...]]) -> Iterabl
 def _rigid_groups(mechanism: Mechanism) -> list[set[int]]:
     """Return the bodies in groups that cannot move against each other.
 
-    Welded bodies are one group, and so are two that share two pins, and three that are pinned to each other
-    in three points.
+    Welded bodies are one group, and so are three groups that are pinned to each other in three points. Two
+    pins between two groups would hold more than there is to hold: `read_mechanism` refuses such a list.
     """
     groups = [set(part) for part in dict.fromkeys(mechanism.parts)]
-    while (found := _rigid_few(mechanism, groups)) is not None:
+    while (found := _rigid_triangle(mechanism, groups)) is not None:
         groups = [group for group in groups if group not in found]
         groups.append(set().union(*found))
     return groups
 
 
-def _rigid_few(mechanism: Mechanism, groups: list[set[int]]) -> list[set[int]] | None:
-    """Return two or three groups that cannot move against each other, or None."""
+def _rigid_triangle(mechanism: Mechanism, groups: list[set[int]]) -> list[set[int]] | None:
+    """Return three groups that are pinned to each other in three points, or None."""
     # A joint names two of the bodies at its point, and all of them meet there
     pinned = {joint.point: set(mechanism.at(joint.point)) for joint in mechanism.joints}
 
     def shared(one: set[int], two: set[int]) -> set[str]:
         return {point for point, bodies in pinned.items() if one & bodies and two & bodies}
 
-    for one, two in combinations(groups, 2):
-        if len(shared(one, two)) > 1:
-            return [one, two]
     for few in combinations(groups, 3):
         corners = [shared(one, two) for one, two in combinations(few, 2)]
         if all(corners) and len(set().union(*corners)) > 2:

@@ -35,7 +35,7 @@ def test_the_pose_and_the_solids_are_those_of_the_leg(preset):
     root = ET.fromstring(text)
     pose = leg.pose(THETA, SWING)
     seen = set()
-    mass, moment = 0.0, np.zeros(2)
+    mass, moment, inertia = 0.0, np.zeros(2), 0.0
     for name, body, here in placed(root.find("worldbody")):
         for site in body.findall("site"):
             place = (here + numbers(site.get("pos")))[[0, 2]] - (0, 1.5)
@@ -44,11 +44,17 @@ def test_the_pose_and_the_solids_are_those_of_the_leg(preset):
             seen.add(point)
         if name not in ("trunk", "frame"):
             solid = body.find("inertial")
-            mass += float(solid.get("mass"))
-            moment += float(solid.get("mass")) * ((here + numbers(solid.get("pos")))[[0, 2]] - (0, 1.5))
+            own = float(solid.get("mass"))
+            centre = (here + numbers(solid.get("pos")))[[0, 2]] - (0, 1.5)
+            mass += own
+            moment += own * centre
+            inertia += numbers(solid.get("diaginertia"))[1] + own * centre @ centre
     assert seen == set(leg.mechanism.points)
     assert mass == pytest.approx(leg.mass)
     assert moment == pytest.approx(leg.body_masses @ pose.centres)
+    # Of all bodies about O
+    about_centres = leg.body_inertias.sum()
+    assert inertia == pytest.approx(about_centres + leg.body_masses @ (pose.centres**2).sum(1))
 
 
 def test_a_loop_closes_at_one_place_of_both_links():
