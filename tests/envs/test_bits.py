@@ -28,7 +28,7 @@ LEG, FIXED, OWN = "hoof_env/HorseLeg-v0", "hoof_env/HorseLegFixed-v0", "own/Ever
 
 @dataclass(frozen=True)
 class Case:
-    """What is run.
+    """Case that is run.
 
     Attributes:
         env_id: id.
@@ -172,7 +172,7 @@ class Run:
         return Found(step, reset, self.answers() if k % 10 == 9 else {}, done)
 
     def answers(self) -> dict[str, tuple[Any, ...]]:
-        """What each row says when it is asked, and the record of the first one."""
+        """Answers of each row, and the record of the first one."""
         asked: list[tuple[str, ...]] = [("weight",), ("episode_summary",), ("raw_observation",)]
         if self.case.env_id != HORSE:
             asked.append(("action_for", "run"))
@@ -194,7 +194,7 @@ class Run:
 
 @dataclass(frozen=True)
 class Found:
-    """What a step gave, the reset by hand after it or None, what rows answered, and which episodes ended."""
+    """Results of a step, the reset by hand after it or None, answers of rows, and the episodes that ended."""
 
     step: tuple[Any, ...]
     reset: tuple[Any, ...] | None
@@ -212,7 +212,7 @@ class Found:
 
 @lru_cache(maxsize=3)
 def alone(name: str, mode: AutoresetMode) -> tuple[Any, list[Found]]:
-    """What single environments find: at the first reset and in each step."""
+    """Results of single environments, at the first reset and in each step."""
     case = CASES[name]
     run = Run(case, mode, Way(case.alone, 0))
     found = run.rest()
@@ -226,13 +226,13 @@ def alone(name: str, mode: AutoresetMode) -> tuple[Any, list[Found]]:
 
 @lru_cache(maxsize=3)
 def together(name: str, mode: AutoresetMode) -> tuple[Any, list[Found]]:
-    """What the most rows find on one thread."""
+    """Results of the most rows on one thread."""
     run = Run(CASES[name], mode, Way(CASES[name].most))
     return run.first, run.rest()
 
 
 def members(envs: Any) -> list[Any]:
-    """What can be copied and has a state: the vector environment, or the single ones under Gymnasium's."""
+    """Environments that can be copied and have a state: the vector one, or the single ones under Gymnasium's."""
     return list(envs.envs) if isinstance(envs, SyncVectorEnv) else [envs]
 
 

@@ -23,7 +23,7 @@ ALL = {**NOISY, **PUSHED, "strength": 0.7, "episode_seconds": 0.5}
 
 
 def alone(env_id, seed, taken, **settings):
-    """What a single environment gives, started again by itself after each episode."""
+    """Results of a single environment that is started again after each episode."""
     env = make(env_id, **settings)
     found, over = [env.reset(seed=seed)[0]], False
     for action in taken:
@@ -59,7 +59,7 @@ def test_a_row_has_the_bits_of_one_environment_on_any_number_of_threads(env_id, 
 
 
 def test_noise_and_bias_are_within_their_bounds_and_change_nothing_else():
-    """Of numbers that do not saturate the error is the difference from an environment without noise, in which
+    """The error of numbers that do not saturate is their difference from an environment without noise, in which
     the episode is the same."""
     noise, bias = 0.03, 0.02
     n, count = 64, 40
