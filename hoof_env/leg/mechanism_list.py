@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from functools import cache
 from importlib import resources
 from typing import Any
@@ -99,15 +99,19 @@ def _read_dyad(
     lengths = _names(f"{where}.lengths", keys["lengths"])
     if len(centres) != 2 or len(lengths) != 2:
         raise ParameterError(f"{where}: expected two points and two lengths, got {centres} and {lengths}")
-    for name in centres:
-        if name not in known:
-            raise ParameterError(
-                f"{where}: {point!r} lies at a length from {name!r}, which is not found before it; "
-                f"known are {', '.join(known)}"
-            )
+    _check_found(where, f"{point!r} lies at a length from", centres, known)
     for centre, name in zip(centres, lengths, strict=True):
         distances[frozenset((centre, point))] = name
     return Dyad(point, *centres, *lengths)
+
+
+def _check_found(where: str, told: str, names: Iterable[str], known: Mapping[str, None]) -> None:
+    """Check that a point stands after the points from which it is found."""
+    for name in names:
+        if name not in known:
+            raise ParameterError(
+                f"{where}: {told} {name!r}, which is not found before it; known are {', '.join(known)}"
+            )
 
 
 def _read_body_point(
@@ -125,12 +129,7 @@ def _read_body_point(
     origin = keys.get("from", body.tail)
     if origin not in ends:
         raise ParameterError(f"{where}.from: expected an end of {body.name!r}, {ends}, got {origin!r}")
-    for name in ends:
-        if name not in known:
-            raise ParameterError(
-                f"{where}: {point!r} lies on body {body.name!r}, whose end {name!r} is not found before it; "
-                f"known are {', '.join(known)}"
-            )
+    _check_found(where, f"{point!r} lies on body {body.name!r} between", ends, known)
     along, across = (_coordinate(f"{where}.{axis}", keys.get(axis, "")) for axis in ("along", "across"))
     if not along and not across:
         raise ParameterError(f"{where}: expected 'along' or 'across', else {point!r} is {origin!r} itself")

@@ -76,6 +76,6 @@ def loads(geometry, motion, joints, lock, driver, hip, toe, heel):
 
 
 def inertia(geometry, motion):
-    """Forces and moments that move the links against their weight: forces, shape (bodies, 2), and moments, shape (bodies,)."""
+    """Forces, shape (bodies, 2), and moments, shape (bodies,), that move the links against their weight."""
     force = geometry.body_masses[:, None] * np.add(motion.centre_accelerations, (0, GRAVITY))
     return force, geometry.body_inertias * motion.angular_accelerations

@@ -232,7 +232,7 @@ def together(name: str, mode: AutoresetMode) -> tuple[Any, list[Found]]:
 
 
 def members(envs: Any) -> list[Any]:
-    """Environments that can be copied and have a state: the vector one, or the single ones under Gymnasium's."""
+    """Environments with a state: the vector one, or the single ones under Gymnasium's."""
     return list(envs.envs) if isinstance(envs, SyncVectorEnv) else [envs]
 
 

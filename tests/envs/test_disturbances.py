@@ -59,7 +59,7 @@ def test_a_row_has_the_bits_of_one_environment_on_any_number_of_threads(env_id, 
 
 
 def test_noise_and_bias_are_within_their_bounds_and_change_nothing_else():
-    """The error of numbers that do not saturate is their difference from an environment without noise, in which
+    """Numbers that do not saturate differ by their error from those of an environment without noise, in which
     the episode is the same."""
     noise, bias = 0.03, 0.02
     n, count = 64, 40
