@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import json
 import warnings
-from dataclasses import asdict, is_dataclass
+from dataclasses import MISSING, asdict, fields, is_dataclass
 from pathlib import Path
 from typing import Any
 
@@ -64,6 +64,15 @@ def settings_of(env: Any) -> dict[str, Any]:
         return {}
     # Through JSON and back, because they are compared with what was read from a file: tuples become lists.
     plain: dict[str, Any] = json.loads(json.dumps(asdict(settings), default=str))
+    return plain
+
+
+def default_settings_of(env: Any) -> dict[str, Any]:
+    """Return the defaults of the settings of an environment of this package that have one, as `settings_of`
+    has them."""
+    defaults = {each.name: each.default for each in fields(env.unwrapped.settings)}
+    found = {name: value for name, value in defaults.items() if value is not MISSING}
+    plain: dict[str, Any] = json.loads(json.dumps(found, default=str))
     return plain
 
 
@@ -160,8 +169,10 @@ def check_record(path: Path, record: dict[str, Any], env: Any, env_id: str) -> N
     """
     refuse_misfit(path, record, {"env_id": env_id, **describe(env)})
     here = settings_of(env)
-    # A record without settings has the arguments only; the settings that they do not set count as equal.
+    # A record without settings has the arguments only; the settings that they do not set count as equal. One
+    # that its settings lack is newer than the policy, which was trained as the default has it.
     there = record.get("settings", here | record.get("env_kwargs", {}))
+    there = default_settings_of(env) | there if here else there
     # Environments of other packages have no settings to compare.
     names = sorted({*here, *record.get("settings", {})}) if here else []
     unlike = [

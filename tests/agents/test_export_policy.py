@@ -134,6 +134,15 @@ def test_other_settings_and_another_version_are_told(env, exported, trained, tmp
         find_policy(str(old), other, ENV_ID)
     with pytest.warns(UserWarning, match="trained with gone=1, here None$"):
         check_record(exported, {**record, "settings": {**record["settings"], "gone": 1}}, env, ENV_ID)
+    newer = {key: value for key, value in record["settings"].items() if key != "action_delay"}
+    with warnings.catch_warnings():
+        warnings.simplefilter("error", UserWarning)
+        check_record(exported, {**record, "settings": newer}, env, ENV_ID)
+    with (
+        make_env(ENV_ID, **KWARGS, action_delay=1.0) as other,
+        pytest.warns(UserWarning, match=r"trained with action_delay=0\.0, here 1\.0$"),
+    ):
+        check_record(exported, {**record, "settings": newer}, other, ENV_ID)
     monkeypatch.setattr("hoof_env.saved_record.__version__", "9.9.9")
     with pytest.warns(UserWarning, match=r"trained with hoof-env \d\S*, here 9\.9\.9$"):
         find_policy(str(exported), env, ENV_ID)

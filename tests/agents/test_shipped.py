@@ -4,6 +4,7 @@ import json
 import os
 import re
 import shutil
+import warnings
 from pathlib import Path
 
 import gymnasium as gym
@@ -54,7 +55,9 @@ def test_the_index_is_what_the_command_writes(tmp_path):
 @SHIPPED
 def test_score(folder):
     score = read(folder / "score.json")
-    with make_env(score["env_id"]) as env:
+    with make_env(score["env_id"]) as env, warnings.catch_warnings():
+        # No word of settings that are newer than the policy
+        warnings.simplefilter("error", UserWarning)
         policy = OnnxPolicy(folder).load(env, score["env_id"])
     recorded = np.mean(score["returns"][: score["check"]["episodes"]])
     allowed = score["check"]["tolerance"]
