@@ -15,7 +15,7 @@ from hoof_env.simd.compile import inline_llvm, kernel
 
 @inline_llvm
 def dot(a, b):  # type: ignore[no-untyped-def]
-    """Return the scalar product of two planar vectors."""
+    """Return the scalar product of two planar vectors, which `simd.dot` takes as planes alone."""
     return a.real * b.real + a.imag * b.imag
 
 
