@@ -4,7 +4,7 @@ wrong time and for assignments without effect."""
 from __future__ import annotations
 
 import copy
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from typing import Any
 
 import gymnasium as gym
@@ -20,6 +20,7 @@ from hoof_env.envs.batch_reports import summaries_of
 from hoof_env.envs.batch_states import state_of
 from hoof_env.envs.conditions import CHANGEABLE
 from hoof_env.envs.properties import LegProperties
+from hoof_env.envs.recording import Recording
 from hoof_env.errors import FixedSettingError, ParameterError, check_choice
 from hoof_env.gait import GaitParameters
 from hoof_env.render.renderer import check_side
@@ -78,6 +79,7 @@ class LegBase(LegProperties):
     metadata: dict[str, Any]
     render_mode: str | None
     _size: tuple[int, int]
+    _watched: dict[int, Recording]  # recordings by environment, of those that are drawn or recorded
     _spec: EnvSpec | None = None
     _as_json: tuple[Settings | None, dict[str, Any], list[str]] = (None, {}, [])
     _phase = "new"
@@ -154,8 +156,8 @@ class LegBase(LegProperties):
         or by `reset`.
 
         Args:
-            changes: some of `target_speed`, `target_seconds`, `terrain`, `reward_weights` and `randomize`, as
-                for `gymnasium.make`. Afterwards the environment is as if it had been made with them.
+            changes: some of the settings of `conditions.CHANGEABLE`, as for `gymnasium.make`. Afterwards the
+                environment is as if it had been made with them.
 
         Raises:
             ParameterError: a value is out of range, or the settings do not fit together; nothing has changed
@@ -232,12 +234,8 @@ class LegBase(LegProperties):
         """
         self._check_started("push")
         push_now(self.batch, forward, upward, envs)
-        for recording in self._recordings():
+        for recording in self._watched.values():
             recording.replace()
-
-    def _recordings(self) -> Sequence[Any]:
-        """Return the recordings of the environments."""
-        raise NotImplementedError
 
     def _check_open(self, call: str) -> None:
         """Raise `ClosedEnvironmentError` after `close`; `call` is the name of the method."""

@@ -17,7 +17,14 @@ from numba.core.errors import NumbaError
 from numpy.typing import NDArray
 
 from hoof_env.dynamics.parts import broken
-from hoof_env.envs.batch_build import check_choices, check_delays, make_engine, make_memory, task_record
+from hoof_env.envs.batch_build import (
+    check_choices,
+    check_delays,
+    check_vary,
+    make_engine,
+    make_memory,
+    task_record,
+)
 from hoof_env.envs.batch_kernels import BatchKernels
 from hoof_env.envs.batch_pushes import check_disturbances, push_due
 from hoof_env.envs.batch_starts import draw_targets, start
@@ -176,12 +183,7 @@ class EpisodeBatch(BatchKernels):
         self.target_seconds = check_range("target_seconds", s.target_seconds, shortest)
         check_disturbances(self)
         check_delays(self)
-        for group, needed in (("target", "target_speed"), ("ground", "terrain")):
-            value = getattr(s, needed)
-            if group in self.groups and value in (None, {}):
-                raise ParameterError(
-                    f"observation: {group!r} is constant without {needed}, got {needed}={value!r}"
-                )
+        check_vary(self)
 
     def _allocate(self) -> None:
         """Make the arrays of all episodes."""
@@ -255,7 +257,8 @@ class EpisodeBatch(BatchKernels):
             self.has_overrides[:] = True  # the engine's constants are those of the old settings
         if self.conditions.all:
             self.conditions.start(which)
-        if self.conditions.are_mixed:
+        # A start evaluates its neighbours again, too: under its settings, and with pushes that are unseen.
+        if self.conditions.are_mixed or self.is_push_unseen:
             drawn: dict[str, Floats] = keep_others(
                 self, which, lambda: start(self, which, generators, options)
             )

@@ -166,8 +166,29 @@ def check_delays(batch: Any) -> None:
     batch.history = check_kept("observation_history", s.observation_history, 1)
     batch.last_actions = check_kept("last_actions", s.last_actions, 0)
     batch.privileged = ()
-    if len(s.privileged):
+    if not isinstance(s.privileged, (list, tuple)) or s.privileged:
         batch.privileged = check_groups(s.privileged, groups_of(batch.task.entries), "privileged")
+
+
+def check_vary(batch: Any) -> None:
+    """Check that groups that an `EpisodeBatch` observes are not constant, and that those which settings name
+    are observed.
+
+    Raises:
+        ParameterError: a group is constant without another setting, or has nothing on this trunk.
+    """
+    s = batch.settings
+    for group, needed in (("target", "target_speed"), ("ground", "terrain")):
+        value = getattr(s, needed)
+        for name, groups in (("observation", batch.groups), ("privileged", batch.privileged)):
+            if group in groups and value in (None, {}):
+                raise ParameterError(
+                    f"{name}: {group!r} is constant without {needed}, got {needed}={value!r}"
+                )
+    for name in ("noise", "bias", "privileged"):
+        for group in getattr(batch, name):
+            if not observed([group], s.trunk, s.drive, batch.task.entries):
+                raise ParameterError(f"{name}: nothing of {group!r} is observed on a {s.trunk} trunk")
 
 
 def find_entries(batch: Any) -> None:

@@ -9,9 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hoof_env.dynamics.engine import TrunkEngine
-from hoof_env.dynamics.parts import MOST_IMPULSE
 from hoof_env.errors import ParameterError, check_number
 from hoof_env.tasks.disturbances import (
+    MOST_PUSH,
     MOST_STRENGTH,
     Push,
     check_noise,
@@ -37,7 +37,7 @@ def check_disturbances(batch: Any) -> None:
     batch.given_pushes = check_pushes("pushes", s.pushes, batch.dt, batch.steps_per_episode)
     batch.push_impulse = None
     if s.push_impulse is not None:
-        batch.push_impulse = check_range("push_impulse", s.push_impulse, -MOST_IMPULSE)
+        batch.push_impulse = check_range("push_impulse", s.push_impulse, -MOST_PUSH, MOST_PUSH)
     # Intervals shorter than a control step do no harm where nothing is pushed
     shortest = batch.dt if batch.push_impulse else 0.0
     batch.push_seconds = check_range("push_seconds", s.push_seconds, shortest)

@@ -63,7 +63,7 @@ class HorseLegEnv(LegBase, gym.Env[NDArray[np.float32], NDArray[np.float32]]):
         spaces_of = self._make(task, settings, 1, render_mode, (width, height))
         self.observation_space, self.action_space = spaces_of
         self._began_with = b"", 0.0
-        self._recording: Recording | None = Recording(self.batch, 0, self._size) if render_mode else None
+        self._watched = {0: Recording(self.batch, 0, self._size)} if render_mode else {}
         self._attach()
 
     def _attach(self) -> None:
@@ -101,12 +101,9 @@ class HorseLegEnv(LegBase, gym.Env[NDArray[np.float32], NDArray[np.float32]]):
             ResetNeeded: there is no episode yet.
         """
         self._check_started("record")
-        if self._recording is None:
-            self._recording = Recording(self.batch)
-        return self._recording.last()
-
-    def _recordings(self) -> list[Recording]:
-        return [] if self._recording is None else [self._recording]
+        if not self._watched:
+            self._watched[0] = Recording(self.batch)
+        return self._watched[0].last()
 
     # Gymnasium
 
@@ -134,8 +131,8 @@ class HorseLegEnv(LegBase, gym.Env[NDArray[np.float32], NDArray[np.float32]]):
         if self.batch.addresses is not before:  # `change_settings` took effect: other arrays
             self._attach()
         self._phase = "running"
-        if self._recording is not None:
-            self._recording.begin()
+        if self._watched:
+            self._watched[0].begin()
             if self.render_mode == "human":
                 self.render()
         self._begin()
@@ -187,8 +184,8 @@ class HorseLegEnv(LegBase, gym.Env[NDArray[np.float32], NDArray[np.float32]]):
             info |= ending_of(self.batch, 0)
             if broken(self.batch.engine.results)[0]:  # the step was taken back: it has no sums
                 info["measured"][self.batch.measurements.last_step] = 0.0
-        if self._recording is not None:
-            self._recording.add()
+        if self._watched:
+            self._watched[0].add()
             if self.render_mode == "human":
                 self.render()
         return observe(), rewards[0], failed, truncated, info
@@ -234,14 +231,13 @@ class HorseLegEnv(LegBase, gym.Env[NDArray[np.float32], NDArray[np.float32]]):
             gym.logger.warn("render() was called without a render_mode: pass 'rgb_array' or 'human'")
             return None
         self._check_started("render")
-        recording: Any = self._recording  # made at once with a render_mode
-        return recording.frame(self.render_mode, self.metadata["render_fps"])
+        return self._watched[0].frame(self.render_mode, self.metadata["render_fps"])
 
     def close(self) -> None:
         """Close the window, if any."""
         self._phase = "closed"
-        if self._recording is not None:
-            self._recording.close()
+        if self._watched:
+            self._watched[0].close()
 
     # State
 
@@ -267,8 +263,8 @@ class HorseLegEnv(LegBase, gym.Env[NDArray[np.float32], NDArray[np.float32]]):
         self._phase = "ended" if self.batch.episode_rows.ended[0] else "running"
         if self._start_and_target() != self._began_with:  # a planner's states are of one episode
             self._begin()
-        if self._recording is not None:
-            self._recording.begin()
+        if self._watched:
+            self._watched[0].begin()
         return self.batch.observations[0].copy()
 
     def __getstate__(self) -> dict[str, Any]:

@@ -10,7 +10,6 @@ from numpy.typing import NDArray
 
 from hoof_env.envs.base import LegBase, array_of, generator_of
 from hoof_env.envs.batch_states import set_state, spread_state
-from hoof_env.envs.recording import Recording
 from hoof_env.envs.rows import UNKNOWN_SEED
 from hoof_env.errors import ParameterError
 
@@ -23,7 +22,6 @@ class RowStates(LegBase):
     _started: NDArray[np.bool_]
     _generators: list[np.random.Generator]
     _seeds: list[int]
-    _watched: dict[int, Recording]
 
     def _observed(self) -> NDArray[np.float32]:
         """Return the observations, a copy that later steps do not change."""

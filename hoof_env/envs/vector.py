@@ -116,9 +116,6 @@ class HorseLegVectorEnv(  # type: ignore[misc]  # generators are of all
         self._ended = np.zeros(self.num_envs, bool)
         self._started = np.zeros(self.num_envs, bool)
 
-    def _recordings(self) -> list[Recording]:
-        return [*self._watched.values()]
-
     # Gymnasium
 
     def reset(

@@ -16,6 +16,9 @@ MOST_NOISE = 10.0
 MOST_STRENGTH = 10.0
 """Largest factor of all disturbances."""
 
+MOST_PUSH = MOST_IMPULSE / MOST_STRENGTH
+"""Largest impulse of a planned push [N s], so that it is possible at any strength."""
+
 Push = tuple[int, float, float]
 """Control step after which the trunk is pushed, impulse forward and upward [N s]."""
 
@@ -44,6 +47,11 @@ def check_noise(name: str, given: Any, groups: Sequence[str]) -> dict[str, float
     }
 
 
+def _listed(value: Any) -> Any:
+    """Return an array as a list; other values as they are."""
+    return value.tolist() if isinstance(value, np.ndarray) else value
+
+
 def check_pushes(name: str, given: Any, dt: float, steps: int) -> tuple[Push, ...]:
     """Return given pushes in the order of their times.
 
@@ -58,20 +66,26 @@ def check_pushes(name: str, given: Any, dt: float, steps: int) -> tuple[Push, ..
     """
     if given is None:
         return ()
+    given = _listed(given)
     rows = list(given) if isinstance(given, Iterable) and not isinstance(given, (str, Mapping)) else [given]
-    pushes = []
-    for k, row in enumerate(rows):
-        if not isinstance(row, (list, tuple, np.ndarray)) or len(row) != 3:
+    impulses: dict[int, tuple[float, float]] = {}
+    for k, row in enumerate(map(_listed, rows)):
+        if not isinstance(row, (list, tuple)) or len(row) != 3:
             raise ParameterError(f"{name}[{k}]: expected [s, N s forward, N s upward], got {row!r}")
         last = (steps - 1) * dt
         seconds = check_number(f"{name}[{k}], time", row[0], low=0.0, high=last)
         forward, upward = (
-            check_number(f"{name}[{k}], impulse", value, low=-MOST_IMPULSE, high=MOST_IMPULSE)
-            for value in row[1:]
+            check_number(f"{name}[{k}], impulse", value, low=-MOST_PUSH, high=MOST_PUSH) for value in row[1:]
         )
         # A push at the very start comes after the first step: the start has a speed of its own.
-        pushes.append((max(round(seconds / dt), 1), forward, upward))
-    return tuple(sorted(pushes))
+        step = max(round(seconds / dt), 1)
+        before = impulses.get(step, (0.0, 0.0))
+        # The sum of all pushes of a step is one push, which is limited, too.
+        impulses[step] = (
+            check_number(f"{name}[{k}], impulse", before[0] + forward, low=-MOST_PUSH, high=MOST_PUSH),
+            check_number(f"{name}[{k}], impulse", before[1] + upward, low=-MOST_PUSH, high=MOST_PUSH),
+        )
+    return tuple((step, *impulses[step]) for step in sorted(impulses))
 
 
 ROUGH_PUSH = 1.5

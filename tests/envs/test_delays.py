@@ -150,6 +150,13 @@ def test_delays_that_are_drawn_are_all_that_may_be():
         ({"last_actions": 1.5}, "last_actions: expected a whole number"),
         ({"privileged": ["nothing"]}, "privileged: expected a list of some of"),
         ({"privileged": "trunk"}, "privileged: expected a list of some of"),
+        ({"privileged": 3}, "privileged: expected a list of some of"),
+        ({"privileged": None}, "privileged: expected a list of some of"),
+        (
+            {"privileged": ["target"], "target_speed": None},
+            "privileged: 'target' is constant without target_speed",
+        ),
+        ({"privileged": ["ground"]}, "privileged: 'ground' is constant without terrain"),
         ({"episode_seconds": 0.02, "action_delay": 1}, "action_delay: expected"),
     ],
     ids=str,
@@ -157,6 +164,25 @@ def test_delays_that_are_drawn_are_all_that_may_be():
 def test_what_cannot_be_is_refused_in_words(given, words):
     with pytest.raises(ParameterError, match=words):
         gym.make(LEG, **given)
+
+
+def test_true_numbers_have_no_noise():
+    privileged = ["trunk", "hoof"]
+    noise = dict.fromkeys(privileged, 0.2)
+    noisy, plain = make(LEG, noise=noise, bias=noise, privileged=privileged), make(LEG)
+    true = [k for k, name in enumerate(noisy.observation_names) if name.startswith("true ")]
+    same_names = [noisy.observation_names[k].removeprefix("true ") for k in true]
+    of_plain = [plain.observation_names.index(name) for name in same_names]
+    observed = [(noisy.reset(seed=1)[0], plain.reset(seed=1)[0])]
+    observed += [(noisy.step(action)[0], plain.step(action)[0]) for action in actions(1, 12)]
+    for one, other in observed:
+        same(one[true], other[of_plain])
+        assert not np.array_equal(one[of_plain], other[of_plain])
+
+
+def test_true_numbers_that_a_fixed_trunk_has_not_are_refused():
+    with pytest.raises(ParameterError, match="privileged: nothing of 'trunk' is observed on a fixed trunk"):
+        gym.make(FIXED, privileged=["trunk"])
 
 
 def test_the_paper_s_solver_takes_whole_steps():

@@ -176,6 +176,74 @@ def test_given_pushes_come_at_their_times():
     assert np.isinf(option.batch.episode_rows.push_at[0]), "the option was for one episode"
 
 
+def test_strength_is_a_factor_of_pushes():
+    env, plain = make(LEG, pushes=[[0.06, 5.0, -2.0]], strength=3.0), make(LEG)
+    for one in (env, plain):
+        one.reset(seed=3)
+        steps(one, 3)
+    moved = [env.engine.state[name][0] - plain.engine.state[name][0] for name in ("momentum_x", "momentum_y")]
+    assert moved == pytest.approx([15.0, -6.0])
+
+
+def test_a_push_that_no_step_shows_stays_so_where_neighbours_start():
+    """Starts evaluate all environments side by side again, which are pushed already."""
+    n = 19
+    envs = make(LEG, n, pushes=[[0.04, 30.0, 0.0]])
+    envs.reset(seed=0)
+    seen, *_, info = steps(envs, 2)[-1]
+    mask = np.isin(np.arange(n), [1, 12])
+    observations, started = envs.reset(options={"reset_mask": mask})
+    same(observations[~mask], seen[~mask])
+    same(started["measured"]["vx"][~mask], info["measured"]["vx"][~mask])
+    assert not np.array_equal(observations[mask], seen[mask])
+
+
+def test_states_between_pushes_are_observed_as_they_were():
+    env, other = make(LEG, **PUSHED), make(LEG, **PUSHED)
+    env.reset(seed=1)
+    for action in actions(2, 12):
+        seen = env.step(action)[0]
+        same(other.set_state(env.get_state()), seen)
+
+
+def test_rows_under_other_settings_have_the_bits_of_one_environment():
+    """While some rows are under older disturbances, each has its own, those that are drawn later, too."""
+    n = 11
+    new = {"push_impulse": (60.0, 90.0), "push_seconds": (0.1, 0.2), "noise": {"hoof": 0.1}, "strength": 1.5}
+    envs = make(LEG, n, **NOISY, **PUSHED)
+    envs.reset(seed=5)
+    began = np.isin(np.arange(n), [1, 2, 9])
+    taken = actions(3, 28, n)
+    for each in taken[:3]:
+        envs.step(each)
+    envs.change_settings(**new)
+    envs.reset(options={"reset_mask": began})
+    found = [envs.step(each)[:2] for each in taken[3:]]
+    for row in (0, 1, 8, 9):
+        env = make(LEG, **NOISY, **PUSHED)
+        env.reset(seed=5 + row)
+        for action in taken[:3, row]:
+            env.step(action)
+        if began[row]:
+            env.change_settings(**new)
+            env.reset()
+        for action, (observations, rewards) in zip(taken[3:, row], found, strict=True):
+            observation, reward, terminated, *_ = env.step(action)
+            assert not terminated
+            same(observation, observations[row])
+            assert reward == rewards[row]
+
+
+def test_a_copy_keeps_its_own_pushes():
+    given = {"pushes": [[0.1, 5.0, 0.0], [0.2, 10.0, -4.0]]}
+    env, wanted = make(LEG), make(LEG)
+    for one in (env, wanted):
+        one.reset(seed=3, options=given)
+    twin = copy.deepcopy(env)
+    env.reset(seed=4)
+    same([s[:4] for s in steps(twin, 14)], [s[:4] for s in steps(wanted, 14)])
+
+
 def test_records_follow_pushes():
     """Substeps that are run again for a record end where the step ended."""
     env = make(HORSE, **PUSHED)
@@ -250,6 +318,14 @@ REFUSED = [
     (LEG, {"pushes": [[10.0, 2.0, 0.0]]}, r"pushes\[0\], time: expected"),
     (LEG, {"drive": "motor", "push_impulse": 3.0}, 'push_impulse: expected none with drive="motor"'),
     (RAIL, {"pushes": [[1.0, 2.0, 1.0]]}, "pushes: expected no impulse upward on a rail"),
+    (LEG, {"push_impulse": 2e5}, r"push_impulse\[0\]: expected a finite number in \[-100000, 100000\]"),
+    (
+        LEG,
+        {"pushes": [[1.0, 9e4, 0.0], [1.0, 9e4, 0.0]]},
+        r"pushes\[1\], impulse: expected a finite number in",
+    ),
+    (FIXED, {"noise": {"trunk": 0.1}}, "noise: nothing of 'trunk' is observed on a fixed trunk"),
+    (FIXED, {"bias": {"trunk": 0.1}}, "bias: nothing of 'trunk' is observed on a fixed trunk"),
     (FIXED, {"push_impulse": 3.0}, "push_impulse: expected"),
     (FIXED, {"pushes": [[0.5, 2.0, 0.0]]}, "pushes: expected"),
     (FIXED, {"solver": "paper", "pushes": [[0.5, 2.0, 0.0]]}, "pushes: expected"),
@@ -274,7 +350,12 @@ def test_calls_and_options_that_cannot_be_are_refused_and_change_nothing():
     for bad in ((np.nan,), ("far",), (np.zeros(2),), (1.0, np.inf), (1.0, 0.0, [7])):
         with pytest.raises(ParameterError):
             leg.push(*bad)
-    for options in ({"strength": -1.0}, {"pushes": [[99.0, 1.0, 1.0]]}, {"pushes": "often"}):
+    for options in (
+        {"strength": -1.0},
+        {"pushes": [[99.0, 1.0, 1.0]]},
+        {"pushes": "often"},
+        {"pushes": np.array(3.0)},
+    ):
         with pytest.raises(ParameterError):
             leg.reset(options=options)
     with pytest.raises(ParameterError, match="fixed trunk"):
@@ -293,3 +374,9 @@ def test_calls_and_options_that_cannot_be_are_refused_and_change_nothing():
 
 def test_a_push_is_rounded_to_control_steps_and_sorted():
     assert check_pushes("pushes", [[0.051, 1, 0], [0.0, 2, 3]], 0.02, 10) == ((1, 2.0, 3.0), (3, 1.0, 0.0))
+
+
+def test_pushes_of_one_step_add_up():
+    given = [[0.06, 5.0, 0.0], [0.061, 1.0, 3.0], [0.02, 2.0, 0.0]]
+    assert check_pushes("pushes", given, 0.02, 10) == ((1, 2.0, 0.0), (3, 6.0, 3.0))
+    assert check_pushes("pushes", np.array(given), 0.02, 10) == ((1, 2.0, 0.0), (3, 6.0, 3.0))

@@ -174,4 +174,4 @@ def test_the_manual_and_the_picture_of_a_small_leg_have_its_limits():
     high = 8 * np.pi
     env.reset(seed=0, options={"gait": {**asdict(gait_of_size("walk", 0.25)), "crank_speed": high}})
     env.render()
-    assert env.unwrapped._recording.renderer._panel._limits["crank_speed"][1] == pytest.approx(high)
+    assert env.unwrapped._watched[0].renderer._panel._limits["crank_speed"][1] == pytest.approx(high)

@@ -276,7 +276,7 @@ def test_stances_and_peaks_are_those_of_the_reward(gait):
         observation, _, failed, truncated, info = env.step(policy.predict(observation)[0])
         ended = failed or truncated
     env.render()
-    summary, stances = info["episode_summary"], env._recording.renderer.stances
+    summary, stances = info["episode_summary"], env._watched[0].renderer.stances
     assert len(stances.peaks) == summary["stances"] > 2
     assert sum(peak.force for peak in stances.peaks) == pytest.approx(summary["stance_peak_sum_n"])
     assert stances.highest == pytest.approx(summary["highest_grf_n"])
