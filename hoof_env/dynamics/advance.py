@@ -251,13 +251,23 @@ def leg_memory_of(at, i, n, row, far, lanes, form):  # type: ignore[no-untyped-d
 
 
 @inline_source
-def load(trunk, legs, leg_count, memory, at, n, row, far, lanes, form):  # type: ignore[no-untyped-def]
-    """Load the environments from column n on."""
+def load(trunk, legs, leg_count, account, memory, at, n, row, far, lanes, form):  # type: ignore[no-untyped-def]
+    """Load the environments from column n on, with an account of 0."""
     read_trunk(trunk, memory)
     if form.has_limits:
         clear_limits(trunk)
     for i in range(leg_count):
         read_leg(block_at(legs, i), leg_memory_of(at, i, n, row, far, lanes, form), form)
+    for k in range(form.account_size):
+        account[k] = 0.0
+
+
+@inline_source
+def start_motion(trunk, legs, leg_count, model, starts):  # type: ignore[no-untyped-def]
+    """Turn the velocities of the environments that start into momenta."""
+    begin_step(trunk, legs, leg_count, model)
+    if model.kind != FIXED:
+        velocities_to_momenta(trunk, legs, leg_count, model, starts)
 
 
 @inline_source
@@ -343,25 +353,19 @@ def advance_of(
         unpacked = unpack_model(model, tables, ground, doubles(8 + 3 * form.gait), lanes_are_legs, law, form)
         at = address(data)
         row = data.shape[1]
-        count = max(steps, 0)
         # lanes are neighbouring columns; lanes that are legs are as far apart as the legs' rows in one column
-        near = 0 if lanes_are_legs else 1
         far = form.leg_rows * row if lanes_are_legs else 1
         if reacts or form.has_limits:
             read_shapes(shapes, leg_count, constants, lanes, lanes_are_legs, form)
         for n in range(begin, end, 1 if lanes_are_legs else lanes):
-            memory = columns(at, lanes, form.trunk_memory, n, row, near)
+            memory = columns(at, lanes, form.trunk_memory, n, row, 0 if lanes_are_legs else 1)
             before = memory.result
             starts = before == RESET_REQUESTED
             if steps < 0 and not any_lane(starts):
                 continue
-            load(trunk, legs, leg_count, memory, at, n, row, far, lanes, form)
-            for k in range(form.account_size):
-                account[k] = 0.0
+            load(trunk, legs, leg_count, account, memory, at, n, row, far, lanes, form)
             if steps < 0:
-                begin_step(trunk, legs, leg_count, unpacked)
-                if unpacked.kind != FIXED:
-                    velocities_to_momenta(trunk, legs, leg_count, unpacked, starts)
+                start_motion(trunk, legs, leg_count, unpacked, starts)
             run_steps(
                 trunk,
                 legs,
@@ -371,7 +375,7 @@ def advance_of(
                 shapes,
                 forces,
                 h,
-                count,
+                max(steps, 0),
                 keeps_account,
                 reacts,
                 joints,
