@@ -98,7 +98,7 @@ def slider(
     low, high = place(low), place(high)
     step = step or 10.0 ** math.floor(math.log10((high - low) / NOTCHES))
     marks = tuple(
-        ((place(number) - low) / (high - low), f"{number:.4g}")
+        ((place(number) - low) / (high - low), f"{round(number, 3):.6g}")
         for number in paper_values().get(name, ())
         if span[0] <= number <= span[1]
     )

@@ -94,6 +94,7 @@ class Drawing:
 
     Attributes:
         places: where glyphs find their numbers.
+        has_heel: False for legs with one foot, which is called toe.
         full_scale: force of an arrow of `ARROW_M` at a leg of a horse's size [N].
         low, high, half_width: what the camera shows around its place [m].
         size, girth: size of trunk and arrows, and of legs, over that of their usual drawing [-].
@@ -111,6 +112,7 @@ class Drawing:
         self._setting = setting
         self._leg = LegOutline(setting.geometry)
         self._geometry = setting.geometry
+        self.has_heel = setting.geometry.heel is not None
         self._find_points()
         self.size = self.girth = 1.0
         self._measure()
@@ -235,7 +237,7 @@ class Drawing:
             forces.append(complex(now.force_x, now.force_y))
         lengths = np.array(forces) / self.full_scale
         hoof = np.abs(lengths[2::3])
-        drawn = np.repeat(hoof >= LEAST_FORCE, 3)
+        drawn = np.repeat(hoof >= LEAST_FORCE, 3) & (np.abs(lengths) > 0)
         shown: Any = ARROW_M * self.size * np.where(drawn, lengths, 0j)
         # An arrow that is not drawn is a point at the toe: a centre of pressure without load is at 0, 0.
         start = np.where(drawn, np.array(tails), np.repeat(np.array(tails)[::3], 3))

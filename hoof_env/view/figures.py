@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -13,7 +13,7 @@ from hoof_env.ground.terrain import Terrain
 from hoof_env.render import colours, kinds
 from hoof_env.render.colours import Colour
 from hoof_env.view.drawing import Drawing
-from hoof_env.view.history import PATHS
+from hoof_env.view.history import paths_of
 
 SECONDS = 3.0  # time that curves show [s]
 DEEP = 9.0  # how far below the surface the soil is drawn [m]
@@ -47,6 +47,12 @@ FAINT = hex_of(colours.FAINT)
 def leg_name(prefix: str) -> str:
     """Return the name of a leg from the prefix of its columns."""
     return prefix.rstrip("_").replace("_", " ") or "leg"
+
+
+TICKS = (
+    "return Math.abs(tick) >= 1e4 ? Number((tick / 1e3).toPrecision(6)) + 'k' : Number(tick.toPrecision(6))"
+)
+"""Script of the texts at ticks: thousands as k, and without the digits that rounding errors add."""
 
 
 class Line(NamedTuple):
@@ -175,8 +181,10 @@ class Scene:
 
     def paint_paths(self) -> ColumnDataSource:
         """Draw the paths of toe and heel; return their source, whose columns are some of the curves'."""
-        source = ColumnDataSource({name: [] for name in PATHS})
-        for point, colour in (("toe", colours.TOE), ("heel", colours.HEEL)):
+        has_heel = self.drawing.has_heel
+        source = ColumnDataSource({name: [] for name in paths_of(has_heel)})
+        points = (("toe", colours.TOE), ("heel", colours.HEEL))
+        for point, colour in points if has_heel else points[:1]:
             look: dict[str, Any] = {"line_color": hex_of(colour), "line_width": 1.4, "line_alpha": 0.8}
             self.figure.line(f"{point}_x", f"{point}_y", source=source, **look)
         return source
@@ -243,7 +251,7 @@ def curve_figure(
     )
     dress(f)
     f.xaxis.axis_label = "time [s]"
-    f.yaxis.formatter = CustomJSTickFormatter(code="return Math.abs(tick) >= 1e4 ? tick / 1e3 + 'k' : tick")
+    f.yaxis.formatter = CustomJSTickFormatter(code=TICKS)
     for line in lines:
         look: dict[str, Any] = {"line_color": hex_of(line.colour), "line_dash": line.dash, "line_width": 1.7}
         f.line("time", line.column, source=source, **look)
@@ -285,12 +293,13 @@ def bars_figure(source: ColumnDataSource, terms: Sequence[str]) -> Any:
     return f
 
 
-def line_sets(legs: Sequence[str], overlaid: bool) -> Mapping[str, tuple[str, list[Line]]]:
+def line_sets(legs: Sequence[str], columns: Collection[str]) -> Mapping[str, tuple[str, list[Line]]]:
     """Return the figures of curves by name: title with unit, and lines.
 
     Args:
         legs: prefixes of the legs.
-        overlaid: True if elastic and inelastic ground are shown for the same motion.
+        columns: columns of the curves: elastic and inelastic ground are shown for the same motion, and the
+            angle of the hoof, where there are such columns.
     """
 
     def each(column: str) -> list[Line]:
@@ -299,7 +308,7 @@ def line_sets(legs: Sequence[str], overlaid: bool) -> Mapping[str, tuple[str, li
         return [Line(f"{leg}{column}", leg_name(leg), colours.OF_LEGS[k]) for k, leg in enumerate(legs)]
 
     normal = each("normal")
-    if overlaid:
+    if "elastic" in columns:
         normal = [
             Line("elastic", "elastic ground", colours.TOE, "dashed"),
             Line("inelastic", "inelastic ground", colours.CRANK, "dotted"),
@@ -309,7 +318,7 @@ def line_sets(legs: Sequence[str], overlaid: bool) -> Mapping[str, tuple[str, li
         forces = [Line("grf", "resultant", colours.FORCE), Line("friction", "friction", colours.TOE)]
     else:
         forces = each("friction")
-    return {
+    sets = {
         "normal": ("normal force [N]", normal),
         "forces": ("ground reaction force [N]" if len(legs) == 1 else "friction [N]", forces),
         "hoof_angle": ("hoof angle, heel up [deg]", each("hoof_angle")),
@@ -317,3 +326,4 @@ def line_sets(legs: Sequence[str], overlaid: bool) -> Mapping[str, tuple[str, li
         "torque": ("crank torque [N m]", each("torque")),
         "power": ("crank power [W]", each("power")),
     }
+    return {name: found for name, found in sets.items() if found[1][0].column in columns}

@@ -29,7 +29,14 @@ PATHS = ("toe_x", "toe_y", "heel_x", "heel_y")
 """Columns of a single leg's paths."""
 
 
-def curves_of(chunk: Chunk, legs: Sequence[str], lift_off: float, begin: float = 0.0) -> Columns:
+def paths_of(has_heel: bool) -> tuple[str, ...]:
+    """Return the columns of a single leg's paths, without those of a heel where it has one foot."""
+    return PATHS if has_heel else PATHS[:2]
+
+
+def curves_of(
+    chunk: Chunk, legs: Sequence[str], lift_off: float, begin: float = 0.0, has_heel: bool = True
+) -> Columns:
     """Return the curves of a chunk, sums and angles of its columns; shape (n,).
 
     Args:
@@ -37,25 +44,27 @@ def curves_of(chunk: Chunk, legs: Sequence[str], lift_off: float, begin: float =
         legs: prefixes of the legs.
         lift_off: normal force that tells stance from swing [N].
         begin: time of the page at which the episode began [s].
+        has_heel: False for legs with one foot, which have neither a path of the heel nor an angle of a hoof.
     """
     columns = chunk.columns
     curves: Columns = {"time": begin + columns["time"]}
     for k, leg in enumerate(legs):
         normal = columns[f"{leg}toe_normal"] + columns[f"{leg}heel_normal"]
-        rise = columns[f"{leg}heel_y"] - columns[f"{leg}toe_y"]
-        run = columns[f"{leg}toe_x"] - columns[f"{leg}heel_x"]
         curves |= {
             f"{leg}normal": normal,
             f"{leg}friction": columns[f"{leg}toe_friction"] + columns[f"{leg}heel_friction"],
             f"{leg}grf": np.hypot(columns[f"{leg}force_x"], columns[f"{leg}force_y"]),
-            f"{leg}hoof_angle": np.degrees(np.arctan2(rise, run)),
             f"{leg}crank_speed": columns[f"{leg}crank_angle_rate"],
             f"{leg}torque": chunk.drives[f"{leg}crank_torque"],
             f"{leg}power": chunk.drives[f"{leg}crank_power"],
             f"{leg}stance": np.where(normal > lift_off, float(len(legs) - k), np.nan),
         }
+        if has_heel:
+            rise = columns[f"{leg}heel_y"] - columns[f"{leg}toe_y"]
+            run = columns[f"{leg}toe_x"] - columns[f"{leg}heel_x"]
+            curves[f"{leg}hoof_angle"] = np.degrees(np.arctan2(rise, run))
     if len(legs) == 1:
-        curves |= {name: columns[name] for name in PATHS}
+        curves |= {name: columns[name] for name in paths_of(has_heel)}
     return curves | chunk.normals
 
 
@@ -104,7 +113,7 @@ class StanceNumbers:
 
 
 class History:
-    """Curves, rows and terms that a page can show again; what is older than `KEPT` is dropped."""
+    """Curves and rows that a page can show again; what is older than `KEPT` is dropped."""
 
     def __init__(self) -> None:
         self.clear()
@@ -113,7 +122,6 @@ class History:
         """Drop everything."""
         self._curves: deque[Columns] = deque()
         self._rows: deque[NDArray[np.float32]] = deque()
-        self._steps: deque[dict[str, float]] = deque()
 
     def add_curves(self, curves: Columns) -> None:
         """Keep curves."""
@@ -126,18 +134,12 @@ class History:
         if not self._rows or row[0] >= self._rows[-1][0] + 0.0099:
             self._rows.append(row.astype(np.float32))
 
-    def add_step(self, time: float, terms: dict[str, float]) -> None:
-        """Keep the reward's terms of a control step that ended at a time [s]."""
-        self._steps.append({"time": time} | terms)
-
     def _drop(self, before: float) -> None:
         """Drop what is older than a time [s]."""
         while self._curves[0]["time"][-1] < before:
             self._curves.popleft()
         while self._rows and self._rows[0][0] < before:
             self._rows.popleft()
-        while self._steps and self._steps[0]["time"] < before:
-            self._steps.popleft()
 
     @property
     def span(self) -> tuple[float, float]:
@@ -157,13 +159,8 @@ class History:
         inside = (whole["time"] >= first) & (whole["time"] <= last)
         return {name: values[inside] for name, values in whole.items()}
 
-    def steps_between(self, first: float, last: float) -> list[dict[str, float]]:
-        """Return times and terms of the control steps from one time to another [s]."""
-        return [step for step in self._steps if first <= step["time"] <= last]
-
     @property
     def size(self) -> int:
         """Numbers in memory."""
         curves = sum(len(part) * len(part["time"]) for part in self._curves)
-        rows = sum(len(row) for row in self._rows)
-        return curves + rows + sum(len(step) for step in self._steps)
+        return curves + sum(len(row) for row in self._rows)

@@ -44,8 +44,10 @@ def new_look(player: Player) -> Look:
 
 
 def template(name: str) -> Template:
-    """Return a template of the room, which extends Bokeh's own."""
-    files = Environment(loader=FileSystemLoader(FOLDER), trim_blocks=True, lstrip_blocks=True)
+    """Return a template of the room, which extends Bokeh's own; texts from outside are escaped in it."""
+    files = Environment(
+        loader=FileSystemLoader(FOLDER), autoescape=True, trim_blocks=True, lstrip_blocks=True
+    )
     return files.get_template(name)
 
 
@@ -95,7 +97,7 @@ def fill(doc: Any, look: Look, told: ColumnDataSource, asked: ColumnDataSource) 
     player = look.player
     simulation = player.simulation
     scene = figures.Scene(player.drawing, simulation.setting.terrain)
-    sets = figures.line_sets(player.legs, "elastic" in look.curves.data)
+    sets = figures.line_sets(player.legs, look.curves.data)
     curves = [figures.curve_figure(name, title, lines) for name, (title, lines) in sets.items()]
     if len(player.legs) > 1:
         curves.append(figures.footfall_figure(player.legs))
@@ -133,13 +135,15 @@ def variables(player: Player, shown: list[figures.Curves]) -> dict[str, Any]:
         "simulation": simulation,
         "summary": env.task.summary,
         "figures": [legend_of(each) for each in shown],
+        "has_heel": drawing.has_heel,
         "legs": [figures.leg_name(leg) for leg in player.legs],
         "stance": STANCE,
         "ids": controls.known_ids(),
         "presets": controls.known_presets(),
         "preset": env.settings.preset,
         "policies": controls.known_policies(simulation),
-        "policy": simulation.policy or default_policy(env),
+        "policy": simulation.policy_name or "",
+        "default": default_policy(env),
         "arguments": controls.as_text(arguments),
         "groups": controls.setting_sliders(simulation),
         "gait": controls.gait_sliders(simulation),

@@ -21,7 +21,6 @@ from hoof_env.render import colours
 from hoof_env.render.colours import Colour
 from hoof_env.render.instant import Columns
 from hoof_env.view import figures
-from hoof_env.view.history import PATHS
 from hoof_env.view.layout import legend_of, scene_arguments, script, template
 from hoof_env.view.player import Player
 from hoof_env.view.simulation import Chunk, Simulation
@@ -131,7 +130,8 @@ class Playback:
             )
             parts = scene_arguments(scene, record.player)
             if parts["paths"] is not None:
-                parts["paths"].data = {name: record.curves[name] for name in PATHS}
+                paths = parts["paths"]
+                paths.data = {name: record.curves[name] for name in paths.data}
             data = ColumnDataSource({"row": np.ascontiguousarray(record.rows).ravel()})
             views.append({"parts": parts, "rows": data, "count": len(record.rows)})
             doc.add_root(scene.figure)
@@ -166,7 +166,7 @@ class Playback:
         if len(self.records) > 1:
             return self._figures_of_several()
         (record,) = self.records
-        sets = figures.line_sets(record.player.legs, "elastic" in record.curves)
+        sets = figures.line_sets(record.player.legs, record.curves)
         shown = [figures.curve_figure(name, *sets[name]) for name in OF_ONE if name in sets]
         if len(record.player.legs) > 1:
             shown = shown[:3]

@@ -124,7 +124,7 @@ class Player:
     def _take(self, chunk: Chunk) -> None:
         """Queue a chunk until the clock reaches it."""
         lift_off = self.simulation.setting.lift_off_n
-        curves = curves_of(chunk, self.legs, lift_off, self._base)
+        curves = curves_of(chunk, self.legs, lift_off, self._base, self.drawing.has_heel)
         if not chunk.terms and self._base:
             # The start of a further episode is not joined to the end of the last one.
             curves |= {name: np.full(len(curves["time"]), np.nan) for name in PATHS if name in curves}

@@ -62,6 +62,9 @@ class Recording:
         else:
             records.check_place(self.path, FORMATS)
         self._simulation = simulation
+        # Those of the recorded episode: the next one may have begun when the file is written.
+        self._played = {"policy": simulation.policy_name, "seed": simulation.seed}
+        self._parameters = simulation.parameters
         self.tell = tell
         self._chunks: list[Chunk] = []
         self._seconds = 0.0
@@ -71,6 +74,7 @@ class Recording:
         """Take the substeps of a control step."""
         if not self.is_over and not self.is_full:
             self._chunks.append(chunk)
+            self._parameters = self._simulation.parameters
             self._seconds += self._simulation.setting.dt
 
     @property
@@ -120,7 +124,7 @@ class Recording:
             film.write_film(film.frames(renderer, moved, FPS, 1.0, read), self.path, FPS)
         else:
             about = simulation.about(
-                threshold_n=THRESHOLD, bodies={}, reactions=[], parameters=simulation.parameters
+                **self._played, threshold_n=THRESHOLD, bodies={}, reactions=[], parameters=self._parameters
             )
             records.write(self.columns(), about, self.path)
 

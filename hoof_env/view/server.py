@@ -23,7 +23,7 @@ MOST_TABS = 8
 KEPT_SETUPS = 64
 """Number of set-ups to which tabs may go back."""
 
-HERE = ("127.0.0.1", "localhost", "::1")
+HERE = ("127.0.0.1", "localhost")
 """Addresses that only this machine reaches."""
 
 
@@ -107,6 +107,8 @@ def start(
     from hoof_env.view.tab import checked_simulation
 
     count("port", port, low=0, most=65535)
+    if ":" in address:  # Bokeh's list of origins cannot name it
+        raise ParameterError(f"address: expected an IPv4 address or a name, got {address!r}")
     check_folder(out)
     simulation, _ = checked_simulation(setup)
     simulation.reset()

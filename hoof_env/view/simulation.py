@@ -6,7 +6,6 @@ from collections.abc import Mapping
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from hoof_env import records
 from hoof_env.envs.batch_build import substeps_under
@@ -269,9 +268,14 @@ class Simulation:
 
     def about(self, **more: Any) -> dict[str, Any]:
         """Return the description of a record of this simulation, see `records.describe`."""
-        policy = self.policy if isinstance(self.policy, str | None) else repr(self.policy)
-        settings = {"environment": self.env_id, "arguments": self.arguments, "policy": policy}
-        return records.describe(self.env, **settings, seed=self.seed, **more)
+        settings = {"environment": self.env_id, "arguments": self.arguments}
+        played = {"policy": self.policy_name, "seed": self.seed}
+        return records.describe(self.env, **settings, **(played | more))
+
+    @property
+    def policy_name(self) -> str | None:
+        """Name of the policy, None for the default, and the text of an object."""
+        return self.policy if isinstance(self.policy, str | None) else repr(self.policy)
 
 
 def unit_of(name: str) -> str:
@@ -280,8 +284,3 @@ def unit_of(name: str) -> str:
         return "rad/s" if name == "crank_speed" else "rad"
     unit = ABOUT[name].unit
     return "" if unit == "-" else unit
-
-
-def kept(columns: Mapping[str, NDArray[np.float64]], names: Any) -> Columns:
-    """Return some columns."""
-    return {name: columns[name] for name in names}

@@ -159,7 +159,7 @@ class Tab:
 
     def reset(self, seed: Any = None, policy: str | None = None) -> None:
         """Start an episode anew."""
-        number = None if seed in (None, "") else int(check_number("seed", float(seed), low=0))
+        number = None if seed in (None, "") else seed_of(seed)
         with warnings.catch_warnings(record=True) as said:
             warnings.simplefilter("always")
             chunk = self.player.simulation.reset(number, policy or None)
@@ -170,7 +170,9 @@ class Tab:
         self._send_anew()
         self._send(is_last=True)
         text = " ".join(str(one.message) for one in said)
-        self._tell(status=text or f"Seed {self.player.simulation.seed}.", hand=False, playing=self.playing)
+        text = text or f"Seed {self.player.simulation.seed}."
+        is_driven = self.player.simulation.hand is not None
+        self._tell(status=text, hand=is_driven, playing=self.playing)
 
     def set_speed(self, value: Any) -> None:
         """Play slower or faster."""
@@ -194,7 +196,8 @@ class Tab:
         if setting == "target_speed":
             self.player.simulation.command_speed(value)
         elif controls.needs_new_environment(setting) or not self.player.simulation.touch(setting, value):
-            self._go({"arguments": self.player.simulation.arguments | {setting: value}})
+            here = self.player.simulation
+            self._go({"arguments": here.arguments | here.parameters | {setting: value}})
 
     def drive(self, setting: str, value: Any) -> None:
         """Drive the leg by hand."""
@@ -222,7 +225,7 @@ class Tab:
         pairs = parse_pairs("arguments", arguments.split())
         if preset:
             pairs["preset"] = preset
-        number = int(check_number("seed", float(seed or 0), low=0))
+        number = seed_of(seed or 0)
         here = self.player.simulation
         if env_id == here.env_id and pairs == here.arguments:
             self.reset(number, policy or None)
@@ -290,6 +293,17 @@ HANDLERS: dict[str, Callable[..., None]] = {
     "record": Tab.record,
 }
 """Requests of a page by name."""
+
+
+def seed_of(text: Any) -> int:
+    """Return the seed that a field of the page has.
+
+    Raises:
+        ParameterError: it is no whole number of 0 or more.
+    """
+    if not str(text).isdecimal():
+        raise ParameterError(f"seed: expected a whole number, 0 or more, got {text!r}")
+    return int(text)
 
 
 def checked_simulation(setup: Setup) -> tuple[Simulation, list[str]]:

@@ -13,7 +13,8 @@ import pytest
 pytest.importorskip("bokeh")
 playwright = pytest.importorskip("playwright.sync_api")
 
-from hoof_env.view.playback import Playback  # noqa: E402 - where there is no Bokeh there is none
+from hoof_env.view.figures import TICKS  # noqa: E402 - where there is no Bokeh there is none
+from hoof_env.view.playback import Playback  # noqa: E402
 
 ROOT = Path(__file__).parents[2]
 CHROMIUM = os.environ.get("CHROMIUM") or shutil.which("chromium") or shutil.which("chromium-browser")
@@ -112,6 +113,14 @@ def test_the_page_plays_and_says_what_the_engine_says(tab):
     )
 
 
+def test_texts_at_ticks_have_no_rounding_errors(tab):
+    texts = [
+        tab.page.evaluate(f"((tick) => {{ {TICKS} }})({tick})")
+        for tick in (-0.6000000000000001, 0, 2.5, 12000.000000000002)
+    ]
+    assert texts == [-0.6, 0, 2.5, "12k"]
+
+
 def test_buttons_and_keys(tab):
     page = tab.page
     page.get_by_role("button", name="Pause").click()
@@ -189,6 +198,52 @@ def test_a_refusal_is_told_and_another_set_up_is_a_new_page(tab):
     page.wait_for_selector("body[data-ready]")
     tab.wait("() => Number(document.querySelector('[data-number=\"peak 0\"]').textContent) > 7000")
     assert page.locator("h1").text_content() == "HorseLegFixed-v0"
+
+
+def test_a_push_changes_the_speed_of_the_trunk(tab):
+    page = tab.page
+    page.get_by_role("button", name="Push").click()
+    page.wait_for_selector("#status[data-kind=error]")
+    tab.status('expected none with drive="motor"')
+    page.get_by_label("arguments, key=value").fill("")
+    page.get_by_role("button", name="Apply").click()
+    page.wait_for_url("**/?setup=*")
+    page.wait_for_selector("body[data-ready]")
+    page.get_by_role("button", name="Pause").click()
+    page.get_by_role("button", name="Play").wait_for()
+    page.get_by_role("button", name="Step").click()
+    page.wait_for_timeout(300)
+    before = tab.number("speed")
+    page.get_by_label("impulse at the trunk").fill("-200")
+    page.get_by_role("button", name="Push").click()
+    tab.status("Pushed by -200 N s.")
+    page.get_by_role("button", name="Step").click()
+    words = "({v}) => Number(document.querySelector('[data-number=speed]').textContent) < v - 1"
+    tab.wait(words, v=before)  # 200 N s over 50 kg are 4 m/s, of which the ground takes some
+    page.get_by_label("impulse at the trunk").fill("1e9")
+    page.get_by_role("button", name="Push").click()
+    page.wait_for_selector("#status[data-kind=error]")
+    tab.status("push")
+
+
+@pytest.mark.parametrize(("setting", "part"), [("exponent", 0.4), ("motor_inertia", 0.5)])
+def test_sliders_that_begin_a_new_page(tab, setting, part):
+    page = tab.page
+    tab.set("touch-friction", 0.4)  # goes along to the new page
+    page.wait_for_timeout(300)
+    slider = page.locator(f"#touch-{setting}")
+    low, high = (float(slider.get_attribute(end)) for end in ("min", "max"))
+    tab.set(f"touch-{setting}", low + part * (high - low))
+    asked = float(slider.input_value())
+    if slider.get_attribute("data-log") is not None:
+        asked = 10**asked
+    page.wait_for_url("**/?setup=*")
+    page.wait_for_selector("body[data-ready]")
+    given = dict(pair.split("=") for pair in page.get_by_label("arguments, key=value").input_value().split())
+    assert float(given[setting]) == pytest.approx(asked)
+    assert float(given["friction"]) == pytest.approx(0.4)
+    assert given["drive"] == '"motor"'
+    tab.wait("() => Number(document.querySelector('[data-number=time]').textContent) > 0.1")
 
 
 def test_a_recording_is_a_file(tab, url):

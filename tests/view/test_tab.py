@@ -11,15 +11,19 @@ import sys
 import numpy as np
 import pytest
 
-from hoof_env import cli
+from hoof_env import cli, film, records
 from hoof_env.errors import HoofEnvError, MissingExtraError, ParameterError
 
 pytest.importorskip("bokeh")
 
 from bokeh.document import Document
+from bokeh.embed import file_html
+from bokeh.models import Div
+from bokeh.resources import INLINE
 
 from hoof_env.view import server
 from hoof_env.view.controls import CONDITIONS, PAPER_ID, paper_values, setting_sliders
+from hoof_env.view.layout import template
 from hoof_env.view.playback import Playback
 from hoof_env.view.recording import FORMATS
 from hoof_env.view.server import MOST_TABS, Pages, start
@@ -103,6 +107,21 @@ def test_a_reset_with_a_seed_begins_the_same_episode(page):
     assert page.row[0] == 0.0
 
 
+def test_a_reset_says_whether_a_hand_still_drives(page):
+    page.ask("drive", setting="crank_speed", value=3.0)
+    assert page.ask("reset")["hand"] is True
+    assert page.tab.player.simulation.hand["crank_speed"] == 3.0
+    assert page.ask("reset", policy="walk")["hand"] is False
+    assert page.tab.player.simulation.hand is None
+
+
+def test_another_preset_needs_no_other_policy_where_none_was_named(page):
+    policy = page.tab._doc.template_variables["policy"]
+    assert policy == ""
+    told = page.ask("setup", env_id=LEG, arguments="", preset="klann", policy=policy, seed="0")
+    assert told["go"]
+
+
 def test_a_slider_moves_the_ground_and_the_next_episode_keeps_it(page):
     page.tick(0.2)
     page.ask("touch", setting="stiffness", value=40000)
@@ -113,7 +132,8 @@ def test_a_slider_moves_the_ground_and_the_next_episode_keeps_it(page):
     page.ask("touch", setting="target_speed", value=1.5)
     assert page.tab.player.simulation.commanded_speed == 1.5
     page.ask("touch", setting="exponent", value=1.5)
-    assert page.kept[-1]["arguments"]["exponent"] == 1.5
+    # What was touched goes along to the page of the other exponent.
+    assert page.kept[-1]["arguments"] == {"stiffness": 40000.0, "restitution": 0.1, "exponent": 1.5}
 
 
 def test_a_push_adds_its_impulse_over_the_mass(page):
@@ -133,6 +153,7 @@ def test_a_push_adds_its_impulse_over_the_mass(page):
         ({"name": "speed", "value": 900}, "speed"),
         ({"name": "back", "value": "soon"}, "time"),
         ({"name": "reset", "seed": "-3"}, "seed"),
+        ({"name": "reset", "seed": "2.7"}, "seed: expected a whole number"),
         ({"name": "reset", "policy": "gallop"}, "policy"),
         ({"name": "reset", "policy": "tests/view"}, "tests/view"),
         ({"name": "condition", "value": "fly"}, "fly"),
@@ -224,6 +245,20 @@ def test_a_recording_is_written_in_each_format(page, suffix, tmp_path):
     assert path.stat().st_size > 1000
 
 
+def test_a_film_begins_with_the_recording(page, monkeypatch):
+    pytest.importorskip("imageio_ffmpeg")
+    pytest.importorskip("pygame")
+    made = []
+    monkeypatch.setattr(film, "write_film", lambda frames, path, fps: made.extend(frames))
+    page.tick(0.6)
+    page.ask("record", suffix=".gif")
+    recording = page.tab.player.recording
+    page.tick(0.4)
+    page.tab.player.recording = None
+    recording.write().join()
+    assert 9 <= len(made) <= 12
+
+
 def test_a_tab_that_is_closed_during_a_recording_writes_it(tmp_path, capfd):
     page = Page(tmp_path)
     page.ask("record", suffix=".csv")
@@ -239,6 +274,65 @@ def test_a_tab_that_is_closed_during_a_recording_writes_it(tmp_path, capfd):
     assert len(path.read_text().splitlines()) > 100
 
 
+@pytest.mark.parametrize("end", ["reset", "episode"])
+def test_a_recording_describes_its_own_episode_when_the_next_one_has_begun(end, tmp_path, monkeypatch):
+    page = Page(tmp_path, arguments={"episode_seconds": 0.5}, policy="walk", seed=3)
+    described = []
+    monkeypatch.setattr(records, "write", lambda columns, about, path: described.append(about))
+    page.ask("touch", setting="friction", value=0.5)
+    page.ask("record", suffix=".csv")
+    recording = page.tab.player.recording
+    page.tick(0.2)
+    if end == "reset":
+        page.ask("reset", seed="9", policy="run")
+    else:
+        page.tick(0.6)
+    page.ask("touch", setting="friction", value=0.7)
+    assert page.tab.player.simulation.seed != 3
+    recording.write().join()
+    for about in described:
+        assert (about["seed"], about["policy"]) == (3, "walk")
+        assert about["parameters"]["friction"] == 0.5
+    assert described
+    page.tab.close()
+
+
+def html_of(page):
+    """Return the page of a tab as the server gives it."""
+    doc = page.tab._doc
+    return file_html(doc, INLINE, template=doc.template, template_variables=doc.template_variables)
+
+
+def test_texts_from_outside_are_escaped(page):
+    text = '"><script>alert(1)</script>'
+    page.tab._doc.template_variables.update({"policy": text, "arguments": 'normal_law="flores" ' + text})
+    found = html_of(page)
+    assert text not in found
+    assert 'value="&#34;&gt;&lt;script&gt;alert(1)' in found
+    assert 'value="normal_law=&#34;flores&#34; ' in found
+    doc = Document()
+    doc.add_root(Div())
+    refused = file_html(doc, INLINE, template=template("refused.html"), template_variables={"reason": text})
+    assert "alert(1)" in refused
+    assert text not in refused
+    made = Playback.of_policy(LEG, seconds=0.1)
+    made.title = text
+    assert text not in made.html("bokeh.min.js")
+
+
+def test_a_leg_with_one_foot_has_no_heel(tmp_path):
+    page = Page(tmp_path, arguments={"preset": "klann"})
+    page.tick(0.5)
+    shown = html_of(page)
+    assert 'class="heel"' not in shown
+    assert "hoof angle" not in shown
+    assert not [name for name in page.tab.look.curves.data if "heel" in name or "angle" in name]
+    page.tab.close()
+    made = Playback.of_policy(LEG, seconds=0.4, preset="klann")
+    assert "hoof angle" not in made.html("bokeh.min.js")
+    assert 'class="heel"' in html_of(Page(tmp_path))
+
+
 def test_every_slider_of_a_setting_has_unit_and_range(page):
     for env_id, arguments in ((LEG, {"drive": "motor"}), (HORSE, {})):
         tab = Page(page.tab._out, env_id=env_id, arguments=arguments).tab
@@ -248,6 +342,9 @@ def test_every_slider_of_a_setting_has_unit_and_range(page):
             assert one.low < one.high
             assert one.low - 1e-9 <= one.value <= one.high + 1e-9
         assert {"touch", "drive"} <= set(HANDLERS)
+        marks = {one.name: [text for _, text in one.marks] for one in sliders}
+        assert marks["stiffness"] == ["20000"]
+        assert marks["restitution"] == ["0", "1"]
 
 
 # Server
@@ -261,6 +358,8 @@ def test_a_port_that_is_taken_is_told():
             start(SETUP, port=taken.getsockname()[1])
     with pytest.raises(ParameterError, match="address"):
         start(SETUP, address="203.0.113.7", port=0)
+    with pytest.raises(ParameterError, match=r"address: .* IPv4 .* got '::1'"):
+        start(SETUP, address="::1", port=0)
 
 
 @pytest.mark.parametrize(
