@@ -15,6 +15,7 @@ from hoof_env.gait import PARAMETERS
 from hoof_env.ground.laws import FACTORS
 from hoof_env.lab.forces import THRESHOLD, above_threshold
 from hoof_env.view import history
+from hoof_env.view.drawing import ARROW_M, LEAST_FORCE, legs_of
 from hoof_env.view.history import RESOLUTION, thinned
 from hoof_env.view.player import Player
 from hoof_env.view.recording import Recording
@@ -267,19 +268,97 @@ def test_numbers_of_a_stance_are_those_of_the_record(env_id):
         normal = record[f"{leg}toe_normal"] + record[f"{leg}heel_normal"]
         grf = np.hypot(record[f"{leg}force_x"], record[f"{leg}force_y"])
         counter = StanceCounter(simulation.setting.lift_off_n)
-        peak, last = 0.0, []
+        peak = 0.0
+        stances = []
         for i in range(len(normal)):
             before = counter.count
-            counter.add(record[f"{leg}crank_angle"][i], normal[i], grf[i])
+            h = record["time"][i] - record["time"][i - 1] if i else np.inf
+            counter.add(record[f"{leg}crank_angle"][i], normal[i], grf[i], h)
             if counter.is_open:
-                last = [i] if counter.count > before else [*last, i]
+                steepest = counter.steepest
+                if counter.count > before:
+                    stances.append([])
+                stances[-1].append(i)
                 peak = counter.peak
         assert row[names.index(f"peak {k}")] == peak
+        assert row[names.index(f"loading rate {k}")] == pytest.approx(steepest / 1000)  # [kN/s]
+        last = stances[-1]
         lasted = record["time"][last[-1]] - record["time"][last[0]]
         impulse = float(normal[last].sum() * 1e-3)
         assert row[names.index(f"impulse {k}")] == pytest.approx(impulse, rel=0.02, abs=1.0)
         assert row[names.index(f"mean {k}")] == pytest.approx(impulse / lasted, rel=0.03)
         assert 0.1 < row[names.index(f"duty {k}")] < 0.9
+        # The part of the last whole stride in which the hoof stood.
+        before, now = stances[-2:]
+        stood, stride = (record["time"][end] - record["time"][before[0]] for end in (before[-1], now[0]))
+        assert row[names.index(f"duty {k}")] == pytest.approx(stood / stride, rel=1e-9)
+
+
+def test_the_return_is_the_sum_of_all_terms_of_all_steps():
+    player, _ = played(Simulation(LEG), 0.5)
+    steps = player.steps()
+    sums = {name: sum(values) for name, values in steps.items() if name != "time"}
+    assert len(steps["time"]) >= 25
+    assert player.totals == pytest.approx(sums)
+    names = [name for name, _ in player.numbers]
+    assert player.row()[3 + names.index("return")] == pytest.approx(sum(sums.values()))
+
+
+@pytest.mark.parametrize("env_id", [LEG, HORSE])
+def test_arrows_are_the_forces_at_the_scale_that_the_page_states(env_id):
+    simulation = Simulation(env_id)
+    player = Player(simulation)
+    player.reset(simulation.reset())
+    drawing = player.drawing
+    newtons = drawing.full_scale / (ARROW_M * drawing.size)  # of a metre, as the page states it
+    seen = 0
+    for _ in range(60):
+        player.go(0.02)
+        row = player.row()
+        (now,) = records.instants_of(simulation.env, player._now)
+        x, y = (
+            row[place.start :][: place.pieces * place.length].reshape(-1, 3, place.length)
+            for place in drawing.places
+            if place.source == "arrows"
+        )
+        outlines = x + 1j * y
+        tips = outlines[..., 3]
+        tails = (outlines[..., 0] + outlines[..., 6]) / 2
+        for k, leg in enumerate(legs_of(now)):
+            if leg.grf < 2 * LEAST_FORCE * drawing.full_scale:
+                continue
+            seen += 1
+            forces = [
+                complex(leg.toe_force_x, leg.toe_force_y),
+                complex(leg.heel_force_x, leg.heel_force_y),
+                complex(leg.force_x, leg.force_y),
+            ]
+            np.testing.assert_allclose(newtons * (tips - tails)[k], forces, atol=1e-6 * newtons)
+            for name, tail in zip(("toe", "heel", "cop"), tails[k], strict=True):
+                if name == "cop" or abs(forces[("toe", "heel").index(name)]) > 0:
+                    assert tail == pytest.approx(
+                        complex(getattr(leg, f"{name}_x"), getattr(leg, f"{name}_y")), abs=1e-9
+                    )
+    assert seen > 10
+
+
+def test_elastic_and_inelastic_are_the_forces_of_the_papers_restitutions():
+    simulation = Simulation(LEG)
+    simulation.reset()
+    loaded = 0
+    for _ in range(60):
+        chunk = simulation.step()
+        env = simulation.env.unwrapped
+        for name, restitution in (("elastic", 1.0), ("inelastic", 0.0)):
+            by_law = normal_for(env.record(), env.batch, simulation.value_of("stiffness"), restitution)
+            np.testing.assert_array_equal(chunk.normals[name], by_law[:, 0])
+        # Elastic ground is a spring: K depth^n, without a loss.
+        depth = np.array([chunk.columns[f"{point}_depth"] for point in ("toe", "heel")])
+        settings = env.batch.settings
+        spring = settings.stiffness * np.maximum(depth, 0.0) ** settings.exponent
+        np.testing.assert_allclose(chunk.normals["elastic"], spring.sum(axis=0), atol=1e-6)
+        loaded += chunk.normals["elastic"].max() > 100
+    assert loaded > 5
 
 
 def test_thinning_keeps_the_largest_force_of_each_slot():
