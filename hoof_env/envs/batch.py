@@ -259,10 +259,7 @@ class EpisodeBatch(BatchKernels):
             self.conditions.start(which)
         # A start evaluates its neighbours again, too: under its settings, and with pushes that are unseen.
         if self.conditions.are_mixed or self.is_push_unseen:
-            drawn: dict[str, Floats] = keep_others(
-                self, which, lambda: start(self, which, generators, options)
-            )
-            return drawn
+            return keep_others(self, which, lambda: start(self, which, generators, options))
         return start(self, which, generators, options)
 
     def step(self, generators: Sequence[np.random.Generator], idle: NDArray[np.bool_] | None = None) -> bool:

@@ -11,12 +11,14 @@ started under older ones has ended.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 Conditions = dict[str, Any]
+
+Result = TypeVar("Result")
 
 CHANGEABLE = (
     "target_speed",
@@ -133,7 +135,7 @@ def enter(batch: Any, conditions: Conditions) -> None:
         conditions.update({name: getattr(batch, name) for name in PLACES})
 
 
-def keep_others(batch: Any, rows: NDArray[np.int64], act: Callable[[], Any]) -> Any:
+def keep_others(batch: Any, rows: NDArray[np.int64], act: Callable[[], Result]) -> Result:
     """Call a function and restore all rows except some; return the function's result.
 
     Args:
