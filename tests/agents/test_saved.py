@@ -147,8 +147,9 @@ def test_a_policy_of_other_spaces(env, tmp_path):
 
 def test_other_settings_and_versions_are_told(env, tmp_path):
     save(tmp_path, env)
+    # A setting that the record lacks is newer than the policy, which was trained with its default.
     change(tmp_path / "run.json", settings={}, versions={"hoof-env": "0.0.1"})
-    with pytest.warns(UserWarning, match=r"episode_seconds=None, here 0\.4; .*hoof-env 0\.0\.1, here"):
+    with pytest.warns(UserWarning, match=r"episode_seconds=10\.0, here 0\.4; .*hoof-env 0\.0\.1, here"):
         SavedModel.find(tmp_path).load(env, ENV_ID)
 
 
