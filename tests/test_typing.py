@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ast
 import inspect
+import pydoc
 import re
 import subprocess
 import sys
@@ -13,7 +14,7 @@ from pathlib import Path
 import pytest
 
 import hoof_env
-from hoof_env import HorseLegEnv, HorseLegVectorEnv, Sb3VecEnv
+from hoof_env import HorseLegEnv, HorseLegMOEnv, HorseLegVectorEnv, Sb3VecEnv
 from hoof_env.envs.arguments import EnvArguments, Sb3Arguments, VectorArguments
 from hoof_env.tasks.plain import to_json
 from hoof_env.tasks.registry import TASKS
@@ -86,15 +87,28 @@ def test_every_default_is_of_its_type(tmp_path, cache):
 )
 def test_what_is_typed_is_what_a_constructor_takes(env, arguments):
     """A constructor names its own arguments a second time, behind the decorator that types them."""
-    taken = {
-        name: parameter.default
-        for name, parameter in inspect.signature(env).parameters.items()
-        if parameter.kind is not inspect.Parameter.VAR_KEYWORD
-    }
+    taken = own_arguments(env)
     typed = {item.name: item.default for item in fields(arguments)}
     assert taken.items() <= typed.items()
     passed_on = set(typed) - set(taken) - set(SETTINGS)
-    assert passed_on <= (set(inspect.signature(HorseLegVectorEnv).parameters) if env is Sb3VecEnv else set())
+    assert passed_on <= (set(own_arguments(HorseLegVectorEnv)) if env is Sb3VecEnv else set())
+
+
+def own_arguments(env):
+    """The arguments that a constructor names itself, with their defaults."""
+    build = env.__init__
+    code = build.__code__
+    positional = code.co_varnames[1 : code.co_argcount]
+    return dict(zip(positional, build.__defaults__ or (), strict=True)) | (build.__kwdefaults__ or {})
+
+
+@pytest.mark.parametrize("env", [HorseLegEnv, HorseLegMOEnv, HorseLegVectorEnv, Sb3VecEnv])
+def test_help_names_every_setting_with_its_type(env):
+    shown = inspect.signature(env).parameters
+    assert set(SETTINGS) <= set(shown)
+    assert all(parameter.kind is not inspect.Parameter.VAR_KEYWORD for parameter in shown.values())
+    assert shown["trunk_mass"].annotation is float
+    assert "friction: float = 0.4" in pydoc.render_doc(env)
 
 
 def test_what_is_typed_is_what_is_public():

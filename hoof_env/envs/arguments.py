@@ -6,9 +6,10 @@ decorator gives the constructor of an environment the parameters of such a class
 
 from __future__ import annotations
 
+import inspect
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from typing import Concatenate, ParamSpec, TypeVar
+from typing import Any, Concatenate, ParamSpec, TypeVar, get_type_hints
 
 from gymnasium.vector import AutoresetMode
 
@@ -58,10 +59,22 @@ class Sb3Arguments(Settings):
 def takes(
     arguments: Callable[Parameters, object],
 ) -> Callable[[Callable[Concatenate[Made, Parameters], None]], Callable[Concatenate[Made, Parameters], None]]:
-    """Return a decorator that gives a constructor the parameters of a class, for type checkers and editors.
-    When the program runs it changes nothing.
+    """Return a decorator that gives a constructor the parameters of a class, for type checkers, editors and
+    `help`. What the constructor does stays the same.
 
     Args:
         arguments: class with these parameters.
     """
-    return lambda constructor: constructor
+
+    def describe(constructor: Callable[Concatenate[Made, Parameters], None]) -> Any:
+        # The bare types: the texts of the settings would hide their names.
+        types = get_type_hints(arguments)
+        taken = inspect.signature(arguments).parameters.values()
+        itself = inspect.Parameter("self", inspect.Parameter.POSITIONAL_OR_KEYWORD)
+        described: Any = constructor
+        described.__signature__ = inspect.Signature(
+            [itself, *(each.replace(annotation=types[each.name]) for each in taken)]
+        )
+        return described
+
+    return describe
