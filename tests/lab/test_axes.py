@@ -14,66 +14,9 @@ from hoof_env.lab.average import average
 from hoof_env.lab.compare import compare
 from hoof_env.lab.picture import report
 from hoof_env.lab.read import read_record
+from tests.lab.made import ASIDE, AXES, FORWARD, OFFSETS, RATE, TIME, UP, ezc3d, plate
 
-ezc3d = pytest.importorskip("ezc3d", reason='pip install "hoof-env[lab]"')
-
-RATE, PEAK, AHEAD = 100.0, 760.0, 120.0
-TIME = np.arange(300) / RATE
-PHASE = (TIME - 0.4) % 1.0 / 0.5
-UP = np.where(PHASE < 1, PEAK * np.sin(np.pi * PHASE), 0.0)
-FORWARD = np.where(PHASE < 1, -AHEAD * np.sin(2 * np.pi * PHASE), 0.0)
-ASIDE = 0.05 * UP
-AXES = {sign + name: (-1 if sign else 1) * np.eye(3)[k] for sign in ("", "-") for k, name in enumerate("xyz")}
-
-
-def plate(
-    path,
-    up="z",
-    forward="x",
-    zero=(0, 0),
-    offsets=((0, 0, 0),),
-    first=1,
-    other_order=False,
-    markers=None,
-    noise=0.0,
-):
-    """A file of one plate or more, whose first one is loaded, in a laboratory with that axis upward, whose
-    animal travels along that other. Offsets are forces in the laboratory's axes, of each plate."""
-    upward, ahead = AXES[up], AXES[forward]
-    aside = np.cross(upward, ahead)  # to the left
-    own = np.array([ahead, -aside, -upward])  # a plate's axes: x ahead, y to the right, z into the floor
-    quadrants = np.array([(1, 1), (-1, 1), (-1, -1), (1, -1)])
-    if other_order:
-        quadrants = quadrants[::-1]  # mirrors the plate's y, and so its z points up
-        own = np.array([ahead, aside, upward])
-    corners = 300 * (quadrants @ (own[:2] if not other_order else np.array([ahead, -aside])))
-    file = ezc3d.c3d()
-    rows, n = file["parameters"], len(offsets)
-    force = np.outer(FORWARD, ahead) + np.outer(ASIDE, aside) + np.outer(UP, upward)
-    channels = []
-    for k, offset in enumerate(offsets):
-        felt = (force if k == 0 else 0 * force) + np.array(offset)
-        felt = felt + np.random.default_rng(k).normal(0, noise, felt.shape)
-        channels += [*(felt @ own.T).T, *np.zeros((3, len(TIME)))]
-    rows["POINT"]["RATE"]["value"] = rows["ANALOG"]["RATE"]["value"] = [RATE]
-    rows["ANALOG"]["UNITS"]["value"] = ["N", "N", "N", "Nmm", "Nmm", "Nmm"] * n
-    rows["ANALOG"]["LABELS"]["value"] = [f"{name}{k}" for k in range(n) for name in "abcdef"]
-    for name, value in (
-        ("USED", [n]), ("TYPE", [2] * n), ("ZERO", list(zero)), ("ORIGIN", np.zeros((3, n))),
-        ("CORNERS", np.repeat(corners.T[..., None], n, axis=2)),
-        ("CHANNEL", np.arange(1, 6 * n + 1).reshape(n, 6).T),
-    ):  # fmt: skip
-        rows["FORCE_PLATFORM"][name]["value"] = value
-    file["data"]["analogs"] = np.array(channels)[None]
-    rows["POINT"]["LABELS"]["value"] = ["trunk"]
-    seen = np.append(np.zeros(3) if markers is None else markers, 1.0)  # zeros are markers that nobody saw
-    file["data"]["points"] = np.tile(seen[:, None, None], (1, 1, len(TIME)))
-    file.write(str(path))
-    if first != 1:
-        content = bytearray(path.read_bytes())
-        struct.pack_into("<2H", content, 6, first, first + len(TIME) - 1)
-        path.write_bytes(content)
-    return path
+pytest.importorskip("ezc3d", reason='pip install "hoof-env[lab]"')
 
 
 @pytest.mark.parametrize(("up", "forward"), [(u, f) for u in AXES for f in AXES if u[-1] != f[-1]])
@@ -105,8 +48,6 @@ def test_travel_along_another_axis_and_backward_are_said(tmp_path):
     assert read_record(tmp_path / "x.c3d", forward="-x").notes == ()
     wrong = read_record(tmp_path / "x.c3d", up="y")
     assert "the force along z is larger than that along y" not in "".join(wrong.notes)  # what the option says
-    with pytest.raises(ParameterError, match=r"forward: expected another axis than upward \(z\)"):
-        read_record(tmp_path / "x.c3d", forward="z")
 
 
 def test_a_text_with_z_up_is_said(tmp_path):
@@ -119,8 +60,6 @@ def test_a_text_with_z_up_is_said(tmp_path):
     found = read_record(tmp_path / "x.csv", up="z")
     assert found.notes == ()
     np.testing.assert_allclose(found.limbs["left"], np.column_stack([FORWARD, UP]))
-    with pytest.raises(ParameterError, match=r"up, forward: expected none beside columns of x\.csv"):
-        read_record(tmp_path / "x.csv", {"force_y": "left_force_z"}, up="z")
 
 
 def test_an_axis_with_a_minus_is_no_option(tmp_path, capsys):
@@ -129,11 +68,6 @@ def test_an_axis_with_a_minus_is_no_option(tmp_path, capsys):
         out = str(tmp_path / "x.csv")
         assert cli.main(["average", path, "--out", out, "--overwrite", *option]) == 0
         assert "warning" not in capsys.readouterr().out
-    assert cli.main(["average", path, "--out", out, "--overwrite", "--forward", "w"]) == 2
-    assert "forward: expected one of -x, -y, -z, auto, x, y, z, got 'w'" in capsys.readouterr().err
-
-
-OFFSETS = ((7.0, -3.0, 30.0), (-5.0, 2.0, -46.0))
 
 
 def test_the_baseline_is_subtracted(tmp_path):
@@ -195,12 +129,6 @@ def test_plates_are_given_to_limbs_and_added(tmp_path):
     found = read_record(path, {"right_force_y": "plate_1_z - plate_2_z", "left": "plate_2"}, reverse="none")
     np.testing.assert_allclose(found.limbs["right"][:, 1], UP + 76, atol=1e-3)
     assert list(found.limbs) == ["right", "left"]
-    with pytest.raises(ParameterError, match=r"map: expected a limb of x\.c3d .*, got left=plate_1-plate_2"):
-        read_record(path, {"left": "plate_1-plate_2"})
-    with pytest.raises(
-        ParameterError, match=r"expected plate_1 of x\.c3d once, got it for left and for right"
-    ):
-        read_record(path, {"left": "plate_1", "right": "plate_1"})
 
 
 @pytest.mark.parametrize("seed", range(12))
@@ -221,19 +149,10 @@ def test_a_damaged_file_is_one_line(seed, tmp_path):
     assert "\n" not in said
 
 
-def test_what_ezc3d_asks_its_own_users_is_not_ours(tmp_path):
-    path = plate(tmp_path / "x.c3d")
-    file = ezc3d.c3d(str(path))
-    file["parameters"]["FORCE_PLATFORM"]["TYPE"]["value"] = [6]
-    file.write(str(path))
-    with pytest.raises(DataFileError, match=r"cannot read it \(ezc3d says: Type 6 is not supported yet\)"):
-        read_record(path)
-
-
 def test_frames_are_those_of_the_cameras(tmp_path):
     """Plates are sampled ten times as often: frames 1 to 3 are 30 samples."""
     path = plate(tmp_path / "x.c3d", zero=(1, 3), offsets=OFFSETS)
-    file = ezc3d.c3d(str(path))
+    file = ezc3d().c3d(str(path))
     file["parameters"]["POINT"]["RATE"]["value"] = [RATE / 10]
     file["data"]["points"] = file["data"]["points"][:, :, ::10]
     file["data"]["meta_points"]["residuals"] = file["data"]["meta_points"]["residuals"][:, :, ::10]

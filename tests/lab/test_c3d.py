@@ -2,13 +2,10 @@
 
 from __future__ import annotations
 
-import sys
-
 import numpy as np
 import pytest
 
 from hoof_env import records
-from hoof_env.errors import DataFileError, MissingExtraError, ParameterError
 from hoof_env.ground.terrain import Terrain
 from hoof_env.lab.c3d import CHANNELS, MARKERS, plane_of
 from hoof_env.lab.forces import loaded
@@ -89,31 +86,12 @@ def test_the_plate_lies_in_the_slope_and_is_level_under_hills():
     assert plane_of(hills, -1.0, 3.0) == (1.0 + 0j, 1.0 + 0j)
 
 
-@pytest.mark.usefixtures("need_ezc3d")
-def test_a_record_that_is_too_long_is_refused(of_leg, tmp_path):
-    record, about = of_leg
-    long = {name: np.resize(values, 70_000) for name, values in record.items()}
-    with pytest.raises(ParameterError, match="at most 65535 frames of a c3d, got 70000"):
-        records.write(long, about, tmp_path / "long.c3d")
-    assert not list(tmp_path.iterdir())
-
-
 def changed(path, change):
     """The c3d file once more, after `change(file)`."""
     file = read(path)
     change(file)
     file.write(str(path))
     return path
-
-
-@pytest.mark.usefixtures("need_ezc3d")
-@pytest.mark.parametrize("part", [0.6, 0.95])
-def test_a_file_that_is_cut_off_is_refused(part, of_horse, tmp_path):
-    path = records.write(*of_horse, tmp_path / "horse.c3d")
-    content = path.read_bytes()
-    path.write_bytes(content[: int(part * len(content))])
-    with pytest.raises(DataFileError, match=r"frames, as its header says, found .*: is the file cut off"):
-        read_record(path)
 
 
 @pytest.mark.usefixtures("need_ezc3d")
@@ -128,27 +106,5 @@ def test_units_are_those_of_the_channels(of_leg, tmp_path):
     thousands = read_record(path)
     assert (newtons.unit, thousands.unit, thousands.per("N")) == ("N", "kN", 1000.0)
     np.testing.assert_allclose(thousands.limbs["leg"], newtons.limbs["leg"])
-    for units, said in ((["V"] * 6, "V"), (["N", "N", "kN", "V", "V", "V"], "N and kN")):
-        name(units)
-        with pytest.raises(ParameterError, match=f"x.c3d, which says {said}; name it by --units-a"):
-            read_record(path)
+    name(["V"] * 6)
     assert read_record(path, unit="N").unit == "N"
-
-
-@pytest.mark.usefixtures("need_ezc3d")
-def test_a_file_without_plates_says_so(of_leg, tmp_path):
-    path = records.write(*of_leg, tmp_path / "x.c3d")
-    changed(path, lambda file: file["parameters"]["FORCE_PLATFORM"]["USED"].update(value=[0]))
-    with pytest.raises(DataFileError, match="found no force plates"):
-        read_record(path)
-
-
-def test_without_ezc3d_the_extra_is_named(tmp_path, monkeypatch):
-    monkeypatch.setitem(sys.modules, "ezc3d", None)
-    (tmp_path / "x.c3d").touch()
-    for call in (
-        lambda: records.export_episode(tmp_path / "y.c3d", "run", "nobody asks for this"),
-        lambda: read_record(tmp_path / "x.c3d"),
-    ):
-        with pytest.raises(MissingExtraError, match=r'c3d needs ezc3d: pip install "hoof-env\[lab\]"'):
-            call()

@@ -13,7 +13,6 @@ from hypothesis import strategies as st
 from hoof_env import Terrain, records
 from hoof_env.constants import GRAVITY
 from hoof_env.envs.policies import make_policy
-from hoof_env.errors import ParameterError
 from hoof_env.lab.forces import above_threshold, in_units, limbs_of, loaded, onto_surface
 from hoof_env.tasks.horse_gaits import LEGS
 
@@ -165,12 +164,8 @@ def test_body_weights_are_forces_over_the_weight(slopes):
     units = {name: said["units"][name] for name in ("force_y", "toe_normal", "free_moment", "cop_x")}
     assert units == {"force_y": "BW", "toe_normal": "BW", "free_moment": "BW m", "cop_x": "m"}
     assert about["units"]["force_y"] == "N"
-    with pytest.raises(ParameterError, match="units: expected one of BW, N"):
-        in_units(record, about, "lb")
 
 
 def test_limbs_are_found_by_their_vertical_force():
     assert limbs_of(["time", "toe_force_y", "force_y"]) == [""]
     assert limbs_of(["left_fore_force_y", "left_fore_heel_force_y"]) == ["left_fore_"]
-    with pytest.raises(ParameterError, match="expected a column force_y, got time"):
-        limbs_of(["time"])

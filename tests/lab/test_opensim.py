@@ -8,8 +8,7 @@ import numpy as np
 import pytest
 
 from hoof_env import cli, records
-from hoof_env.errors import ParameterError
-from hoof_env.lab.opensim import MOT_COLUMNS, check_bodies, loads_path
+from hoof_env.lab.opensim import MOT_COLUMNS, loads_path
 from hoof_env.lab.read import read_record
 from hoof_env.tasks.horse_gaits import LEGS
 
@@ -112,12 +111,6 @@ def test_a_storage_file_leaves_the_loads_of_a_motion_file_alone(of_leg, tmp_path
     for path in (motion, storage):
         assert f"<datafile>{path.name}<" in loads_path(path).read_text(encoding="utf-8")
     assert len(list(tmp_path.iterdir())) == 4
-
-
-@pytest.mark.parametrize("bodies", [{"tail": "x"}, {"leg": ""}, {"leg": 3}])
-def test_bodies_are_of_limbs(bodies):
-    with pytest.raises(ParameterError, match="bodies: expected leg=BODY"):
-        check_bodies(bodies, [""])
 
 
 def test_loads_that_are_there_are_not_replaced_unasked(tmp_path, capsys):

@@ -9,7 +9,6 @@ import pytest
 from hoof_env import records
 from hoof_env.constants import GRAVITY
 from hoof_env.envs.policies import make_policy
-from hoof_env.errors import ParameterError
 from hoof_env.lab.reactions import joint_columns, reaction_units
 from hoof_env.leg.mechanism_list import PAPER
 from hoof_env.tasks.horse_gaits import LEGS
@@ -57,11 +56,3 @@ def test_names_say_joint_and_bodies():
     assert len(JOINT_COLUMNS) == 40
     assert JOINT_COLUMNS[:2] == ["joint_O_1_frame_x", "joint_O_1_frame_y"]
     assert "joint_G_11_10_x" in JOINT_COLUMNS
-
-
-def test_the_paper_s_solver_is_refused():
-    with (
-        gym.make("hoof_env/HorseLegFixed-v0", solver="paper") as env,
-        pytest.raises(ParameterError, match="reactions: expected an environment with solver"),
-    ):
-        records.record_episode(env, make_policy("walk", env), 0, 0.1, reactions=True)

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import sys
-
 import numpy as np
 import pytest
 
@@ -74,90 +72,6 @@ def test_every_format_says_the_same(of_horse, tmp_path):
         for errors in compare(first, other).limbs.values():
             assert errors.forces["vertical"].rmse < 1e-3
             assert errors.forces["fore-aft"].rmse < 1e-3
-
-
-STEADY = "time [s],force_x [N],force_y [N]\n0,1,2\n"
-BROKEN = {
-    "none.csv": (None, "expected a file, found none"),
-    "empty.csv": ("", "expected two rows of numbers or more, found fewer"),
-    "head.csv": ("time [s],force_y [N]\n", "expected two rows of numbers or more, found fewer"),
-    "words.csv": (STEADY + "1,x,2\n", "line 3: expected numbers, got 'x'"),
-    "short.csv": (STEADY + "1,2\n", "line 3: expected numbers, got 2 cells under 3"),
-    "nan.csv": (STEADY + "1,2,nan\n", "force_y: expected finite numbers, got nan"),
-    "twice.csv": ("time,force_y,force_y\n0,1,2\n1,2,3\n", "expected names that differ"),
-    "uneven.csv": (STEADY + "1,1,2\n3,1,2\n", "times that increase evenly"),
-    "unitless.csv": ("time,force_x,force_y\n0,1,2\n1,1,2\n", "units: expected one of N, kN, N/kg, BW"),
-    "pounds.csv": ("time,force_x [lbf],force_y [lbf]\n0,1,2\n1,1,2\n", "which says lbf"),
-    "names.csv": ("t,Fx,Fz\n0,1,2\n1,1,2\n", "expected columns of names.csv for time, force_x and force_y"),
-    "timeless.csv": ("force_x [N],force_y [N]\n1,2\n1,2\n", "expected a column of timeless.csv for time"),
-    "hours.csv": ("time [h],force_x [N],force_y [N]\n0,1,2\n1,1,2\n", "in s or ms, got h"),
-    "gap.csv": (STEADY + "".join(f"0.0{k},1,2\n" for k in (1, 2, 4, 5)), "of 0.02 behind 0.02 in row 3"),
-    "rows.mot": ("x\nnRows=3\nendheader\ntime ground_force_vy\n0 1\n1 1\n", "expected 3 rows, as its"),
-    "columns.mot": ("x\nnColumns=3\nendheader\ntime ground_force_vy\n0 1\n1 1\n", "expected 3 columns, as"),
-    "row.mot": ("x\nendheader\ntime a ground_force_vy\n0 1 2\n1 1\n", "got 2 cells under 3 names"),
-    "headless.mot": ("time\tground_force_vy\n0\t1\n", "expected a line endheader"),
-    "bytes.parquet": ("not a table", "cannot read it"),
-    "bytes.c3d": ("not a c3d", "cannot read it"),
-    "other.xlsx": ("", "expected a file that ends in .c3d, .csv"),
-}  # fmt: skip
-
-
-@pytest.mark.parametrize("name", BROKEN)
-def test_a_broken_record_is_one_line_and_leaves_no_picture(name, files, tmp_path, capsys):
-    content, words = BROKEN[name]
-    if name.endswith(".c3d"):
-        pytest.importorskip("ezc3d")
-    if content is not None:
-        (tmp_path / name).write_text(content, encoding="utf-8")
-    out = tmp_path / "x.png"
-    assert cli.main(["compare", str(files[0]), str(tmp_path / name), "--out", str(out)]) == 2
-    said = capsys.readouterr().err
-    assert words in said
-    assert said.count("\n") == 1
-    assert not out.exists()
-
-
-WRONG = [
-    (["--units-b", "lb"], "units: expected one of"),
-    (["--reverse-b", "z"], "reverse: expected one of"),
-    (["--map-b", "left_fore=tail"], "map: expected a limb of ours.csv"),
-    (["--map-b", "left_fore_force_y=Fz"], "map: expected a column of ours.csv"),
-    (["--map-b", "force_x=left_fore_force_x"], "map: expected force_y beside"),
-    (["--map-b", "x"], "--map-b: expected a JSON object or key=value"),
-    (["--threshold", "-1"], "threshold: expected"),
-    (["--threshold", "1e5"], "expected a whole stance above 100000 N, found none"),
-    (["--rate-b", "0"], "rate: expected"),
-    (["--rate-b", "1e9"], "rate: expected at most 20000000 samples"),
-    (["--mass-b", "-3"], "mass: expected"),
-    (["--align", "best"], "align: expected one of"),
-    (["--units", "lb"], "units: expected one of"),
-    (["--out", "x.jpg"], "out: expected a file that ends in .pdf, .png, .svg"),
-]
-
-
-@pytest.mark.parametrize(("options", "words"), WRONG)
-def test_a_wrong_option_is_one_line(options, words, files, tmp_path, capsys, monkeypatch):
-    monkeypatch.chdir(tmp_path)
-    assert cli.main(["compare", str(files[0]), str(files[0]), *options]) == 2
-    said = capsys.readouterr().err
-    assert words in said
-    assert said.count("\n") == 1
-    assert not list(tmp_path.iterdir())
-
-
-def test_missing_packages_are_named(files, capsys, monkeypatch, tmp_path):
-    (tmp_path / "x.parquet").touch()
-    for package, file, words in (
-        ("matplotlib", files[0], 'pictures need matplotlib: pip install "hoof-env[lab]"'),
-        ("pyarrow", tmp_path / "x.parquet", 'Parquet needs pyarrow: pip install "hoof-env[export]"'),
-    ):
-        with monkeypatch.context() as without:
-            without.setitem(sys.modules, package, None)
-            out = str(tmp_path / "x.png")
-            assert cli.main(["compare", str(files[0]), str(file), "--out", out]) == 2
-        said = capsys.readouterr().err
-        assert words in said
-        assert said.count("\n") == 1
 
 
 def test_a_record_without_time_takes_a_rate_and_milliseconds_are_known(tmp_path):
