@@ -28,6 +28,7 @@ extensions = [
     "sphinx.ext.napoleon",
     "sphinx.ext.viewcode",
     "sphinx_copybutton",
+    "equations",
 ]
 
 CHILDREN = {
@@ -48,6 +49,9 @@ include_patterns = [
 exclude_patterns = [".*", "runs", "build", "dist", "**/__pycache__"]
 
 myst_heading_anchors = 4
+myst_enable_extensions = ["dollarmath"]
+myst_dmath_allow_space = False
+html_math_renderer = "svg"
 autodoc_typehints = "description"
 autodoc_typehints_description_target = "documented"
 autodoc_member_order = "bysource"

@@ -109,8 +109,8 @@ def scale_functions(value, slope, length, mass):  # type: ignore[no-untyped-def]
 
 @inline_llvm
 def place_frame(trunk, leg, harmonics, elapsed):  # type: ignore[no-untyped-def]
-    """Compute the leg's frame (E1), and its first moment and inertia in the world. The swing is phi = offset
-    + A sin(theta) + B cos(theta) and higher harmonics, if any; each parameter moves as its filter does."""
+    """Compute the leg's frame (E1), and its first moment and inertia in the world. The swing is phi = phi_0
+    + phi_s sin(theta) + phi_c cos(theta) and higher harmonics, if any; each parameter moves as its filter does."""
     sine = leg.sine
     cosine = leg.cosine
     w = leg.theta_rate
@@ -140,8 +140,8 @@ def place_frame(trunk, leg, harmonics, elapsed):  # type: ignore[no-untyped-def]
     k = side * slope
     leg.phi = offset + swing
     leg.beta_by_theta = k  # (E1)
-    leg.swing_rate = side * swing_rate  # sway of (E1)
-    leg.swing_acceleration = side * swing_acceleration  # sway_t of (E1)
+    leg.swing_rate = side * swing_rate  # v_phi of (E1)
+    leg.swing_acceleration = side * swing_acceleration  # a_phi of (E1)
 
     cos_beta, sin_beta = cos_sin(trunk.stage.pitch + side * (offset + swing))
     turn = vector(cos_beta, sin_beta)
@@ -207,20 +207,20 @@ def gather_leg(trunk, leg, kind, lanes_are_legs):  # type: ignore[no-untyped-def
     s = leg.first_moment
     w = leg.theta_rate
     sway = leg.swing_rate
-    drift = w * leg.moment_by_crank + sway * perpendicular(s)  # d of (E6)
+    drift = w * leg.moment_by_crank + sway * perpendicular(s)  # q of (E6)
     if kind == FREE:
         leg.hip = trunk.turn * leg.settings.hip_on_trunk
         hip = leg.hip
         frame = leg.frame_inertia
-        trunk.composite_inertia = add(  # J of (E6)
+        trunk.composite_inertia = add(  # J_sum of (E6)
             trunk.composite_inertia, dot(hip, leg.settings.mass * hip + 2.0 * s) + frame, lanes_are_legs
         )
-        trunk.relative_angular_momentum = add(  # G of (E6)
+        trunk.relative_angular_momentum = add(  # H_sum of (E6)
             trunk.relative_angular_momentum,
             cross(hip, drift) + leg.crank_coupling * w + frame * sway,
             lanes_are_legs,
         )
-    # B and P of (E6)
+    # S_sum and p_sum of (E6)
     trunk.first_moment = add(trunk.first_moment, leg.settings.mass * leg.hip + s, lanes_are_legs)
     trunk.relative_momentum = add(trunk.relative_momentum, drift, lanes_are_legs)
 
@@ -260,7 +260,7 @@ def move_trunk(trunk, kind):  # type: ignore[no-untyped-def]
     trunk.rates.moment = -drag * (place.imag - centre.imag)  # the drag acts on the trunk
     trunk.load = vector(full_like(trunk, 0.0), 0.0)
     trunk.load_moment = 0.0
-    # K of (E8); `load_trunk` takes off each motor's crank
+    # A of (E8); `load_trunk` takes off each motor's crank
     trunk.mass_xx = total
     trunk.mass_xy = 0.0
     trunk.mass_yy = total
@@ -374,7 +374,7 @@ def load_trunk(trunk, leg, kind, motors, lanes_are_legs):  # type: ignore[no-unt
     centripetal = pitch_rate * pitch_rate * hip  # minus O's acceleration there
     # loads of (E8)
     trunk.load = add(trunk.load, mass * centripetal - moment_acceleration - free * u, lanes_are_legs)
-    # K - sum (U, L) (U, L)^T / I of (E8); prescribed cranks have 1 / I = 0
+    # A - sum u u^T / I of (E8); prescribed cranks have 1 / I = 0
     if motors:
         mobile_u = leg.crank_mobility * u
         trunk.mass_xx = add(trunk.mass_xx, -mobile_u.real * u.real, lanes_are_legs)

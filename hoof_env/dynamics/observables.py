@@ -40,7 +40,7 @@ def find_drives(trunk, leg):  # type: ignore[no-untyped-def]
     frame = leg.frame_inertia
     pitch_acc = trunk.pitch_acceleration
     coupling = leg.crank_coupling - k * frame  # b
-    turning = pitch_acc + k * acc  # beta_tt of (E1) without sway_t, which is in the rest moments
+    turning = pitch_acc + k * acc  # beta_tt of (E1) without a_phi, which is in the rest moments
     lift = trunk.acceleration + pitch_acc * perpendicular(leg.hip)
     by_frame = (  # (E3) - Q_beta
         coupling * acc
