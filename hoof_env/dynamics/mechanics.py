@@ -110,7 +110,8 @@ def scale_functions(value, slope, length, mass):  # type: ignore[no-untyped-def]
 @inline_llvm
 def place_frame(trunk, leg, harmonics, elapsed):  # type: ignore[no-untyped-def]
     """Compute the leg's frame (E1), and its first moment and inertia in the world. The swing is phi = phi_0
-    + phi_s sin(theta) + phi_c cos(theta) and higher harmonics, if any; each parameter moves as its filter does."""
+    + phi_s sin(theta) + phi_c cos(theta) and higher harmonics, if any; each parameter moves as its filter
+    does."""
     sine = leg.sine
     cosine = leg.cosine
     w = leg.theta_rate

@@ -21,7 +21,7 @@ from hoof_env.dynamics.memory import LIFT_OFF
 from hoof_env.envs.horse_leg import HorseLegMOEnv
 from hoof_env.envs.infos import measured_names
 from hoof_env.envs.manual_bodies import page_of_body
-from hoof_env.envs.manual_common import without_common
+from hoof_env.envs.manual_common import own_sections, shared_sections, without_common
 from hoof_env.envs.manual_words import HERE, TABLES, WORDS, rows_of
 from hoof_env.envs.policies import STANDS_FOR
 from hoof_env.envs.shown import Markdown
@@ -29,7 +29,6 @@ from hoof_env.errors import DataFileError, OutputError, check_choice
 from hoof_env.render.renderer import USUAL_SIZE
 from hoof_env.tasks import observation
 from hoof_env.tasks.body import Body
-from hoof_env.tasks.one_leg import OneLeg
 from hoof_env.tasks.parameters import HILLS
 from hoof_env.tasks.plain import to_json
 from hoof_env.tasks.registry import TASKS, Task, task_of
@@ -49,13 +48,22 @@ PAGES = tuple(_NAMES)  # names of the tasks, and "mo" for the id with three rewa
 COMMON = _NAMES["leg"]
 """Name of the page that the others refer to."""
 
+SCORED = {
+    "policy": "the shipped agent",
+    "open-loop": "the best gait without feedback",
+    "run": "the scripted run",
+    "reference": "the reference gait",
+}
+"""Policies whose returns a page shows."""
 
-def page(task: str, film: str = "") -> str:
+
+def page(task: str, film: str = "", score: str = "") -> str:
     """Write the manual page of a task in Markdown.
 
     Args:
         task: one of `PAGES`, or an id of one's own.
         film: path of the film, relative to the page; "" for a page without one.
+        score: words about returns; "" for a page without them.
     """
     definition = task_of("leg" if task == "mo" else task)
     s = definition.settings({})
@@ -64,8 +72,7 @@ def page(task: str, film: str = "") -> str:
     film = _film(COMMON if task == "mo" else _NAMES[task], parts.kind, film) if film else ""
     if task == "mo":
         objectives = _objectives(check_weights(s.reward_weights))
-        observations = _observations(definition, body)
-        text = Template(MO_PAGE).substitute(film=film, observations=observations, objectives=objectives)
+        text = Template(MO_PAGE).substitute(film=film, score=score, objectives=objectives)
         return _tidy(text)
     trunk = TABLES[s.trunk]
     groups = observation.groups_of(definition.entries)
@@ -81,6 +88,7 @@ def page(task: str, film: str = "") -> str:
         module_words="the package" if module == "hoof_env" else "it",
         summary=definition.summary,
         film=film,
+        score=score,
         about=definition.about,
         body=Template(WORDS[f"{parts.kind}_body"].strip()).safe_substitute(trunk=trunk["moves"]),
         action_space=f"Box(-1, 1, ({len(body.action_names)},), float32)",
@@ -93,7 +101,6 @@ def page(task: str, film: str = "") -> str:
         observations=_observations(definition, body),
         other_groups=", ".join(f"`{group}`" for group in groups if group not in s.observation),
         rewards=_rewards(definition, weights),
-        target_reward=parts.target_reward(s),
         lift_off=f"{100 * LIFT_OFF:g}",
         start=_start(s, definition.start),
         options=markdown_table(("Option", "Unit", "Range", "Meaning"), parts.options()),
@@ -153,28 +160,32 @@ def index() -> str:
 def write_pages(out: Path, films: Path | None = None) -> list[Path]:
     """Write all pages and the index into a folder, which is made if it does not exist; return the files.
 
-    Parts that a page shares with the page of `HorseLeg` are replaced by a link (`without_common`).
+    Sections that hold for all ids are in common.md. What else a page shares with the page of `HorseLeg` is
+    there alone (`without_common`).
 
     Args:
         out: folder of the pages.
-        films: folder of trained policies, in the form of agents.ship. Each page shows the film of its policy.
-            None for pages without films.
+        films: folder of trained policies, in the form of agents.ship. Each page shows film and scores of its
+            policy. None for pages without them.
 
     Raises:
-        DataFileError: a policy has no film.
+        DataFileError: a policy has no film, or no scores.
         OutputError: the folder cannot be written.
     """
-    shown = {name: "" if films is None else _find_film(films, name, out) for name in _NAMES.values()}
-    texts = {f"{name}.md": page(task, shown[name]) for task, name in _NAMES.items()}
-    # This id is `HorseLeg` with another reward: its page says so, and needs no table of the observation.
-    texts["HorseLegMO.md"] = _tidy(
-        texts["HorseLegMO.md"].replace(_observations(TASKS["leg"], OneLeg(TASKS["leg"].settings({}))), "")
-    )
-    for name in _NAMES.values():
-        if name not in (COMMON, "HorseLegMO"):
-            # With the page's own id in the examples, so that these count as equal.
-            common = texts[f"{COMMON}.md"].replace(f"/{COMMON}-v0", f"/{name}-v0")
-            texts[f"{name}.md"] = without_common(texts[f"{name}.md"], COMMON, common)
+    whole = {}
+    for task, name in _NAMES.items():
+        policy = None if films is None else _find_policy(films, name)
+        film = "" if policy is None else Path(os.path.relpath(policy / "film.gif", out)).as_posix()
+        whole[name] = page(task, film, _score(policy) if policy else "")
+    usual = whole[COMMON]
+    texts = {"common.md": WORDS["common"].lstrip() + shared_sections(usual)}
+    for name, text in whole.items():
+        # With the page's own id in the examples, so that these count as equal.
+        others = {COMMON: own_sections(usual), "common": shared_sections(usual)}
+        others = {key: other.replace(f"/{COMMON}-v0", f"/{name}-v0") for key, other in others.items()}
+        if name == COMMON:
+            del others[COMMON]
+        texts[f"{name}.md"] = without_common(text, others)
     texts["README.md"] = index()
     try:
         out.mkdir(parents=True, exist_ok=True)
@@ -204,17 +215,36 @@ def _tidy(text: str) -> str:
     return re.sub(r"\n{3,}", "\n\n", text)
 
 
-def _find_film(films: Path, name: str, out: Path) -> str:
-    """Return the path of the film of an id, or of the id with the same policy, relative to the folder `out`.
+def _find_policy(films: Path, name: str) -> Path:
+    """Return the folder of the policy of an id, or of the id with the same policy.
 
     Raises:
         DataFileError: there is no film.
     """
     for id in (f"hoof_env/{name}-v0", STANDS_FOR.get(f"hoof_env/{name}-v0", "")):
-        film = films / id.rpartition("/")[2] / "film.gif"
-        if film.is_file():
-            return Path(os.path.relpath(film, out)).as_posix()
+        folder = films / id.rpartition("/")[2]
+        if (folder / "film.gif").is_file():
+            return folder
     raise DataFileError(f"films {films}: expected {name}-v0/film.gif, as agents.ship writes it, found none")
+
+
+def _score(policy: Path) -> str:
+    """Write the sentence that says which returns are good.
+
+    Raises:
+        DataFileError: the policy has no scores.
+    """
+    path = policy / "score.json"
+    try:
+        scores = json.loads(path.read_text(encoding="utf-8"))
+        first, last = scores["seeds"]
+        means = {name: values["mean"]["return"] for name, values in scores["policies"].items()}
+    except (OSError, ValueError, KeyError, TypeError) as error:
+        raise DataFileError(f"scores {path}: expected those that agents.ship writes: {error!r}") from None
+    shown = [f"{SCORED[name]} {means[name]:.3g}" for name in SCORED if name in means]
+    return Template(WORDS["score"].strip()).substitute(
+        returns=", ".join(shown), count=str(last - first), id=str(scores["env_id"])
+    )
 
 
 def _film(name: str, kind: str, film: str) -> str:
@@ -245,10 +275,13 @@ def _objectives(weights: Mapping[str, float]) -> str:
 
 
 def _observations(task: Task, body: Body) -> str:
-    """Write the table of the observation."""
+    """Write the table of the observation; numbers that each leg has share a row."""
     parts = page_of_body(body)
-    entries = enumerate(_observed(task))
-    rows = [(str(k), e.name, parts.scaling(e.scale, body), e.unit, e.group) for k, e in entries]
+    numbers: dict[tuple[str, ...], list[str]] = {}
+    for k, entry in enumerate(_observed(task)):
+        cells = (parts.name_of_any_leg(entry.name), parts.scaling(entry.scale, body), entry.unit, entry.group)
+        numbers.setdefault(cells, []).append(str(k))
+    rows = [(", ".join(places), *cells) for cells, places in numbers.items()]
     return markdown_table(("Num", "Observation", "Scaling", "Unit before scaling", "Group"), rows)
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from abc import ABC, abstractmethod
 from collections.abc import Iterable, Mapping
 from contextlib import suppress
@@ -19,7 +20,7 @@ from hoof_env.tasks import horse, leg_starts, observation
 from hoof_env.tasks.body import Body
 from hoof_env.tasks.effects import check_effect
 from hoof_env.tasks.horse import Horse
-from hoof_env.tasks.horse_gaits import ACTED, COUNT
+from hoof_env.tasks.horse_gaits import ACTED, COUNT, LEGS
 from hoof_env.tasks.one_leg import OneLeg
 from hoof_env.tasks.settings import PER_EPISODE, Settings
 
@@ -49,6 +50,10 @@ class BodyPage(ABC):
     def scaling(self, scale: observation.Scale, body: Any) -> str:
         """Return the formula of a scale."""
         return scale.text
+
+    def name_of_any_leg(self, name: str) -> str:
+        """Return the name of an observation without that of its leg."""
+        return name
 
     def settings(self, s: Settings, defaults: Mapping[str, str]) -> list[tuple[str, ...]]:
         """Return the rows of the settings that the body takes, with those defaults."""
@@ -83,10 +88,6 @@ class BodyPage(ABC):
         rows = rows_of(f"{self.table_prefix}info")
         return [row for row in rows if row[0] != "`target_speed`" or s.target_speed is not None]
 
-    def target_reward(self, s: Settings) -> str:
-        """Return the words about rewards at a commanded speed, "" for none."""
-        return ""
-
 
 class LegPage(BodyPage):
     """Parts of the page of one leg."""
@@ -97,6 +98,7 @@ class LegPage(BodyPage):
     words = MappingProxyType(
         {
             "still": " " + WORDS["leg_still"].strip(),
+            "target_reward": WORDS["target_reward"],
             "share": "",
             "of_legs": "leg's",
             "prefixes": "",
@@ -124,10 +126,6 @@ class LegPage(BodyPage):
             return observation.rate_text(body.filters.to_array()[observation.IN_RATE.index(scale), 1])
         return scale.text
 
-    def target_reward(self, s: Settings) -> str:
-        """Return the words about rewards at a commanded speed, "" without one."""
-        return WORDS["target_reward"] if s.target_speed else ""
-
 
 class HorsePage(BodyPage):
     """Parts of the page of a horse."""
@@ -138,6 +136,7 @@ class HorsePage(BodyPage):
     words = MappingProxyType(
         {
             "still": "",
+            "target_reward": "",
             "share": "a fourth of ",
             "of_legs": "legs'",
             "prefixes": WORDS["prefixes"],
@@ -157,6 +156,10 @@ class HorsePage(BodyPage):
             rows.append((numbers, GAIT[k].name, operation, f"{-span:g}", f"{span:g}", unit, fastest))
         head = ("Num", "Offset of the reference's", "Is", "At -1", "At +1", "Unit", "Fastest change")
         return markdown_table(head, rows)
+
+    def name_of_any_leg(self, name: str) -> str:
+        """Return the name of an observation without that of its leg."""
+        return re.sub(rf"({'|'.join(LEGS).replace('_', ' ')})[:,] ", "", name)
 
     def settings(self, s: Settings, defaults: Mapping[str, str]) -> list[tuple[str, ...]]:
         """Return the rows of the settings that a horse accepts, with those defaults."""

@@ -1,40 +1,94 @@
-"""Removal of the parts that a manual page shares with another page, to which it then refers."""
+"""Short forms of the manual pages: what a page shares with another page is there alone."""
 
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from difflib import SequenceMatcher
+from typing import NamedTuple
+
+from hoof_env._output import markdown_table
+
+SHARED = ("Episode Summary", "Infos", "What is Measured", "Vector Environment", "State", "Arguments")
+"""Sections that hold for all ids; they have a page of their own."""
+
+REST = "The Rest"
+"""Heading of the section that says where the sections are that a short page lacks."""
+
+ROWS = "Rows that differ:"
+"""Line before a table that is to be read with that of another page."""
 
 
-def without_common(page: str, name: str, other: str) -> str:
-    """Replace the parts that a page shares with another page by links to that page's sections.
+class Table(NamedTuple):
+    """A table in Markdown.
 
-    Paragraphs that are in the same section of both pages are removed, and so are equal rows of tables. A
-    section is kept whole if that of the other page has a paragraph without a counterpart, and a table if the
-    other one has a name that it lacks: with a link, readers would apply them to this page, too.
+    Attributes:
+        head: titles of the columns.
+        rows: cells of the rows by name, which is the first cell, or the second one where rows are numbered.
+    """
+
+    head: list[str]
+    rows: dict[str, list[str]]
+
+
+def shared_sections(page: str) -> str:
+    """Return the sections of a page that hold for all ids."""
+    return "".join(section for section in _sections(page) if _title(section).strip("# ") in SHARED)
+
+
+def own_sections(page: str) -> str:
+    """Return the other sections of a page."""
+    return "".join(section for section in _sections(page) if _title(section).strip("# ") not in SHARED)
+
+
+def without_common(page: str, others: Mapping[str, str]) -> str:
+    """Leave out the parts that a page shares with other pages, and say where they are.
+
+    A section that is equal in another page is left out, and the section `REST` refers to it. Of any other one
+    paragraphs that the other page has in the same section are left out. A table becomes the rows that differ,
+    after the names that it lacks; if the other table has all of these rows, columns that are equal in both
+    are left out, too. A section is kept whole if that of the other page has a paragraph without a
+    counterpart: with a link, readers would apply it to this page.
 
     Args:
         page: page in Markdown.
-        name: name of the other page, which is NAME.md in the same folder.
-        other: the other page.
+        others: other pages by name, which is NAME.md in the same folder. A section is compared with that of
+            the first page that has it.
 
     Returns:
-        The page in Markdown, with all of its headings.
+        The page in Markdown.
     """
-    others = {_title(section): section for section in _sections(other)}
     sections = []
+    equal: dict[str, list[str]] = {}
     for section in _sections(page):
         title = _title(section)
-        left = _differing(_blocks(section), _blocks(others[title])) if title in others else None
+        name, other = _counterpart(title, others)
+        left = None if other is None else _differing(_blocks(section), _blocks(other))
         if left is None:
             sections.append(section)
-            continue
-        # The anchor that Markdown renderers give to a heading.
-        anchor = title.strip("# ").lower().replace(" ", "-")
-        start = f"As in [{name}]({name}.md#{anchor})"
-        sections.append("\n\n".join((title, f"{start}, but for:" if left else f"{start}.", *left)) + "\n\n")
+        elif left:
+            start = f"As in [{name}]({name}.md#{_anchor(title)}), except:"
+            sections.append("\n\n".join((title, start, *left)) + "\n\n")
+        else:
+            equal.setdefault(name, []).append(f"[{title.strip('# ')}]({name}.md#{_anchor(title)})")
+    if equal:
+        sentences = [f"As in {name}: {', '.join(links)}." for name, links in equal.items()]
+        sections.append(f"## {REST}\n\n" + "\n\n".join(sentences) + "\n\n")
     return "".join(sections).rstrip() + "\n"
+
+
+def _counterpart(title: str, others: Mapping[str, str]) -> tuple[str, str | None]:
+    """Return the name of the first page with a section of that title, and the section."""
+    for name, page in others.items():
+        for section in _sections(page):
+            if _title(section) == title:
+                return name, section
+    return "", None
+
+
+def _anchor(title: str) -> str:
+    """Return the anchor that Markdown renderers give to a heading."""
+    return title.strip("# ").lower().replace(" ", "-")
 
 
 def _sections(page: str) -> list[str]:
@@ -64,20 +118,56 @@ def _differing(own: Sequence[str], others: Sequence[str]) -> list[str] | None:
         if i_end - i > j_end - j:
             return None
         left += [_differing_rows(block, others[i:i_end]) for block in own[j:j_end]]
-    return left
+    return [block for block in left if block]
 
 
 def _differing_rows(block: str, others: Sequence[str]) -> str:
-    """Return a table without the rows of another one with the same head, if it has all names of that one; any
-    other block unchanged."""
-    rows = block.split("\n")
-    names = {_first_cell(row) for row in rows}
-    for other in (text.split("\n") for text in others if block.startswith("|")):
-        if other[0] == rows[0] and {_first_cell(row) for row in other} <= names:
-            return "\n".join([*rows[:2], *(row for row in rows[2:] if row not in other)])
+    """Return how a table differs from another one with the same head; any other block unchanged."""
+    own = read_table(block)
+    for other in map(read_table, others):
+        if own and other and own.head == other.head and _is_in_order(own, other):
+            return _difference(own, other)
     return block
 
 
-def _first_cell(row: str) -> str:
-    """Return the first cell of a row of a table, the name; "" of another line."""
-    return row.split("|")[1] if row.startswith("|") else ""
+def read_table(block: str) -> Table | None:
+    """Return the table of a block, None if it is no table."""
+    if not block.startswith("|"):
+        return None
+    head, _, *lines = [[cell.strip() for cell in line.strip("|").split("|")] for line in block.split("\n")]
+    name = _column_of_names(head)
+    return Table(head, {cells[name]: cells for cells in lines})
+
+
+def _column_of_names(head: Sequence[str]) -> int:
+    """Return which column has the names of the rows."""
+    return 1 if head[0] == "Num" and head[1] == "Observation" else 0
+
+
+def _is_in_order(own: Table, other: Table) -> bool:
+    """True if tables share at least half of their rows, which come first and in the same order."""
+    both = [name for name in other.rows if name in own.rows]
+    return 2 * len(both) >= len(own.rows) and list(own.rows)[: len(both)] == both
+
+
+def _difference(own: Table, other: Table) -> str:
+    """Return the names that a table lacks, and its rows that differ."""
+    names = _column_of_names(own.head)
+    lacking = [name for name in other.rows if name not in own.rows]
+    added = [cells for name, cells in own.rows.items() if name not in other.rows]
+    changed = {name: cells for name, cells in own.rows.items() if name in other.rows}
+    compared = range(names, len(own.head))  # numbers follow from the order
+    differing = {
+        name: cells
+        for name, cells in changed.items()
+        if any(cells[k] != other.rows[name][k] for k in compared)
+    }
+    shown = list(range(len(own.head)))
+    if not added:
+        rows = differing.items()
+        shown = [k for k in compared if k == names or any(c[k] != other.rows[n][k] for n, c in rows)]
+    parts = [f"Without {', '.join(lacking)}."] if lacking else []
+    head, *lines = [[cells[k] for k in shown] for cells in (own.head, *differing.values(), *added)]
+    if lines:
+        parts += [ROWS, markdown_table(head, lines)]
+    return "\n\n".join(parts)

@@ -60,7 +60,7 @@ def test_committed_pages_are_what_the_command_writes(tmp_path, capsys, monkeypat
     monkeypatch.chdir(tmp_path)
     out = Path("docs/environments")
     assert cli.main(["manual", "--out", str(out), "--films", "agents/policies"]) == 0
-    assert f"8 files written; read {out / 'README.md'} first" in capsys.readouterr().out
+    assert f"9 files written; read {out / 'README.md'} first" in capsys.readouterr().out
     written = {file.name: file.read_text("utf-8") for file in out.iterdir()}
     committed = {file.name: file.read_text("utf-8") for file in DOCS.glob("*.md")}
     assert written == committed, "run `hoof-env manual --out docs/environments --films agents/policies`"
@@ -71,12 +71,30 @@ def test_every_page_shows_its_film(page):
     name = IDS[page].removeprefix("hoof_env/").removesuffix("-v0")
     (told, film) = re.search(r"!\[(.+?)\]\((.+?)\)", (DOCS / f"{name}.md").read_text("utf-8")).groups()
     # HorseLegMO has the agent of HorseLeg, and its film.
-    assert told.startswith(f"{'HorseLeg' if page == 'mo' else name}, the agent that ships")
+    assert told.startswith(f"{'HorseLeg' if page == 'mo' else name}, the shipped agent")
     assert ("footfall" in told) == (page == "horse") == ("gait parameters" not in told)
     policy = "HorseLeg-v0" if page == "mo" else f"{name}-v0"
     assert film == f"../../agents/policies/{policy}/film.gif"
     assert (DOCS / film).stat().st_size < 650e3  # a page loads quickly
     assert "![" not in manual.page(page)
+
+
+@pytest.mark.parametrize("page", manual.PAGES)
+def test_every_page_says_which_returns_are_good(page):
+    """Those of the table of the policies that ship."""
+    name = "HorseLeg" if page == "mo" else IDS[page].removeprefix("hoof_env/").removesuffix("-v0")
+    told = re.search(r"over the same 100 episodes: (.+?)\. \[", (DOCS / f"{name}.md").read_text("utf-8"))[1]
+    table = rows((POLICIES / "README.md").read_text("utf-8").partition("mean returns")[0])
+    shipped = next(row for row in table if f"/{name}-v0`" in row[0])[2]
+    assert f"the shipped agent {float(shipped.split()[0]):.3g}" in told
+
+
+def test_a_policy_without_scores_is_named(tmp_path, capsys):
+    shutil.copytree(POLICIES / "HorseLeg-v0", tmp_path / "HorseLeg-v0")
+    (tmp_path / "HorseLeg-v0" / "score.json").write_text("{}")
+    assert cli.main(["manual", "--out", str(tmp_path / "out"), "--films", str(tmp_path)]) == 2
+    assert "score.json: expected those that agents.ship writes" in capsys.readouterr().err
+    assert not (tmp_path / "out").exists()
 
 
 def test_a_policy_without_a_film_is_named(tmp_path, capsys):
@@ -110,9 +128,13 @@ def test_tables_match_the_spaces(page):
         assert space.dtype == np.float32
         assert (space.low == -1).all()
         assert (space.high == 1).all()
-    table = rows(seen)
-    assert [int(row[0]) for row in table] == list(range(env.observation_space.shape[0]))
-    assert tuple(row[1] for row in table) == tuple(env.unwrapped.observation_names)
+    if page == "mo":
+        return
+    told = {int(number): row[1] for row in rows(seen) for number in row[0].split(", ")}
+    assert sorted(told) == list(range(env.observation_space.shape[0]))
+    legs = "|".join(leg.replace("_", " ") for leg in LEGS)
+    for number, name in enumerate(env.unwrapped.observation_names):
+        assert told[number] == re.sub(rf"({legs})[:,] ", "", name)
 
 
 @pytest.mark.parametrize("page", OF_LEGS)
@@ -300,7 +322,7 @@ def test_rewards_options_and_figures_are_those_of_the_environment(page):
     table = rows(section(text, "Rewards"))
     assert [row[0].strip("`") for row in table] == [name for name in info if name.startswith("reward_")]
     assert [float(row[2]) for row in table] == [weights[row[1].strip("`")] for row in table]
-    figures = [row[0].strip("`") for row in rows(section(text, "Episode End"))]
+    figures = [row[0].strip("`") for row in rows(section(text, "Episode Summary"))]
     assert figures == list(info["episode_summary"])
     told = {row[0].strip("`") for row in [*table, *rows(section(text, "Infos"))]}
     assert set(started) == told

@@ -7,7 +7,7 @@ import gymnasium as gym
 import pytest
 
 from hoof_env.envs import manual
-from hoof_env.envs.manual_common import without_common
+from hoof_env.envs.manual_common import REST, ROWS, without_common
 from hoof_env.tasks.one_leg import OneLeg
 from hoof_env.tasks.plain import to_json
 from hoof_env.tasks.registry import TASKS
@@ -33,43 +33,71 @@ def read(name):
     return (DOCS / f"{name}.md").read_text(encoding="utf-8")
 
 
-@pytest.mark.parametrize("task", OTHERS)
+def others(name):
+    """The pages to which a page refers, with its id in their examples."""
+    pages = {other: read(other).replace("/HorseLeg-v0", f"/{name}-v0") for other in ("HorseLeg", "common")}
+    return {other: page for other, page in pages.items() if other != name}
+
+
+def anchor(heading):
+    return heading.strip("# ").lower().replace(" ", "-")
+
+
+@pytest.mark.parametrize("task", TASKS)
 def test_what_a_page_lacks_stands_in_the_section_that_it_refers_to(task):
     name = TASKS[task].name
     whole, short = lines_by_heading(manual.page(task)), lines_by_heading(read(name))
-    common = lines_by_heading(manual.page("leg").replace("/HorseLeg-v0", f"/{name}-v0"))
-    assert list(whole) == list(short)
+    elsewhere = {other: lines_by_heading(page) for other, page in others(name).items()}
+    rest = "".join(short.pop(f"## {REST}", []))
     for heading, lines in whole.items():
-        missing = [line for line in lines if line not in short[heading]]
-        assert not [line for line in missing if line not in common[heading]], heading
-        if missing:
-            anchor = heading.strip("# ").lower().replace(" ", "-")
-            assert short[heading][0].startswith(f"As in [HorseLeg](HorseLeg.md#{anchor})")
+        own = short.pop(heading, None)
+        links = [f"({other}.md#{anchor(heading)})" for other in elsewhere]
+        if own is None:
+            (other,) = (other for other, link in zip(elsewhere, links, strict=True) if link in rest)
+            assert lines == elsewhere[other][heading]
+        elif own != lines and heading != next(iter(whole)):
+            (other,) = (other for other, link in zip(elsewhere, links, strict=True) if link in own[0])
+            common = elsewhere[other][heading]
+            assert restored(own, common) == read_tables(lines)
+            assert {line for line in lines if not line.startswith("|")} <= {*own, *common}
+    assert not short
 
 
-def tables(lines):
-    """Rows of the tables among lines by head and first cell."""
-    found, rows = {}, {}
+def restored(lines, common):
+    """Tables of a section of which `common` is the section that it refers to."""
+    tables = read_tables(common)
+    found = {}
+    for line in lines:
+        if line.startswith("Without "):
+            names = line.removeprefix("Without ").removesuffix(".").split(", ")
+            tables = {
+                head: {name: row for name, row in rows.items() if name not in names}
+                for head, rows in tables.items()
+            }
+    is_merged = ROWS in lines
+    for head, rows in read_tables(lines).items():
+        known = next((other for other in tables if set(head) <= set(other)), None)
+        if is_merged and known:
+            for name, cells in rows.items():
+                tables[known][name] = tables[known].get(name, {}) | cells
+        else:
+            found[head] = rows
+    return tables | found
+
+
+def read_tables(lines):
+    """Cells of the tables among lines, by head, name of the row and column."""
+    found, rows, head = {}, {}, ()
     for number, line in enumerate(lines):
+        cells = [cell.strip() for cell in line.strip("|").split("|")]
         if line.startswith("|") and number + 1 < len(lines) and lines[number + 1].startswith("|---"):
-            found[line] = rows = {}
+            head = tuple(cells)
+            found[head] = rows = {}
         elif line.startswith("|") and not line.startswith("|---"):
-            rows[line.split("|")[1]] = line
+            name = cells[1] if head[:2] == ("Num", "Observation") else cells[0]
+            # Numbers follow from the order of the rows.
+            rows[name] = {title: cell for title, cell in zip(head, cells, strict=True) if title != "Num"}
     return found
-
-
-@pytest.mark.parametrize("task", OTHERS)
-def test_rows_that_are_listed_replace_those_of_the_other_page(task):
-    """Both pages together have the whole table, and no row that is not in it."""
-    name = TASKS[task].name
-    whole, short = lines_by_heading(manual.page(task)), lines_by_heading(read(name))
-    common = lines_by_heading(read("HorseLeg"))
-    for heading, lines in short.items():
-        if lines and lines[0].startswith("As in "):
-            others, own = tables(common[heading]), tables(lines)
-            for head, rows in tables(whole[heading]).items():
-                listed = own.get(head, {})
-                assert listed == rows or others[head] | listed == rows
 
 
 @pytest.mark.parametrize("task", [task for task in OTHERS if TASKS[task].body is OneLeg])
@@ -85,31 +113,44 @@ TABLE = "| Name | Default |\n|---|---|\n"
 
 
 def shortened(own, other):
-    return without_common(PAGE.format(name="Own", **own), "Other", PAGE.format(name="Other", **other))
+    return without_common(PAGE.format(name="Own", **own), {"Other": PAGE.format(name="Other", **other)})
 
 
-def test_equal_paragraphs_rows_and_code_go():
+def test_equal_sections_paragraphs_and_rows_go():
     code = "```python\nx = 1\n\ny = 2\n```"
     page = shortened(
         {"a": code, "b": TABLE + "| x | 1 |\n| y | 2 |\n| z | 3 |"},
         {"a": code, "b": TABLE + "| x | 1 |\n| y | 1 |"},
     )
     assert page == (
-        "# Own\n\nfilm\n\n## A\n\nAs in [Other](Other.md#a).\n\n"
-        "## B\n\nAs in [Other](Other.md#b), but for:\n\n" + TABLE + "| y | 2 |\n| z | 3 |\n"
+        "# Own\n\nfilm\n\n## B\n\nAs in [Other](Other.md#b), except:\n\nRows that differ:\n\n"
+        + TABLE
+        + "| y | 2 |\n| z | 3 |\n\n## The Rest\n\nAs in Other: [A](Other.md#a).\n"
     )
 
 
+def test_columns_that_are_equal_go_and_rows_that_are_missing_are_named():
+    head = "| Name | Default | Unit |\n|---|---|---|\n"
+    page = shortened(
+        {"a": "two", "b": head + "| x | 1 | m |\n| z | 3 | s |"},
+        {"a": "two", "b": head + "| x | 1 | m |\n| y | 1 | m |\n| z | 2 | s |"},
+    )
+    assert "except:\n\nWithout y.\n\nRows that differ:\n\n| Name | Default |\n|---|---|\n| z | 3 |\n" in page
+
+
+def test_a_table_of_other_rows_or_in_another_order_stays_whole():
+    for rows in ("| a | 1 |\n| b | 2 |", "| y | 1 |\n| x | 1 |"):
+        page = shortened({"a": "two", "b": TABLE + rows}, {"a": "two", "b": TABLE + "| x | 1 |\n| y | 1 |"})
+        assert f"except:\n\n{TABLE}{rows}\n" in page
+
+
 def test_what_the_other_page_has_beyond_is_not_claimed():
-    own = {"a": "two", "b": TABLE + "| x | 1 |"}
-    page = shortened(own, {"a": "two\n\nthree", "b": TABLE + "| x | 1 |\n| y | 1 |"})
+    page = shortened({"a": "two", "b": "four"}, {"a": "two\n\nthree", "b": "five"})
     assert page == (
-        "# Own\n\nfilm\n\n## A\n\none\n\ntwo\n\n## B\n\nAs in [Other](Other.md#b), but for:\n\n"
-        + own["b"]
-        + "\n"
+        "# Own\n\nfilm\n\n## A\n\none\n\ntwo\n\n## B\n\nAs in [Other](Other.md#b), except:\n\nfour\n"
     )
 
 
 def test_a_section_of_its_own_stays():
-    page = without_common("# Own\n\n## C\n\none\n", "Other", "# Other\n\n## D\n\none\n")
+    page = without_common("# Own\n\n## C\n\none\n", {"Other": "# Other\n\n## D\n\none\n"})
     assert page == "# Own\n\n## C\n\none\n"
