@@ -31,10 +31,10 @@ def draw(tex: str, block: bool) -> str:
         block: whether it stands on lines of its own.
     """
     svg = ziamath.Latex(tex, size=SIZE, inline=not block).svg()
-    width, height = (
-        float(value) / SIZE for value in re.search(r'width="([\d.]+)" height="([\d.]+)"', svg).groups()
-    )  # type: ignore[union-attr]
-    top = float(re.search(r'viewBox="\S+ (\S+)', svg).group(1)) / SIZE  # type: ignore[union-attr]
+    size = ElementTree.fromstring(svg).attrib
+    width = float(size["width"]) / SIZE
+    height = float(size["height"]) / SIZE
+    top = float(size["viewBox"].split()[1]) / SIZE
     place = f'style="width:{width:.3f}em;height:{height:.3f}em;vertical-align:{-(height + top):.3f}em"'
     drawn = re.sub(r"<svg ([^>]*?)width=\S+ height=\S+", rf'<svg aria-hidden="true" {place} \1', svg, count=1)
     spoken = convert(tex, display="block" if block else "inline")
