@@ -147,7 +147,7 @@ def _ill_conditioned(reproduction: Reproduction) -> str:
         return ""
     return (
         "## Ill-conditioned rows\n\n"
-        f"These rows, marked †, have no bar with {listed((f'`{solver}`' for solver in EULER), 'or')}: "
+        f"These rows, marked †, count as outside with {listed((f'`{solver}`' for solver in EULER), 'or')}: "
         f"{listed(f'`{name}`' for name in spared)}. Inelastic walking depends on the approach speed at a "
         "touch-down that grazes the ground. The paper's loop takes that speed at its first step inside the "
         "ground, so a small change of the time step, of β or of the identified ground level moves these rows "
@@ -244,9 +244,9 @@ def which_beta(reproduction: Reproduction) -> dict[str, str]:
         "within": listed(f"{sum(rows)} of {len(rows)} ({name} β)" for name, rows in judged.items()),
         # Both readings of beta share the leg, so that none, one or both can meet all rows.
         "verdict": {
-            0: "This leg meets all of them with neither",
-            1: f"This leg meets all of them with the {met[0] if met else ''} β only",
-            2: "This leg meets all of them with both",
+            0: "This leg meets all of these with neither",
+            1: f"This leg meets all of these with the {met[0] if met else ''} β only",
+            2: "This leg meets all of these with both",
         }[len(met)],
     }
 

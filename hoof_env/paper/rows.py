@@ -198,6 +198,9 @@ ILL_CONDITIONED = ("walk.peak_inelastic", "walk.mean_inelastic", "walk.reduction
 """Rows without a bar for the paper's solver, with either beta: the walk grazes, and they depend on how its
 loop samples touch-down (docs/evidence/README.md has how far they move)."""
 
+OURS = "not in the paper"
+"""Beginning of a claim that the paper does not make."""
+
 # Reasons why a row is spared.
 REPORTED = "reported"
 ILL = "ill-conditioned"
@@ -299,17 +302,26 @@ def compare(published: Published, stances: Stances, solver: str) -> list[dict[st
 
 
 def counted(rows: Iterable[Mapping[str, Any]], shapes: Iterable[Mapping[str, Any]], solver: str) -> str:
-    """Return a sentence with the numbers of a solver's rows within their bars, of rows that are not counted
-    with the reason, and of claims about shape that hold."""
-    mine = [row for row in rows if row["solver"] == solver]
-    judged = [row["within_bar"] for row in mine if not row["spared"]]
-    spared = [row["spared"] for row in mine]
-    rest = " and ".join(f"{spared.count(why)} {why}" for why in (REPORTED, ILL) if why in spared)
-    holds = [shape["holds"] for shape in shapes if shape["solver"] == solver]
-    return (
-        f"{sum(judged)} of {len(judged)} rows within their bar{f' (not counted: {rest})' if rest else ''}, "
-        f"{sum(holds)} of {len(holds)} claims about shape hold"
+    """Return a sentence with the numbers of a solver's rows within their bars and of claims that hold.
+
+    An ill-conditioned row counts as outside. The paper's claims are counted apart from checks of our own, and
+    those that hold in another reading than the printed one are told.
+    """
+    own_rows = [row for row in rows if row["solver"] == solver and row["spared"] != REPORTED]
+    within = sum(bool(row["within_bar"]) for row in own_rows)
+    ill = sum(row["spared"] == ILL for row in own_rows)
+    claims = [shape for shape in shapes if shape["solver"] == solver]
+    of_paper = [claim for claim in claims if not claim["claim"].startswith(OURS)]
+    held = [claim for claim in of_paper if claim["holds"]]
+    turned = sum(bool(claim["used"]) for claim in held)
+    ours = [claim["holds"] for claim in claims if claim["claim"].startswith(OURS)]
+    parts = (
+        f"{within} of {len(own_rows)} rows within their bar{f' ({ill} outside are {ILL})' if ill else ''}",
+        f"{len(held) - turned} of {len(of_paper)} of the paper's claims about shape hold as printed"
+        f"{f' and {turned} with the sign turned' if turned else ''}",
+        f"{sum(ours)} of {len(ours)} checks of our own",
     )
+    return ", ".join(parts)
 
 
 def _compare(row: PublishedRow, stances: Stances, solver: str) -> dict[str, Any]:

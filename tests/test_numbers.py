@@ -1,0 +1,165 @@
+"""Results on the pages, read off the data that they come from.
+
+A result is followed by a comment that names its source, which no reader sees, as in
+`183<!-- = score HorseLeg-v0 policy return -->`. `python tests/test_numbers.py` lists the numbers with units
+that have none, page by page: most are settings and definitions. Their counts may fall and not rise.
+"""
+
+import csv
+import json
+import re
+import sys
+from collections.abc import Callable, Iterator
+from functools import cache
+from pathlib import Path
+
+import pytest
+
+from agents.statistics import iqm
+from hoof_env.envs.horse_leg import HorseLegEnv
+from hoof_env.paper.rows import EXACT, OURS, PRINTED, PROBABLE, REPORTED
+from hoof_env.tasks.horse import MASS
+
+ROOT = Path(__file__).parents[1]
+PAGES = ("README.md", "docs/index.md", "docs/agents.md", "docs/paper.md")
+"""Pages whose results are marked."""
+
+MOST_UNMARKED = {"README.md": 3, "docs/index.md": 1, "docs/agents.md": 4, "docs/paper.md": 7}
+"""Largest counts of numbers with units that name no source."""
+
+MARK = re.compile(r"(?P<number>-?\d[\d,]*(?:\.\d+)?)(?P<unit>[^<\d|]{0,8})<!-- = (?P<source>.+?) -->")
+UNITS = (
+    "m/s",
+    "kN/s",
+    "kN",
+    "N/kg",
+    "N",
+    "kg",
+    "mm",
+    "ms",
+    "s",
+    "m",
+    "rad",
+    "J",
+    "steps",
+    "seconds",
+    "minutes",
+)
+NUMBER = re.compile(rf"(?<![\w.])\d[\d,]*(?:\.\d+)?[ -]?(?:%|(?:{'|'.join(UNITS)})(?![\w/]))(?!<!--)")
+
+
+def score(policy_id: str, policy: str, figure: str) -> float:
+    """The mean figure of a policy in the file of a policy that ships."""
+    means = json.loads((ROOT / "agents/policies" / policy_id / "score.json").read_text())["policies"]
+    found = means[policy]["mean"]
+    if figure == "speed":
+        return found["distance_m"] / 10.0  # no episode failed, and each lasts 10 s
+    if figure == "peak_kn":
+        return found["stance_peak_n"] / 1000.0
+    return found[figure]
+
+
+def stock(name: str, algo: str, steps: str) -> float:
+    """The interquartile mean over seeds of the last return of a stock learner up to so many steps."""
+    last: dict[str, tuple[int, float]] = {}
+    with (ROOT / "docs/evidence/stock/curves.csv").open(newline="") as file:
+        for row in csv.DictReader(file):
+            here = int(row["steps"])
+            is_asked = (row["env_id"], row["algo"]) == (f"hoof_env/{name}", algo) and here <= int(steps)
+            if is_asked and here >= last.get(row["seed"], (0, 0.0))[0]:
+                last[row["seed"]] = here, float(row["return"])
+    return float(iqm([value for _, value in last.values()])[0])
+
+
+def speed(*case: str) -> float:
+    """The ratio of a case in the committed benchmark of the environments."""
+    text = (ROOT / "benchmarks/results/512-bits/env_speed.md").read_text(encoding="utf-8")
+    row = next(line for line in text.splitlines() if line.startswith(f"| {' '.join(case)} |"))
+    return float(row.split("|")[5].split()[0])
+
+
+def leg(figure: str) -> float:
+    """A figure of the environment with the defaults."""
+    env = HorseLegEnv()
+    env.reset(seed=0)
+    if figure == "hip_height":
+        return env.batch.body.height
+    mass = env.weight / 9.81
+    if figure == "mass":
+        return mass
+    assert figure == "peak_weights"
+    return score("HorseLeg-v0", "policy", "stance_peak_n") / env.weight
+
+
+def horse(figure: str) -> float:
+    """The mass of the horse."""
+    assert figure == "mass"
+    return MASS
+
+
+def reproduced(solver: str, count: str) -> float:
+    """How many rows of the committed reproduction have a bar, or are within it, with a solver."""
+    entries = json.loads((ROOT / "docs/paper/reproduction.json").read_text(encoding="utf-8"))
+    names = {"exact": EXACT, "printed": PRINTED, "probable": PROBABLE}
+    rows = [entry for entry in entries if entry["kind"] == "row" and entry["solver"] == names[solver]]
+    barred = [row for row in rows if row["spared"] != REPORTED]
+    return {"rows": len(barred), "within": sum(bool(row["within_bar"]) for row in barred)}[count]
+
+
+def claims(count: str) -> float:
+    """How many claims of the paper there are, hold as printed, or hold with a turned sign, converged."""
+    entries = json.loads((ROOT / "docs/paper/reproduction.json").read_text(encoding="utf-8"))
+    shapes = [entry for entry in entries if entry["kind"] == "shape" and entry["solver"] == EXACT]
+    of_paper = [shape for shape in shapes if not shape["claim"].startswith(OURS)]
+    turned = sum(bool(shape["used"]) for shape in of_paper if shape["holds"])
+    held = sum(shape["holds"] for shape in of_paper)
+    return {"all": len(of_paper), "printed": held - turned, "turned": turned}[count]
+
+
+SOURCES: dict[str, Callable[..., float]] = {
+    "score": score,
+    "stock": stock,
+    "speed": speed,
+    "leg": leg,
+    "horse": horse,
+    "reproduced": reproduced,
+    "claims": claims,
+}
+
+
+def marks() -> Iterator[tuple[str, str, str]]:
+    """Page, number and source of every marked result."""
+    for page in PAGES:
+        text = (ROOT / page).read_text(encoding="utf-8")
+        assert text.count("<!-- = ") == len(MARK.findall(text)), f"{page}: a mark without a number before it"
+        yield from ((page, found["number"], found["source"]) for found in MARK.finditer(text))
+
+
+@pytest.mark.parametrize(("page", "number", "source"), list(marks()))
+def test_a_result_is_what_its_source_has(page, number, source):
+    kind, *arguments = source.split()
+    decimals = len(number.partition(".")[2])
+    assert f"{SOURCES[kind](*arguments):.{decimals}f}" == number.replace(",", ""), source
+
+
+@cache
+def unmarked(page: str) -> list[str]:
+    """Numbers with units of a page, code apart, that name no source."""
+    text = (ROOT / page).read_text(encoding="utf-8")
+    prose = re.sub(r"```.*?```|`[^`\n]*`|\]\([^)]*\)", " ", text, flags=re.DOTALL)
+    return [found.group() for found in NUMBER.finditer(prose)]
+
+
+@pytest.mark.parametrize("page", PAGES)
+def test_numbers_without_a_source_do_not_become_more(page):
+    assert len(unmarked(page)) <= MOST_UNMARKED[page], unmarked(page)
+
+
+def test_a_number_without_a_source_is_found():
+    assert NUMBER.findall("forces of 3.2 kN and 12 % in 5 steps") == ["3.2 kN", "12 %", "5 steps"]
+    assert not NUMBER.findall("Python 3.11, 1024 legs, Eq. 8, 3.2 kN<!-- = score a b c -->")
+
+
+if __name__ == "__main__":
+    for page in sys.argv[1:] or PAGES:
+        print(f"{page}: {len(unmarked(page))}", *unmarked(page), sep="\n    ")
