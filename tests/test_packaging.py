@@ -51,7 +51,10 @@ def test_the_page_on_an_index_leads_nowhere_that_is_not_there(wheel):
     assert re.search(r"!\[.*\]\(docs/", readme)
     assert "Description-Content-Type: text/markdown" in text
     assert set(re.findall(r"\]\(([^)]*)\)", text)) == set(re.findall(r"\]\((https://[^)]*)\)", readme))
-    assert "To use the environments in a project of yours, install the package with pip." in text
+    assert "[docs" not in text
+    assert "](" not in text.partition("# hoof-env")[2].replace("](https://", "")
+    assert "<!--" not in text
+    assert "Read on\n\nGetting started | which environment for what |" in text
     assert "\n\n\n" not in text.partition("# hoof-env")[2]
 
 
