@@ -230,11 +230,13 @@ def load_gait(name: str, preset: Preset = DEFAULT_PRESET) -> GaitParameters:
     try:
         return (HarmonicGait if "higher" in gaits[name] else GaitParameters)(**gaits[name])
     # an entry is missing or unknown, or a gait is not an object
-    except TypeError as error:
+    except TypeError:
         raise preset_error_type(preset)(
-            f"{preset_label(preset)}, gait {name!r}: expected {', '.join(PARAMETERS)}, perhaps higher:"
-            f" {error}"
+            f"{preset_label(preset)}, gait {name!r}: expected {', '.join(PARAMETERS)}, perhaps higher, "
+            f"got {gaits[name]!r}"
         ) from None
+    except ParameterError as error:
+        raise ParameterError(f"{preset_label(preset)}, gait {name!r}: {error}") from None
 
 
 def paper_gaits(gaits: Mapping[str, Gait]) -> dict[str, Gait]:

@@ -16,6 +16,7 @@ from hoof_env.errors import FixedSettingError, ParameterError, UnknownArgumentEr
 from hoof_env.gait import HarmonicGait, load_gait
 
 LEG, NAN = "hoof_env/HorseLeg-v0", float("nan")
+HARMONIC = HarmonicGait(5.0, 0.4, 0.1, -0.2, (0.1, 0.05))
 OTHER_LEG = {**read_preset("identified"), "provenance": "another"}
 
 
@@ -33,6 +34,7 @@ OPTIONS = [
     ),
     ({"gait": 7}, r"options\['gait'\]: expected a gait name"),
     ({"gait": {**vars(load_gait("run")), "crank_speed": 99.0}}, "expected crank_speed.*got 99"),
+    ({"gait": HARMONIC}, "gait: expected a swing of at most 1 harmonic, got HarmonicGait"),
     ({"crank_angle": NAN}, r"options\['crank_angle'\]: expected.*got nan"),
     ({"speed": 1e3}, r"options\['speed'\]: expected.*got 1000.0"),
     ({"x": "here"}, r"options\['x'\]: expected.*got 'here'"),
@@ -344,7 +346,7 @@ def of_before(env):
 
 NO_GAIT = r"gait: expected one of carrying_walk, run, walk.*got"
 NO_GAITS = (
-    "trot", None, 3, [1.0, 2.0], [1.0, 2.0, 3.0, NAN], HarmonicGait(5.0, 0.4, 0.1, -0.2),
+    "trot", None, 3, [1.0, 2.0], [1.0, 2.0, 3.0, NAN], HarmonicGait(5.0, 0.4, 0.1, -0.2), HARMONIC,
     {"crank_speed": 1.0},
 )  # fmt: skip
 OF_ONE = "state: expected what get_state gives of one"

@@ -271,6 +271,10 @@ PRESETS = [
     ({**CONTENT, "gait": {}}, "unknown entries gait; expected some of provenance, units, geometry"),
     ({**CONTENT, "geometry": {**CONTENT["geometry"], "colour": "bay"}}, "geometry: .*; unknown colour"),
     ({**CONTENT, "gaits": {"trot": {"speed": 1.0}}}, "gait 'trot': expected crank_speed.*'speed'"),
+    (
+        {**CONTENT, "gaits": {"trot": {**CONTENT["gaits"]["walk"], "higher": [0.1, 0.05]}}},
+        "gait 'trot': expected the four parameters of one harmonic, .*, got HarmonicGait",
+    ),
     ({**CONTENT, "ground": {"softness": 1.0}}, "ground: .* no other entries than stiffness, exponent"),
     ({**CONTENT, "geometry": {**CONTENT["geometry"], "lengths": {"OP": 1.0}}}, "lengths: .*missing AJ, "),
 ]

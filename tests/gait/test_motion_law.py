@@ -5,7 +5,6 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from hoof_env.errors import ParameterError
 from hoof_env.gait import (
     LIMITS,
     MOTION,
@@ -128,17 +127,3 @@ def test_without_amplitude_the_frame_stands_still_and_the_crank_angle_is_not_wra
     for motion, _ in play([(gait, 10000)], 1e-3, gait):
         assert (motion["phi"], motion["phi_rate"], motion["phi_acc"]) == (0.7, 0.0, 0.0)
     assert motion["theta"] == pytest.approx(40 * np.pi, rel=1e-12)
-
-
-@pytest.mark.parametrize(
-    ("given_", "message"),
-    [
-        ({"gain": 0.0}, "filters.gain: expected"),
-        ({"swing_rate": -1.0}, "filters.swing_rate: expected"),
-        ({"crank_rate": 20.0, "crank_acc": 399.0}, r"gain \* crank_rate <= crank_acc .* got 20 \* 20 > 399"),
-        ({"swing_rate": 5.0, "swing_acc": 80.0}, r"gain \* swing_rate <= swing_acc .* got 20 \* 5 > 80"),
-    ],
-)
-def test_bad_settings_are_named(given_, message):
-    with pytest.raises(ParameterError, match=message):
-        FilterSettings(**given_)

@@ -2,15 +2,12 @@
 
 import json
 
-import gymnasium as gym
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import hoof_env  # noqa: F401
-from hoof_env.dynamics.constrained import ConstrainedLeg
-from hoof_env.errors import DataFileError, ParameterError
 from hoof_env.gait import (
     FASTEST_CRANK,
     LIMITS,
@@ -21,7 +18,6 @@ from hoof_env.gait import (
     load_gait,
     paper_gaits,
 )
-from hoof_env.ground.contact import Ground
 from hoof_env.leg.geometry import load_geometry, read_preset
 from tests.legs import FIRST_FIT
 
@@ -37,16 +33,11 @@ def test_an_array_and_back(values):
 
 
 @pytest.mark.parametrize("name", PARAMETERS)
-def test_each_limit_is_kept(name):
-    with pytest.raises(ParameterError, match=r"expected 4 values .*crank_speed.*, got shape \(3,\)"):
-        GaitParameters.from_array([1.0, 0.5, 0.0])
+def test_a_limit_itself_is_taken(name):
     low, high = LIMITS[name] if name != "crank_speed" else (0.0, FASTEST_CRANK)
     gait = dict(zip(PARAMETERS, (1.0, 0.5, 0.0, 0.0), strict=True))
     for value in (low, high):
         GaitParameters(**{**gait, name: value})
-    for value in (low - 1e-6, high + 1e-6, np.nan, np.inf, "fast", None, True):
-        with pytest.raises(ParameterError, match=f"{name}: expected a finite number in"):
-            GaitParameters(**{**gait, name: value})
 
 
 @pytest.mark.parametrize(
@@ -66,32 +57,9 @@ def test_the_gaits_of_first_fit(name, offset, amplitude, phase):
         assert swing == pytest.approx(offset + amplitude * np.sin(theta + phase), abs=1e-12)
 
 
-def test_an_unknown_gait():
+def test_names_of_gaits():
     assert gait_names(FIRST_FIT) == ["run", "walk"]
     assert {"run", "walk"} <= set(gait_names())
-    with pytest.raises(ParameterError, match="gait: expected one of run, walk, got 'trot'"):
-        load_gait("trot", FIRST_FIT)
-
-
-@pytest.mark.parametrize(
-    ("gaits", "error", "message"),
-    [
-        (None, DataFileError, "expected an object 'gaits' with at least one gait, got None"),
-        ({}, DataFileError, "expected an object 'gaits' with at least one gait"),
-        ({"walk": 3}, DataFileError, "gait 'walk': expected crank_speed"),
-        ({"walk": {"crank_speed": 6.0}}, DataFileError, "gait 'walk': expected crank_speed"),
-        ({"walk": {"crank_speed": 9999, "swing_offset": 0, "swing_sin": 0, "swing_cos": 0}},
-         ParameterError, "crank_speed: expected"),
-    ],
-)  # fmt: skip
-def test_a_bad_preset_is_named(tmp_path, gaits, error, message):
-    path = tmp_path / "bad.json"
-    path.write_text(json.dumps({"gaits": gaits}))
-    with pytest.raises(error, match=message):
-        load_gait("walk", path)
-    if not gaits or not isinstance(gaits, dict):
-        with pytest.raises(DataFileError, match="expected an object 'gaits'"):
-            gait_names(path)
 
 
 def test_a_preset_holds_more_gaits_than_the_papers(tmp_path):
@@ -103,8 +71,6 @@ def test_a_preset_holds_more_gaits_than_the_papers(tmp_path):
     assert gait_names(path) == ["carrying_walk", "run", "walk"]
     assert load_gait("carrying_walk", path) == GaitParameters(**given)
     assert load_gait("walk", path) == load_gait("walk", FIRST_FIT)
-    with pytest.raises(ParameterError, match="gait: expected one of run, walk, got 'carrying_walk'"):
-        load_gait("carrying_walk", FIRST_FIT)
 
 
 @pytest.mark.parametrize(
@@ -120,20 +86,10 @@ def test_the_papers_gaits_stand_apart_from_those_found_later(gaits, names):
     assert list(chosen.items()) == [(name, name.upper()) for name in names]
 
 
-def test_a_gait_with_harmonics_is_kept_in_a_file_and_no_leg_alone_takes_it(tmp_path):
+def test_a_gait_with_harmonics_is_kept_in_a_file(tmp_path):
     leg, gait = load_geometry(), HarmonicGait(5.0, 0.4, 0.1, -0.2, (0.1, 0.05))
     leg.save(
         tmp_path / "leg.json", gaits={"trot": gait, "walk": load_gait("walk")}, ground={"stiffness": 2e4}
     )
     assert load_gait("trot", tmp_path / "leg.json") == gait
     assert HarmonicGait.from_array(gait.to_array()) == gait
-    with pytest.raises(DataFileError, match=r"leg.json, gait 'trot': expected the four parameters"):
-        gym.make("hoof_env/HorseLeg-v0", preset=tmp_path / "leg.json")
-    env = gym.make("hoof_env/HorseLeg-v0")
-    with pytest.raises(ParameterError, match="gait: expected a swing of at most 1 harmonic, got"):
-        env.reset(seed=0, options={"gait": gait})
-    env.reset(seed=0)
-    with pytest.raises(ParameterError, match="gait: expected one of"):
-        env.unwrapped.action_for(gait)
-    with pytest.raises(ParameterError, match="gait: expected a swing of at most 1 harmonic"):
-        ConstrainedLeg(leg, Ground()).reset(gait)

@@ -5,7 +5,6 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from hoof_env.errors import ParameterError
 from hoof_env.ground.contact import HEEL, TOE, Ground, latch, new_contacts, touch
 from tests.oracle.laws import friction_force, normal_force
 
@@ -79,25 +78,3 @@ def test_touch_is_the_two_laws_at_the_place_of_the_point(x, y, vx, vy):
     assert force == complex(friction, normal)
     assert [contact[name] for name in ("x", "vx", "penetration", "rate")] == [x, vx, -y, -vy]
     assert [contact["normal"], contact["friction"]] == [normal, friction]
-
-
-@pytest.mark.parametrize(
-    ("settings_", "message"),
-    [
-        ({"stiffness": 0.0}, "stiffness: expected"),
-        ({"exponent": 1.4}, "exponent: expected a multiple of 1/8, .* got 1.4"),
-        ({"exponent": 0.5}, r"exponent: expected a finite number in \[1, 3\], got 0.5"),
-        ({"normal_law": "hertz"}, "normal_law: expected one of"),
-        ({"restitution": -0.1}, "restitution: expected"),
-        ({"restitution": 0.0, "normal_law": "flores"}, "damping grows without bound"),
-        ({"approach_floor": 0.0}, "approach_floor: expected"),
-        ({"approach": "guessed"}, "approach: expected one of interpolated, sampled, got 'guessed'"),
-        ({"friction_law": "coulomb"}, "friction_law: expected one of ambrosio, tanh, threlfall"),
-        ({"friction": float("nan")}, "friction: expected"),
-        ({"friction_slow": 0.02}, "friction_fast: expected more than friction_slow"),
-        ({"reference_mass": 0.0}, "reference_mass: expected"),
-    ],
-)
-def test_bad_settings_are_named(settings_, message):
-    with pytest.raises(ParameterError, match=message):
-        Ground(**settings_)

@@ -4,22 +4,24 @@ import json
 
 import pytest
 
-from hoof_env.errors import DataFileError, ParameterError
 from hoof_env.ground.contact import SETTINGS, Ground, load_ground
 from hoof_env.leg.geometry import preset_names, read_preset
 
 
+def with_ground(ground):
+    """A preset's content with this ground, without any for None."""
+    data = read_preset(preset_names()[0])
+    data.pop("ground", None)
+    return data if ground is None else {**data, "ground": ground}
+
+
 @pytest.fixture
 def preset(tmp_path):
-    """Writes a preset with this ground, without any for None; returns its path."""
+    """Writes a preset with this ground; returns its path."""
 
     def write(ground):
-        data = read_preset(preset_names()[0])
-        data.pop("ground", None)
-        if ground is not None:
-            data["ground"] = ground
         path = tmp_path / "leg.json"
-        path.write_text(json.dumps(data), encoding="utf-8")
+        path.write_text(json.dumps(with_ground(ground)), encoding="utf-8")
         return path
 
     return write
@@ -37,27 +39,6 @@ def test_an_override_replaces_and_none_keeps(preset):
     changed = load_ground(path, exponent=1.25, stiffness=None, restitution=0.0)
     assert changed == Ground(exponent=1.25, restitution=0.0)
     assert load_ground(path, exponent=None) == Ground(exponent=1.375)
-    with pytest.raises(ParameterError, match=r"exponent: expected .*got 9"):
-        load_ground(path, exponent=9)
-
-
-@pytest.mark.parametrize(
-    ("ground", "message"),
-    [
-        (1.375, "ground: expected an object .*got 1.375"),
-        ({"n": 1.375}, "no other entries than stiffness, exponent, got .*'n'"),
-        ({"friction": 0.4}, "no other entries than"),
-        ({"exponent": 0.5}, r"ground: exponent: expected a finite number in \[1, 3\], got 0.5"),
-        ({"exponent": "1.5"}, "ground: exponent: expected"),
-        ({"exponent": None}, "ground: exponent: expected"),
-        ({"stiffness": float("nan")}, "ground: stiffness: expected"),
-        ({"stiffness": -2e4}, "ground: stiffness: expected"),
-    ],
-)
-def test_a_ground_that_is_none_is_refused_with_the_file(preset, ground, message):
-    with pytest.raises(DataFileError, match=message) as error:
-        load_ground(preset(ground))
-    assert "leg.json" in str(error.value)
 
 
 def test_what_is_written_is_read_again():

@@ -7,7 +7,6 @@ import pytest
 from numba import njit
 from scipy.integrate import solve_ivp
 
-from hoof_env.errors import ParameterError
 from hoof_env.ground.contact import Ground
 from hoof_env.ground.stiffness import SCHEME_LIMITS, ContactRates, contact_rates
 from hoof_env.ground.terrain import Terrain
@@ -191,18 +190,3 @@ def test_rates_follow_their_formulas():
     assert rates.friction == pytest.approx(0.8 * 8e4 * depth / 0.01 / 2)
     free = ContactRates(0.0, 0.0, 0.0, 1.5)
     assert set(free.longest_steps("rk4").values()) == {math.inf}
-
-
-@pytest.mark.parametrize(
-    ("call", "message"),
-    [
-        (lambda: contact_rates(Ground(), 0.0, 1.0), "mass: expected .*got 0.0"),
-        (lambda: contact_rates(Ground(), 1.0, -1.0), "load: expected .*got -1.0"),
-        (lambda: contact_rates(Ground(), 1.0, 1.0, sliding_mass=math.nan), "sliding_mass: expected"),
-        (lambda: contact_rates(Ground(), 1.0, 1.0).longest_steps("leapfrog"), "scheme: expected one of"),
-        (lambda: contact_rates(Ground(), 1.0, 1.0).longest_steps("rk4", 0.0), "tolerance: expected"),
-    ],
-)
-def test_bad_input_is_named(call, message):
-    with pytest.raises(ParameterError, match=message):
-        call()

@@ -9,7 +9,6 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numba import njit
 
-from hoof_env.errors import ParameterError
 from hoof_env.ground import terrain as lanes
 from hoof_env.ground.terrain import LONG_WAY, Terrain
 
@@ -104,36 +103,3 @@ def test_what_is_not_a_number_stays_so():
     for terrain in (Terrain(), Terrain.ramp(0.2)):
         height, _, _, stiffness, friction = surface(math.nan, *terrain.to_grid())
         assert np.isnan([height, stiffness, friction]).all()
-
-
-@pytest.mark.parametrize(
-    ("make", "message"),
-    [
-        (lambda: Terrain(()), r"terrain.height: expected a row of numbers, got \(\)"),
-        (lambda: Terrain(3.0), "terrain.height: expected a row of numbers, got 3.0"),
-        (lambda: Terrain("012"), "terrain.height"),
-        (lambda: Terrain((0, math.nan)), r"terrain.height\[1\]: expected a finite number"),
-        (lambda: Terrain((0, 1), (1, 1, 1)), r"terrain.stiffness: expected 2 numbers, got \(1, 1, 1\)"),
-        (lambda: Terrain((0, 1), stiffness=0), "terrain.stiffness: expected .*got 0"),
-        (lambda: Terrain((0, 1), friction=(1, -1)), r"terrain.friction\[1\]: expected .*got -1"),
-        (lambda: Terrain((0, 1), spacing=0), "terrain.spacing: expected .*got 0"),
-        (lambda: Terrain((0, 1), start=math.inf), "terrain.start: expected a finite number"),
-        (lambda: Terrain.slope(1.6), "angle: expected .*got 1.6"),
-        (lambda: Terrain.ramp(0.1, length=-1), "length: expected .*got -1"),
-        (lambda: Terrain.through([0, 0], [1, 1]), r"x: expected two or more increasing .*got \[0, 0\]"),
-        (lambda: Terrain.through([0, 1], [1]), "height: expected 2 numbers"),
-        (lambda: Terrain.through([0, 1e6], [1, 1]), "terrain.spacing: expected at most .* knots"),
-        (lambda: Terrain.patches([(1, 0, 1, 1)]), r"patches\[0\]: expected \(x0, x1, .*got \(1, 0, 1, 1\)"),
-        (lambda: Terrain.patches([(0, 1, 1)]), r"patches\[0\]: expected \(x0, x1"),
-        (lambda: Terrain.patches(None), "patches: expected a row of patches, got None"),
-        (lambda: Terrain.patches([(0, 1, 1, 1)], spacing="fine"), "terrain.spacing: .*got 'fine'"),
-        (lambda: Terrain.patches([1]), r"patches\[0\]: expected a row of numbers, got 1"),
-        (lambda: Terrain.patches([(0, 2, 1, 1), (1, 3, 1, 1)]), "patches: expected patches apart"),
-        (lambda: Terrain.patches([(0, 2, 1, 1)], spacing=0), "terrain.spacing"),
-        (lambda: Terrain.from_dict({"heights": [0]}), "no other entries than height, .*got .*heights"),
-        (lambda: Terrain.from_dict([]), "terrain: expected an object"),
-    ],
-)
-def test_bad_input_is_named(make, message):
-    with pytest.raises(ParameterError, match=message):
-        make()
