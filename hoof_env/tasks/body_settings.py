@@ -47,11 +47,11 @@ class BodySettings:
         About(
             "",
             (
-                "leg and gaits: $presets, or [one's own](../own_task.md#a-leg-of-your-own): a mapping or a "
+                "leg and gaits: $presets, or [your own](../own_task.md#a-leg-of-your-own): a mapping or a "
                 "JSON file"
             ),
             of_horse=(
-                "the legs' linkage: $presets, or [one's own](../own_task.md#a-leg-of-your-own): a mapping "
+                "the legs' linkage: $presets, or [your own](../own_task.md#a-leg-of-your-own): a mapping "
                 "or a JSON file"
             ),
         ),

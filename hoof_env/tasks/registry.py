@@ -217,7 +217,7 @@ TASKS: Mapping[str, Task] = MappingProxyType(
             "Horse",
             "A horse on four legs that keeps a commanded speed.",
             "Four legs carry a trunk that moves along x and y and pitches, in the plane. Every 3 to 5 s a new"
-            " speed is commanded, between the Froude numbers 0.1 and 1 (v^2 over g times the height of the"
+            " speed is commanded, between Froude numbers 0.1 and 1 (v^2 over g times the height of the"
             " hips) and at most 0.5 m/s from the last, and with it the gait"
             " from which actions make offsets: its reference gait.",
             {
