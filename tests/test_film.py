@@ -121,28 +121,3 @@ def test_an_interrupt_is_one_line_and_leaves_nothing_behind(tmp_path):
     assert errors.splitlines()[-1].endswith("interrupted")
     assert "Traceback" not in errors
     assert list(tmp_path.iterdir()) == []
-
-
-@pytest.mark.parametrize(("module", "extra"), [("pygame", "render"), ("imageio_ffmpeg", "video")])
-def test_a_missing_package_is_named(module, extra, tmp_path, monkeypatch, capsys):
-    monkeypatch.setitem(sys.modules, module, None)
-    assert cli.main(["render", "--out", str(tmp_path / "x.mp4")]) == 2
-    assert f'pip install "hoof-env[{extra}]"' in capsys.readouterr().err
-
-
-@pytest.mark.parametrize("kind", ["a path that leads nowhere", "no program"])
-def test_a_missing_ffmpeg_is_said_in_a_line(kind, tmp_path, monkeypatch, capsys):
-    """It was "cannot write to '.'", or a traceback."""
-    import imageio_ffmpeg._io
-
-    def nothing():
-        raise RuntimeError("No ffmpeg exe could be found.")
-
-    if kind == "no program":
-        monkeypatch.setattr(imageio_ffmpeg._io, "get_ffmpeg_exe", nothing)
-    else:
-        monkeypatch.setenv("IMAGEIO_FFMPEG_EXE", "/nowhere/ffmpeg")
-    assert cli.main(["render", "--seconds", "0.1", "--out", str(tmp_path / "film.mp4")]) == 2
-    (line,) = capsys.readouterr().err.splitlines()
-    assert line.startswith("hoof-env: error: films need the program ffmpeg, and ")
-    assert not [*tmp_path.iterdir()]

@@ -224,8 +224,3 @@ def test_an_id_names_its_best_stored_gait(env_id):
                 np.testing.assert_array_equal(action, same.predict(seen)[0])
                 assert np.abs(action).max() < 1  # as only the gait itself has it
                 seen = env.step(action)[0]
-
-
-def test_an_id_without_a_gait(env):
-    with pytest.raises(DataFileError, match=r"Cow-v0.*HorseLeg-v0-constant\.json"):
-        load_open_loop("hoof_env/Cow-v0", env)

@@ -11,7 +11,7 @@ import pytest
 from family import HORSE, IDS, actions, same
 from gymnasium.error import ClosedEnvironmentError, ResetNeeded
 
-from hoof_env import RandomizeParameters, Sb3VecEnv, make_policy, read_preset
+from hoof_env import RandomizeParameters, Sb3VecEnv, read_preset
 from hoof_env.errors import FixedSettingError, ParameterError, UnknownArgumentError
 from hoof_env.gait import HarmonicGait, load_gait
 
@@ -475,14 +475,9 @@ def test_the_adapter_has_no_method_of_one_environment():
         env.env_method("close", indices=0)
 
 
-def test_gaits_and_policies_by_name_or_refused_in_words():
+def test_gaits_go_by_name_or_number():
     env = gym.make(LEG)
     leg, run = env.unwrapped, load_gait("run")
     env.reset(seed=0, options={"gait": "walk"})
     for gait in ("run", run.to_array(), run.to_array().tolist()):
         same(leg.action_for(gait), leg.action_for(run))
-    for arguments in ((env, "run"), ("run", "walk"), ("run", gym.make("CartPole-v1"))):
-        with pytest.raises(ParameterError, match=r"env: expected an environment of this package, make_pol"):
-            make_policy(*arguments)
-    with pytest.raises(ParameterError, match=r"policy: expected one of .*got 3"):
-        make_policy(3, env)

@@ -1,0 +1,119 @@
+"""Policies and gaits that cannot be, by the words of each error: names and environments (`CALLS`), files of
+gaits (`FILES`)."""
+
+from __future__ import annotations
+
+import json
+from functools import cache
+
+import gymnasium as gym
+import numpy as np
+import pytest
+
+from hoof_env.envs.policies import load_open_loop, make_policy, open_loop
+from hoof_env.errors import DataFileError, ParameterError
+
+LEG = "hoof_env/HorseLeg-v0"
+CLOCKED = {
+    "constant": [5.0, 0.4, 0.1, 0.0], "sin": [1.0, 0.0, 0.0, 0.1], "cos": [0.0, 0.2, 0.0, 0.0],
+    "frequency_hz": 0.25,
+}  # fmt: skip
+
+
+@cache
+def made(env_id=LEG, *observation):
+    """An environment; with its observed groups, if some are given."""
+    return gym.make(env_id, **({"observation": list(observation)} if observation else {}))
+
+
+def blind():
+    return made(LEG, "crank", "hoof")
+
+
+def horse():
+    return made("hoof_env/Horse-v0")
+
+
+UNSEEN = r"policy: expected 'gait' among the observed groups.*got \['crank', 'hoof'\]"
+NO_ENV = "env: expected an environment of this package, make_policy.*got"
+CALLS = [
+    *((lambda name=name: make_policy(name, blind()), UNSEEN) for name in ("run", "idle", "drag", "airborne")),
+    (lambda: open_loop(CLOCKED, blind()), UNSEEN),
+    *(
+        (
+            lambda name=name: make_policy(name, made(LEG, "gait")),
+            r"expected 'crank' among the observed groups, got \['gait'\]",
+        )
+        for name in ("drag", "airborne")
+    ),
+    (
+        lambda: make_policy("idle", horse()),
+        "policy: expected one of bang-bang, random, reference, got 'idle'",
+    ),
+    (lambda: make_policy(made(), "run"), NO_ENV),
+    (lambda: make_policy("run", "walk"), NO_ENV),
+    (lambda: make_policy("run", made("CartPole-v1")), NO_ENV),
+    (lambda: make_policy(3, made()), "policy: expected one of .*got 3"),
+    (
+        lambda: make_policy("run", made()).predict(None),
+        r"observation: expected what .*shape \(\.\.\., \d+\).*got None",
+    ),
+]
+"""Calls and words."""
+
+
+@pytest.mark.parametrize(("call", "words"), CALLS)
+def test_calls(call, words):
+    with pytest.raises(ParameterError, match=words):
+        call()
+
+
+GAIT = {"env_id": LEG, "form": "gait", "parameters": CLOCKED}
+NO_GAIT = r"gait\.json: expected the JSON object of agents\.open_loop"
+OLD = r"gait\.json: expected form 'gait'.*got .*actions that were positions"
+FILES = [
+    ({**GAIT, "form": None}, OLD),
+    ({**GAIT, "form": "actions"}, OLD),
+    *(
+        ({**GAIT, "parameters": parameters}, f"{NO_GAIT}.*{given}")
+        for parameters, given in (
+            ({"constant": [0.0, 0.0, 0.0]}, r"constant \[0.0, 0.0, 0.0\]"),
+            ({**CLOCKED, "frequency_hz": None}, "frequency_hz None"),
+            ({"constant": [0.0] * 4, "sin": [0.0] * 4}, r"parameters \['constant', 'sin'\]"),
+            (None, "NoneType"),
+            ({"constant": [0.0, 0.0, 0.0, float("nan")]}, "constant .*nan"),
+        )
+    ),
+    ("", NO_GAIT),
+    ("[]", NO_GAIT),
+    ("{}", f"{NO_GAIT}.*'parameters'"),
+    ("\x00", NO_GAIT),
+    (None, f"{NO_GAIT}.*No such file"),
+]
+"""Content of a file, a text or what JSON takes, or None for no file, and words."""
+
+
+@pytest.mark.parametrize(("content", "words"), FILES, ids=str)
+def test_files(content, words, tmp_path):
+    path = tmp_path / "gait.json"
+    if content is not None:
+        path.write_text(content if isinstance(content, str) else json.dumps(content))
+    with pytest.raises(DataFileError, match=words):
+        load_open_loop(path, made())
+
+
+def test_a_file_for_an_environment_whose_actions_mean_something_else(tmp_path):
+    path = tmp_path / "gait.json"
+    path.write_text(json.dumps({**GAIT, "env_id": "hoof_env/Horse-v0"}))
+    with pytest.raises(DataFileError, match="expected an environment of one leg, got HorseLegEnv whose act"):
+        load_open_loop(path, horse())
+
+
+def test_an_id_without_a_gait():
+    with pytest.raises(DataFileError, match=r"of Cow-v0: expected one of .*HorseLeg-v0-constant\.json"):
+        load_open_loop("hoof_env/Cow-v0", made())
+
+
+def test_blind_policies_need_no_gait():
+    for name in ("random", "bang-bang"):
+        assert make_policy(name, blind()).predict(np.zeros(10))[0].shape == (4,)

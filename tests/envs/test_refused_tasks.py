@@ -1,0 +1,176 @@
+"""Own tasks that cannot be, by the words of each error: registrations (`REGISTRATIONS`), functions that
+cannot be compiled (`FUNCTIONS`), calls with an id (`CALLS`)."""
+
+from __future__ import annotations
+
+import pickle
+from dataclasses import replace
+
+import gymnasium as gym
+import pytest
+
+import hoof_env
+from hoof_env import Entry, Scale, Term, register
+from hoof_env.envs.manual import page_of
+from hoof_env.errors import ParameterError
+from hoof_env.tasks import registry as tasks
+
+BAD = "own/Bad-v0"
+
+
+@pytest.fixture(autouse=True)
+def registered():
+    """What a test registers is gone after it."""
+    known, own = dict(gym.registry), dict(tasks._OWN)
+    yield
+    for registry, before in ((gym.registry, known), (tasks._OWN, own)):
+        registry.clear()
+        registry.update(before)
+
+
+def term(compute, name="mine", **kwargs):
+    return Term(name, 1.0, "-", "a test's", compute, **kwargs)
+
+
+def entry(measure, name="mine"):
+    return Entry(name, "mine", "-", measure, Scale("none"))
+
+
+def constant(step, weight):
+    return 1.0
+
+
+def uses_if(step, weight):
+    if step.progress > 0.0:
+        return weight
+    return 0.0
+
+
+def sometimes(step, weight):
+    if step.progress > 0.0:
+        return 1.0
+
+
+def outdated(step, weight):
+    return weight * step.highest
+
+
+def powers(penetration, rate, inverse_approach_speed, ground):
+    return ground.stiffness * penetration**1.5
+
+
+REGISTRATIONS = [
+    (
+        lambda: {"env_id": "Turf"},
+        "env_id: expected 'namespace/Name-v0' of a namespace of yours, got 'Turf'",
+    ),
+    (lambda: {"env_id": "hoof_env/HorseLeg-v0"}, "of a namespace of yours, got 'hoof_env/HorseLeg-v0'"),
+    (lambda: {"env_id": 3}, "env_id: expected .*got 3"),
+    (lambda: {"base": "pony"}, r"task: expected one of fixed, horse, leg, .*, terrain.*, got 'pony'"),
+    (lambda: {"terms": [term(constant), term(constant)]}, "expected names that differ, got mine twice"),
+    (
+        lambda: {"entries": [entry(len), entry(len)]},
+        "expected a plain function of 1 arguments, got <built-in",
+    ),
+    (
+        lambda: {"entries": [entry(lambda s: 0.0), entry(lambda s: 1.0)]},
+        "names that differ, got mine twice",
+    ),
+    (lambda: {"entries": [entry(lambda s: 0.0, "height")]}, "names that differ, got height twice"),
+    (lambda: {"terms": [constant]}, f"{BAD}: terms: expected a list of hoof_env.Term, got <function"),
+    (lambda: {"terms": None}, f"{BAD}: terms: expected a list of hoof_env.Term, got None"),
+    (lambda: {"entries": 3}, f"{BAD}: entries: expected a list of hoof_env.Entry, got 3"),
+    (lambda: {"entries": ["speed"]}, f"{BAD}: entries: expected a list of hoof_env.Entry, got 'speed'"),
+    (
+        lambda: {"terms": [term(lambda step: 0.0)]},
+        r"compute: expected a function of 2 arguments, got one of \(step\)",
+    ),
+    (
+        lambda: {"contact_law": constant},
+        r"contact_law: expected a function of 4 arguments, got one of \(step, weight\)",
+    ),
+    (
+        lambda: {"stiffnes": 1.0},
+        f"{BAD}: unexpected keyword argument 'stiffnes'; did you mean stiffness",
+    ),
+    (
+        lambda: {"motor_gain": 1.0},
+        "motor_gain: expected drive='motor' beside it, without which it has no effect",
+    ),
+    (
+        lambda: {"reward_weights": {"slop": 1.0}},
+        "reward_weights: expected a mapping with some of progress, .*slop",
+    ),
+    (
+        lambda: {"observation": ["crank", "smell"]},
+        "observation: expected a list of some of crank, .*smell",
+    ),
+    (
+        lambda: {"base": "fixed", "solver": "paper", "contact_law": powers},
+        'solver: expected "exact" beside a contact law of one\'s own, got "paper"',
+    ),
+]
+"""Arguments of `register`, and words."""
+
+
+@pytest.mark.parametrize(("arguments", "words"), REGISTRATIONS, ids=[row[1] for row in REGISTRATIONS])
+def test_registrations(arguments, words):
+    """Nothing is registered, and nothing is lost."""
+    before = dict(gym.registry), dict(tasks._OWN)
+    with pytest.raises(ParameterError, match=words):
+        register(**{"env_id": BAD, **arguments()})
+    assert (dict(gym.registry), dict(tasks._OWN)) == before
+
+
+HERE = r"\(.*test_refused_tasks.py, line"
+FUNCTIONS = [
+    ({"terms": [term(uses_if)]}, f"{BAD}: cannot compile `if`, .* of numbers in uses_if {HERE}"),
+    (
+        {"terms": [term(sometimes, scalar=True)]},
+        f"{BAD}: term 'mine' returns nothing in some cases; expected a",
+    ),
+    ({"entries": [entry(lambda s: s.leg.command)]}, f"{BAD}: entry 'mine' returns .*; expected a number"),
+    ({"contact_law": powers}, rf"{BAD}: cannot compile pow\(\) in powers {HERE} \d+\); expected"),
+    ({"terms": [term(outdated)]}, r"\.highest, which Outcome has not \(it is \.sums\.highest_grf now\)"),
+]
+"""Arguments of `register`, and words of the error when the environment is made: operation and place."""
+
+
+@pytest.mark.parametrize(("arguments", "words"), FUNCTIONS, ids=[row[1] for row in FUNCTIONS])
+def test_functions_that_cannot_be_compiled(arguments, words):
+    register(BAD, **arguments)
+    with pytest.raises(ParameterError, match=words):
+        gym.make(BAD)
+
+
+def registered_no_more(own):
+    """The id's module is imported, but registers it no more."""
+    tasks._OWN.pop(own.ID)
+    gym.make(own.ID)
+
+
+def pickled(own):
+    """A pickle of another registration."""
+    text = pickle.dumps(tasks._OWN[own.ID])
+    assert pickle.loads(text) is tasks._OWN[own.ID]
+    tasks._OWN[own.ID] = replace(tasks._OWN[own.ID], terms=own.TERMS)
+    pickle.loads(text)
+
+
+CALLS = [
+    (
+        lambda own: gym.make(own.ID, reward_weights={"slop": 1}),
+        r"some of .*support, overspeed, loading, friction, comfort, got \{'slop': 1\}",
+    ),
+    (pickled, "pickled with other terms, entries or law"),
+    (registered_no_more, "task: expected one of .*, got 'own/Everything-v0'"),
+    (lambda own: hoof_env.HorseLegEnv(task="nobody:own/Nothing-v0"), "No module named 'nobody'"),
+    (lambda own: page_of("own/Nothing-v0"), "expected one of .*, got 'own/Nothing-v0'"),
+]
+"""Calls with the module of a user, and words."""
+
+
+@pytest.mark.parametrize(("call", "words"), CALLS, ids=[row[1] for row in CALLS])
+def test_calls(own, call, words):
+    with pytest.raises(ParameterError, match=words):
+        call(own)
