@@ -46,6 +46,9 @@ if TYPE_CHECKING:
     from hoof_env.tasks.horse_gaits import HorseGait as HorseGait
     from hoof_env.tasks.observation import Entry as Entry
     from hoof_env.tasks.observation import Scale as Scale
+    from hoof_env.tasks.own_parts import ActionMap as ActionMap
+    from hoof_env.tasks.own_parts import Constant as Constant
+    from hoof_env.tasks.own_parts import Kept as Kept
     from hoof_env.tasks.registry import register as register
     from hoof_env.tasks.reward import Term as Term
 
@@ -58,6 +61,7 @@ _MODULES = {
     "tasks.observation": "Entry Scale",
     "envs.policies": "make_policy",
     "tasks.horse_gaits": "HorseGait",
+    "tasks.own_parts": "ActionMap Constant Kept",
     "tasks.reward": "Term",
     "envs.sb3": "Sb3VecEnv",
     "tasks.registry": "register",

@@ -22,9 +22,11 @@ ADDRESSES = Addresses(
     "acted",
     "past_actions",
     "frames",
+    "mapped",
 )
 """Arrays of a step; the first ones, to `reactions`, are `TrunkEngine.arrays` in their order. `acted` are the
-actions that act now, the same array as `actions` where nothing delays them."""
+actions that act now, the same array as `actions` where nothing delays them; `mapped` are those of the body,
+the same array as `acted` without a map of one's own."""
 
 AT = ADDRESSES.slots
 BEGIN = ADDRESSES.begin

@@ -21,6 +21,7 @@ from hoof_env.envs.batch_states import state_of
 from hoof_env.envs.conditions import CHANGEABLE
 from hoof_env.envs.properties import LegProperties
 from hoof_env.envs.recording import Recording
+from hoof_env.envs.settings_changes import SettingsChanges
 from hoof_env.errors import FixedSettingError, ParameterError, check_choice
 from hoof_env.gait import GaitParameters
 from hoof_env.render.renderer import check_side
@@ -66,7 +67,7 @@ def generator_of(state: Any) -> np.random.Generator:
     return generator
 
 
-class LegBase(LegProperties):
+class LegBase(LegProperties, SettingsChanges):
     """Base of the single and the vector environment.
 
     Attributes:
@@ -106,10 +107,10 @@ class LegBase(LegProperties):
         self.task = task_of(task)
         self.render_mode = render_mode
         # Kept for `change_settings`, which replaces some and starts from the task's defaults again.
-        self._given = {name: as_plain(name, value) for name, value in given.items()}
+        self._given = [{name: as_plain(name, value) for name, value in given.items()}] * n
         self.batch = EpisodeBatch(self.task, self.task.settings(given), n, num_threads)
         self.metadata = {**self.metadata, "render_fps": max(1, round(1 / self.batch.dt))}
-        sizes = len(self.batch.names), len(self.batch.body.action_names)
+        sizes = len(self.batch.names), len(self.batch.action_names)
         return [spaces.Box(-1.0, 1.0, (size,), np.float32) for size in sizes]
 
     def __setattr__(self, name: str, value: Any) -> None:
@@ -150,31 +151,6 @@ class LegBase(LegProperties):
         """Settings of the episode; of a vector environment those of every episode that starts from now on."""
         return self.batch.asked
 
-    def change_settings(self, **changes: Any) -> None:
-        """Change settings from the next reset on, for a curriculum. The present episode continues with the
-        old ones. In a vector environment each environment takes the new ones when it starts again, by itself
-        or by `reset`.
-
-        Args:
-            changes: some of the settings of `conditions.CHANGEABLE`, as for `gymnasium.make`. Afterwards the
-                environment is as if it had been made with them.
-
-        Raises:
-            ParameterError: a value is out of range, or the settings do not fit together; nothing has changed
-                then.
-            FixedSettingError: another setting.
-        """
-        self._check_open("change_settings")
-        for name in changes:
-            if name in SETTINGS and name not in CHANGEABLE:
-                raise FixedSettingError(
-                    f"change_settings: expected some of {', '.join(CHANGEABLE)}, got {name!r}, which stays as"
-                    " it was made"
-                )
-        given = self._given | {name: as_plain(name, value) for name, value in changes.items()}
-        self.batch.change(self.task.settings(given))
-        self._given = given
-
     def episode_summary(self) -> dict[str, Any]:
         """Return figures of the episode so far by name, as in `info["episode_summary"]`; in a vector
         environment of shape (num_envs,). The info lacks them where a wrapper ends an episode, such as the one
@@ -201,6 +177,12 @@ class LegBase(LegProperties):
         """Return values of all environments as an array; the single environment returns its own value."""
         return np.array(values)
 
+    def _checked(self) -> NDArray[np.float32]:
+        """Return the observation of the first environment, of which entries from outside are checked."""
+        self.batch.check_observed()
+        observation: NDArray[np.float32] = self.batch.observations[0].copy()
+        return observation
+
     def action_for(self, gait: str | GaitParameters | NDArray[np.float64]) -> NDArray[np.float32]:
         """Return the action that moves from the present gait towards another one as fast as is allowed. If it
         is computed again for every step, the gait arrives there and stays. Shape (4,); in a vector
@@ -215,6 +197,10 @@ class LegBase(LegProperties):
             ResetNeeded: there is no episode yet, and therefore no present gait.
         """
         self._check_started("action_for")
+        if self.task.action_map:
+            raise ParameterError(
+                f"action_for: expected actions that are rates, got actions that are {self.action_form}"
+            )
         actions: NDArray[np.float32] = self._each(
             self.batch.body.action_for(gait, self.engine, self.batch.dt)
         )
@@ -272,8 +258,14 @@ class LegBase(LegProperties):
         here = self._settings_as_json()
         if here == there:
             return
+        # Rows of such a state have settings of their own.
+        free = CHANGEABLE if "rows" in state else ()
         # Only settings that exist now: states of other versions may have more.
-        unlike = [f"{k}: {v!r} here, {there.get(k)!r} there" for k, v in here.items() if there.get(k) != v]
+        unlike = [
+            f"{k}: {v!r} here, {there.get(k)!r} there"
+            for k, v in here.items()
+            if there.get(k) != v and k not in free
+        ]
         if unlike:
             raise ParameterError(f"state: of other settings; {'; '.join(unlike)}")
 

@@ -25,13 +25,12 @@ from hoof_env.envs.batch_build import (
     make_memory,
     task_record,
 )
+from hoof_env.envs.batch_changes import BatchChanges
 from hoof_env.envs.batch_kernels import BatchKernels
 from hoof_env.envs.batch_pushes import check_disturbances, push_due
 from hoof_env.envs.batch_starts import draw_targets, start
 from hoof_env.envs.conditions import (
     RowConditions,
-    conditions_of,
-    enter,
     keep_others,
     under_each,
 )
@@ -45,6 +44,7 @@ from hoof_env.tasks.delays import Delay
 from hoof_env.tasks.disturbances import Push
 from hoof_env.tasks.episode import episode_layout
 from hoof_env.tasks.observation import check_groups, groups_of
+from hoof_env.tasks.own_parts import check_constants, constants_of, own_of
 from hoof_env.tasks.parameters import (
     check_drift,
     check_parameters,
@@ -55,6 +55,7 @@ from hoof_env.tasks.parameters import (
 )
 from hoof_env.tasks.registry import Task
 from hoof_env.tasks.reward import check_weights
+from hoof_env.tasks.schedules import SPEED, STRENGTH, check_schedule
 from hoof_env.tasks.settings import Settings
 
 Floats = NDArray[np.float64]
@@ -65,6 +66,7 @@ COPIED = (
     "engine",
     "has_overrides",
     "push_plans",
+    "steps_before",
     "start_values",
     "episode",
     "actions",
@@ -90,7 +92,7 @@ FOUND_AGAIN = (
 """Attributes of an `EpisodeBatch` that belong to one process: addresses, kernels and views."""
 
 
-class EpisodeBatch(BatchKernels):
+class EpisodeBatch(BatchKernels, BatchChanges):
     """`num_envs` episodes of a task.
 
     Attributes:
@@ -107,9 +109,12 @@ class EpisodeBatch(BatchKernels):
         start_values: the body's `start_names`, the gait, and the values drawn by `randomize`, shape (numbers,
             num_envs); NaN where a state does not contain them.
         push_plans: pushes that were given for the present episode of each row, in the order of their times.
+        steps_before: control steps of each row in earlier episodes, from which schedules follow, shape
+            (num_envs,).
         is_push_unseen: True if a trunk was pushed since the last step, which no observation shows yet.
-        conditions, changed: conditions of the rows, and a batch with the settings of the next episodes, None
-            if `change` was not called.
+        schedule: courses of scheduled settings by name; `randomize` has their ranges, too.
+        drawn_names: names of the parameters that any row draws, in the order of `start_values`.
+        conditions: conditions of the rows.
         paper: solver of the paper, None with the engine's kernels.
 
     Kernels and their attributes are those of `BatchKernels`.
@@ -132,7 +137,6 @@ class EpisodeBatch(BatchKernels):
         self.num_envs = num_envs
         self.asked = settings
         self.conditions = RowConditions(num_envs)
-        self.changed: EpisodeBatch | None = None
         self.settings = resolved(settings)
         self._check_settings()
         self.engine = make_engine(self, num_threads)
@@ -168,6 +172,7 @@ class EpisodeBatch(BatchKernels):
         check_drift(self.terrain, s.terrain, s.trunk, self.body.height)
         self.terms = tuple(term.key for term in task.terms)
         self.weights = check_weights(s.reward_weights, task.terms)
+        self.constants = check_constants(s.constants, constants_of(task.terms, task.entries))
         self.substeps = substeps_of(s.dt, s.sim_dt)
         self.dt = s.sim_dt * self.substeps
         # An episode of one step is allowed, whatever the rounding of dt.
@@ -178,6 +183,12 @@ class EpisodeBatch(BatchKernels):
         self.steps_per_episode = round(s.episode_seconds / self.dt)
         self.groups = check_groups(s.observation, groups_of(task.entries))
         self.target_speed = self.body.commanded_speeds(s)
+        self.schedule = check_schedule(s.schedule, s, self.body)
+        for name, course in self.schedule.items():
+            if name == SPEED:
+                self.target_speed = course.hull
+            elif name != STRENGTH:
+                self.randomize[name] = course.hull
         self.speed_changes = self.target_speed is not None and self.target_speed[0] < self.target_speed[1]
         shortest = self.dt if self.speed_changes else 0.0
         self.target_seconds = check_range("target_seconds", s.target_seconds, shortest)
@@ -189,7 +200,9 @@ class EpisodeBatch(BatchKernels):
         """Make the arrays of all episodes."""
         self.has_overrides = np.zeros(self.num_envs, bool)
         self.push_plans: list[tuple[Push, ...]] = [()] * self.num_envs
+        self.steps_before = np.zeros(self.num_envs, np.int64)
         self.is_push_unseen = False
+        self.drawn_names = [*self.randomize]
         self.start_values = np.full((self.start_row_count + len(self.randomize), self.num_envs), np.nan)
         columns = self.engine.columns
         self.episode = np.zeros((self.layout.size, columns))
@@ -204,37 +217,8 @@ class EpisodeBatch(BatchKernels):
     def layout(self) -> Any:
         """Layout of an episode's memory."""
         terms = len(self.task.terms)
-        return episode_layout(self.body.kernels.episode, terms, self.engine.features, self.legs)
-
-    # Conditions
-
-    def change(self, settings: Settings) -> None:
-        """Start every episode from now on with other settings, of those that `conditions.CHANGEABLE` names.
-
-        Raises:
-            ParameterError: a setting is out of range; nothing has changed then.
-        """
-        # A batch of one checks the settings and makes everything that follows from them.
-        made = EpisodeBatch(self.task, settings, 1, runs=False)
-        made.limit(self.steps_per_episode)
-        made.num_envs = self.num_envs  # the number for which `check_options` checks the options
-        self.changed = made
-
-    def _adopt(self) -> None:
-        """Work under the conditions that `change` asked for."""
-        assert self.changed is not None
-        old = [*self.randomize]
-        old_values = self.start_values
-        self.conditions.add(conditions_of(self), conditions_of(self.changed))
-        enter(self, self.conditions.all[-1])
-        self.changed = None
-        first = self.start_row_count
-        self.start_values = np.full((first + len(self.randomize), self.num_envs), np.nan)
-        self.start_values[:first] = old_values[:first]
-        # Infos of running episodes keep the drawn values that the new settings draw, too; others are NaN.
-        for k, name in enumerate(self.randomize):
-            if name in old:
-                self.start_values[first + k] = old_values[first + old.index(name)]
+        own = own_of(self.task.terms, self.task.entries)
+        return episode_layout(self.body.kernels.episode, terms, self.engine.features, self.legs, own)
 
     # Episodes
 
@@ -252,13 +236,22 @@ class EpisodeBatch(BatchKernels):
         """Start episodes in `envs`, with a generator for each and options of `batch_starts.check_options`.
         Return the "parameters" that were drawn or set, by name, shape (len(envs),)."""
         which = np.asarray(envs, np.int64)
-        if self.changed is not None:
-            self._adopt()
-            self.has_overrides[:] = True  # the engine's constants are those of the old settings
-        if self.conditions.all:
-            self.conditions.start(which)
-        # A start evaluates its neighbours again, too: under its settings, and with pushes that are unseen.
-        if self.conditions.are_mixed or self.is_push_unseen:
+        if self.conditions.are_due(which):
+            self._adopt(which)
+        if self.conditions.are_mixed:
+            each = dict(zip(which.tolist(), generators, strict=True))
+            drawn: dict[str, Floats] = {}
+
+            def begin(rows: NDArray[np.int64]) -> None:
+                values = start(self, rows, [each[row] for row in rows.tolist()], options)
+                at = np.isin(which, rows)
+                for name, of_rows in values.items():
+                    drawn.setdefault(name, np.full(len(which), np.nan))[at] = of_rows
+
+            under_each(self, which, begin)
+            return drawn
+        # A start evaluates its neighbours again, too, and with pushes that are unseen.
+        if self.is_push_unseen:
             return keep_others(self, which, lambda: start(self, which, generators, options))
         return start(self, which, generators, options)
 
@@ -269,11 +262,15 @@ class EpisodeBatch(BatchKernels):
         Raises:
             ParameterError: an action is not finite; no environment was advanced then.
         """
-        if self.conditions.are_mixed:
+        if self.conditions.differ:
             all_rows = np.arange(self.num_envs)
-            happened = np.bitwise_or.reduce(under_each(self, all_rows, lambda rows: self._step()))
+            codes = under_each(self, all_rows, lambda rows: self._step(), for_kernels=True)
+            happened = np.bitwise_or.reduce(codes)
         else:
             happened = self._step()
+        # A step between two episodes is none.
+        if idle is not None:
+            self.episode_rows.steps[: self.num_envs][idle] -= 1.0
         return self.finish_step(int(happened), generators, idle)
 
     def _step(self) -> int:
@@ -291,8 +288,8 @@ class EpisodeBatch(BatchKernels):
         # The engine put failed environments back to their last good state; the kernel observed what failed.
         if happened & SOME_ENDED and not self.paper:
             put_back = np.flatnonzero(broken(self.engine.results))
-            if put_back.size and self.conditions.are_mixed:
-                under_each(self, put_back, self._observe_broken)
+            if put_back.size and self.conditions.differ:
+                under_each(self, put_back, self._observe_broken, for_kernels=True)
             elif put_back.size:
                 self._observe_broken(put_back)
         self.is_push_unseen = False
@@ -322,6 +319,7 @@ class EpisodeBatch(BatchKernels):
         vars(self).update(state)
         # A pickle keeps no identity of arrays that are equal.
         self.acted = self.acted if self.past_actions.size else self.actions
+        self.mapped = self.mapped if self.task.action_map else self.acted
         self.conditions = self.conditions.copied()
         self._open()
 
@@ -332,6 +330,7 @@ class EpisodeBatch(BatchKernels):
         for name in COPIED:
             setattr(made, name, copy.deepcopy(getattr(self, name), memo))
         made.acted = made.actions if self.acted is self.actions else self.acted.copy()
+        made.mapped = made.acted if self.mapped is self.acted else self.mapped.copy()
         # The solver refers to the engine, and the kernel is a method of the batch: both to those of the copy.
         if self.paper:
             made.paper = copy.deepcopy(self.paper, memo | {id(self.engine): made.engine})

@@ -20,6 +20,7 @@ from hoof_env.leg.profile import leg_profile
 from hoof_env.tasks.delays import check_delay, check_kept, parts_of
 from hoof_env.tasks.episode import ACTIONS, task_type
 from hoof_env.tasks.observation import check_groups, groups_of, observed
+from hoof_env.tasks.own_parts import own_of
 from hoof_env.tasks.parameters import extremes
 from hoof_env.tasks.settings import Settings
 
@@ -96,15 +97,17 @@ def task_record(batch: Any) -> NDArray[Any]:
     """Return the record of the constants that the kernels of an `EpisodeBatch` read, shape (1,)."""
     entries = batch.task.entries
     slots, _, count = slots_of(entries)
-    kind = task_type(
-        len(batch.task.terms), count, batch.engine.features.gait_size, batch.body.kernels.task_fields
-    )
+    own = own_of(batch.task.terms, entries)
+    fields = (*batch.body.kernels.task_fields, *own.fields)
+    kind = task_type(len(batch.task.terms), count, batch.engine.features.gait_size, fields)
     constants = np.zeros(1, kind)
     task = constants[0]
     for name, value in batch.body.constants(batch.engine, batch.dt).items():
         task[name] = value
     task["rate_bound"][:ACTIONS] = batch.engine.filters.to_array()[:, 1]
     task["weights"] = [batch.weights[term.name] for term in batch.task.terms]
+    if own.constants:
+        task["constants"] = batch.constants
     task["episode_seconds"] = batch.episode_seconds
     task["h"] = batch.engine.substep
     task["substeps"] = batch.substeps * batch.engine.substeps
@@ -208,12 +211,13 @@ def make_memory(batch: Any) -> None:
     `frames`, shape (columns, number, entries), are observations of one instant each, `past_actions`, shape
     (columns, number, actions), the last actions; both the newest first, and empty if none are kept. `acted`
     are the actions that act now, shape (columns, actions); it is `actions` where nothing delays them.
+    `mapped` are those of the body; it is `acted` without a map of one's own.
     """
     find_entries(batch)
     frame = [entry.name for entry in batch.entries]
     if not frame:
         raise ParameterError(f"observation: nothing of {list(batch.groups)} is observed on a fixed trunk")
-    actions = batch.body.action_names
+    actions = batch.action_names
     batch.names = [
         *frame,
         *(f"{name}, {_ago(k)}" for k in range(1, batch.history) for name in frame),
@@ -233,3 +237,5 @@ def make_memory(batch: Any) -> None:
     kept = max(delay.most + 1, batch.last_actions) if keeps_actions else 0
     batch.past_actions = np.zeros((columns, kept, len(actions)), np.float32)
     batch.acted = np.zeros_like(batch.actions) if keeps_actions else batch.actions
+    of_body = len(batch.body.action_names)
+    batch.mapped = np.zeros((columns, of_body), np.float32) if batch.task.action_map else batch.acted

@@ -15,7 +15,9 @@ from hoof_env.envs.conditions import (
     under_each,
 )
 from hoof_env.envs.infos import InfoLayout
+from hoof_env.envs.observation_kernel import from_outside, functions_of
 from hoof_env.envs.step import NOT_A_NUMBER, step_kernels
+from hoof_env.errors import ParameterError
 from hoof_env.gait import GaitParameters
 from hoof_env.simd.layout import views
 from hoof_env.tasks.observation import MIDDLE
@@ -32,6 +34,7 @@ class BatchKernels:
         kernels: all kernels of the task, `step.StepKernels`.
         episode_rows: views of the episodes' memory by name.
         entries: entries that are observed.
+        has_own_entries: True if an entry that is observed is from outside the package.
         measurements: places of the values in the engine's memory that infos contain.
     """
 
@@ -51,19 +54,42 @@ class BatchKernels:
     episode: Any
     task_record: Any
     entries: Any
+    true_entries: Any
     actions: Any
     acted: Any
+    mapped: Any
     past_actions: Any
     frames: Any
     observations: Any
     rewards: Any
 
+    @property
+    def action_names(self) -> tuple[str, ...]:
+        """Names of the actions."""
+        own = self.task.action_map
+        names: tuple[str, ...] = own.names if own else self.body.action_names
+        return names
+
+    @property
+    def action_form(self) -> str:
+        """Tag of the meaning of actions."""
+        own = self.task.action_map
+        form: str = own.form if own else self.body.action_form
+        return form
+
     def _open(self) -> None:
         """Find the kernels, and the addresses of the arrays in this process."""
         find_entries(self)
+        functions = [part for entry in (*self.entries, *self.true_entries) for part in functions_of(entry)]
+        self.has_own_entries = bool(from_outside(functions))
         self.measurements = InfoLayout(self.engine.features, self.body.leg_prefixes)
         self.kernels = k = step_kernels(
-            self.task.terms, self.task.entries, self.task.contact_law, self.engine.features, self.body.kernels
+            self.task.terms,
+            self.task.entries,
+            self.task.contact_law,
+            self.engine.features,
+            self.body.kernels,
+            self.task.action_map,
         )
         # Few environments, or the paper's solver, which works on the engine's memory between two kernels.
         runs_scalar = self.engine.runs_scalar or self.paper
@@ -89,11 +115,26 @@ class BatchKernels:
             self.acted,
             self.past_actions,
             self.frames,
+            self.mapped,
         )
         self.addresses = ADDRESSES.of(*arrays, columns=range(self.engine.columns))
         # A block of columns for each thread; the paper's solver runs on one, with all of them.
         blocks = [range(self.engine.columns)] if self.paper else self.engine.blocks
         self._blocks = [(ADDRESSES.of(*arrays, columns=block),) for block in blocks]
+
+    def check_observed(self) -> None:
+        """Check that entries from outside gave numbers; those of this package do.
+
+        Raises:
+            ParameterError: one gave NaN.
+        """
+        if not self.has_own_entries or not np.isnan(self.observations[: self.num_envs]).any():
+            return
+        env, column = np.argwhere(np.isnan(self.observations[: self.num_envs]))[0].tolist()
+        raise ParameterError(
+            f"entry {self.names[column]!r}: expected a number, got NaN in environment {env}, after"
+            f" {self.episode_rows.steps[env]:g} steps"
+        )
 
     def _compile(self) -> None:
         """Compile or load every kernel of a step, by running it on no environment."""
@@ -140,14 +181,14 @@ class BatchKernels:
         """Return what is observed, true and before scaling: entries by name, shape (num_envs,) each."""
         names = [entry.name for entry in self.entries]
         out = np.zeros((len(names), self.num_envs))
-        if self.conditions.are_mixed:
+        if self.conditions.differ:
             # The kernel measures all rows; only those under the present conditions are right.
             def measure(rows: NDArray[np.int64]) -> None:
                 measured = np.zeros_like(out)
                 self.kernels.observers.measure_one(self.addresses, measured)
                 out[:, rows] = measured[:, rows]
 
-            under_each(self, np.arange(self.num_envs), measure)
+            under_each(self, np.arange(self.num_envs), measure, for_kernels=True)
         else:
             self.kernels.observers.measure_one(self.addresses, out)
         return dict(zip(names, out, strict=True))

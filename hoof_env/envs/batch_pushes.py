@@ -18,6 +18,7 @@ from hoof_env.tasks.disturbances import (
     check_pushes,
 )
 from hoof_env.tasks.parameters import check_range
+from hoof_env.tasks.schedules import STRENGTH
 
 Generators = Sequence[np.random.Generator]
 Rows = NDArray[np.int64]
@@ -72,7 +73,9 @@ def check_can_be_pushed(name: str, batch: Any, upward: bool) -> None:
 def begin_disturbances(batch: Any, which: Rows, generators: Generators, options: Mapping[str, Any]) -> None:
     """Draw the disturbances of episodes that start in some rows."""
     episode = batch.episode_rows
-    episode.strength[which] = options.get("strength", batch.strength)
+    course = batch.schedule.get(STRENGTH)
+    strength = course.after(batch.steps_before[which])[0] if course else batch.strength
+    episode.strength[which] = options.get("strength", strength)
     draws = bool(batch.noise or batch.bias)
     episode.noise_key[which] = [generator.random() for generator in generators] if draws else 0.0
     for name in ("observation_delay", "action_delay"):

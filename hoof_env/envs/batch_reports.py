@@ -40,8 +40,8 @@ def infos_of(batch: Any, ended: bool = True) -> dict[str, NDArray[Any]]:
     names = batch.body.start_names
     infos: dict[str, NDArray[Any]] = dict(zip(names, values, strict=False))
     infos["gait"] = name_columns(values[len(names) : first].T, batch.body.gait_names)
-    if batch.randomize:
-        infos["parameters"] = name_columns(values[first:].T, tuple(batch.randomize))
+    if batch.drawn_names:
+        infos["parameters"] = name_columns(values[first:].T, tuple(batch.drawn_names))
     if batch.target_speed:
         infos["target_speed"] = batch.episode_rows.target[:n].copy()
     infos["measured"] = measured.T.view(batch.measurements.kind)

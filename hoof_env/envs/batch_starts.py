@@ -14,24 +14,45 @@ from hoof_env.dynamics.advance import LANES
 from hoof_env.envs.addresses import BEGIN, END
 from hoof_env.envs.batch_build import substeps_under
 from hoof_env.envs.batch_pushes import begin_disturbances, check_can_be_pushed
+from hoof_env.envs.conditions import enter
 from hoof_env.errors import ParameterError
 from hoof_env.tasks.disturbances import check_pushes
 from hoof_env.tasks.parameters import draw_parameters, extremes
 from hoof_env.tasks.reward import BEARING, LONGEST_STRIDE
+from hoof_env.tasks.schedules import SPEED, drawn_names
 
 Floats = NDArray[np.float64]
 
 
-def check_options(batch: Any, options: Any) -> dict[str, Any]:
+def check_options(batch: Any, options: Any, rows: NDArray[np.int64] | None = None) -> dict[str, Any]:
     """Check reset options completely, so that a refused reset changes nothing; return them in the form that
     `EpisodeBatch.reset` takes.
 
+    Args:
+        batch: an `EpisodeBatch`.
+        options: the options.
+        rows: rows that start, each under its coming conditions; None for all.
+
     Raises:
-        ParameterError: an unknown option, or one that no episode of the batch can have.
+        ParameterError: an unknown option, or one that some of the episodes cannot have.
     """
-    # The next episodes have the changed settings.
-    if batch.changed is not None:
-        return check_options(batch.changed, options)
+    conditions = batch.conditions
+    which = np.arange(batch.num_envs) if rows is None else rows
+    if not conditions.are_due(which) and not conditions.are_mixed:
+        return _check_options(batch, options)
+    checked: dict[str, Any] = {}
+    try:
+        for k in np.unique(conditions.coming[which]).tolist():
+            enter(batch, conditions.all[k])
+            checked = _check_options(batch, options)
+            conditions.all[k]["validated"] = batch.validated
+    finally:
+        enter(batch, conditions.newest)
+    return checked
+
+
+def _check_options(batch: Any, options: Any) -> dict[str, Any]:
+    """Check reset options under the present conditions."""
     checked = batch.body.check_options(options, batch.engine.trunk, batch.settings)
     if batch.paper and checked.get("parameters"):
         raise ParameterError(
@@ -75,11 +96,16 @@ def start(
     seed means."""
     episode = batch.episode_rows
     options = {**batch.task.start, **options}
-    parameters = batch.randomize | options.get("parameters", {})
+    batch.steps_before[which] += episode.steps[which].astype(np.int64)
+    of_options = options.get("parameters", {})
+    parameters = batch.randomize | of_options
+    scheduled = [name for name in drawn_names(batch.schedule) if name not in of_options]
     drawn = {name: np.zeros(len(which)) for name in parameters}
     # Also without parameters if the last episode had some: they were for that one only.
     if parameters or batch.has_overrides[which].any():
         for k, (env, generator) in enumerate(zip(which, generators, strict=True)):
+            for name in scheduled:
+                parameters[name] = _now(batch, name, int(env))
             values = draw_parameters(parameters, generator)
             for name, value in values.items():
                 drawn[name][k] = value
@@ -90,19 +116,17 @@ def start(
     if np.ndim(gaits) == 2:
         options = {**options, "gait": gaits[which]}
     start = batch.body.draw(options, generators, batch.engine)
-    for row in (episode.steps, episode.time, episode.distance, episode.commanded, episode.ended):
-        row[which] = 0.0
-    batch.rewards[which] = 0.0
-    # The full allowance: a leg can bear its weight from the first step on.
-    episode.allowance[which] = BEARING * LONGEST_STRIDE
-    episode.terms[:, which] = 0.0
-    episode.sums[:, which] = 0.0
+    _clear(batch, which)
     begin_targets(batch, which, generators, options)
     begin_disturbances(batch, which, generators, options)
     batch.body.complete_start(start, episode.target[which], options, batch.engine)
     batch.engine.reset(start.commands, start.theta, envs=which, **start.trunk)
     start_values = [*(start.values[name] for name in batch.body.start_names), *start.gaits.T]
-    batch.start_values[:, which] = [*start_values, *(drawn[name] for name in batch.randomize)]
+    unknown = np.full(len(which), np.nan)
+    batch.start_values[:, which] = [
+        *start_values,
+        *(drawn[name] if name in batch.randomize else unknown for name in batch.drawn_names),
+    ]
     episode.x_before[which] = start.trunk["x"]
     batch.body.begin_episodes(episode, which, start)
     if batch.paper:
@@ -119,6 +143,21 @@ def start(
     return drawn
 
 
+def _clear(batch: Any, which: NDArray[np.int64]) -> None:
+    """Set what rows count and keep to its value at the start of an episode."""
+    episode = batch.episode_rows
+    for row in (episode.steps, episode.time, episode.distance, episode.commanded, episode.ended):
+        row[which] = 0.0
+    batch.rewards[which] = 0.0
+    # The full allowance: a leg can bear its weight from the first step on.
+    episode.allowance[which] = BEARING * LONGEST_STRIDE
+    episode.terms[:, which] = 0.0
+    episode.sums[:, which] = 0.0
+    begins = [row.begin for term in batch.task.terms for row in term.keeps]
+    if begins:
+        episode.own[:, which] = np.array(begins)[:, None]
+
+
 def begin_targets(
     batch: Any,
     which: NDArray[np.int64],
@@ -130,14 +169,33 @@ def begin_targets(
     episode.target[which] = np.inf
     episode.switch[which] = np.inf
     if batch.target_speed:
-        episode.target[which] = batch.target_speed[0]
+        (low, high) = speeds_now(batch, which, vars(batch))
+        episode.target[which] = low
     if batch.target_speed and batch.speed_changes:
-        episode.target[which] = [generator.uniform(*batch.target_speed) for generator in generators]
+        drawn = [generator.uniform(*ends) for *ends, generator in zip(low, high, generators, strict=True)]
+        episode.target[which] = drawn
         draw_targets(batch, which, generators)
     # After the draws, so that the option does not change what follows from the generator.
     if "target_speed" in options:
         episode.target[which] = options["target_speed"]
         episode.switch[which] = np.inf
+
+
+def _now(batch: Any, name: str, env: int) -> float | tuple[float, float]:
+    """Return the value of a scheduled parameter at the start of an episode, or its range."""
+    course = batch.schedule[name]
+    low, high = map(float, course.after(batch.steps_before[env]))
+    return (low, high) if course.is_range else low
+
+
+def speeds_now(batch: Any, which: NDArray[np.int64], conditions: Mapping[str, Any]) -> tuple[Floats, Floats]:
+    """Return the lowest and highest commanded speed of the episodes of some rows [m/s]."""
+    course = conditions["schedule"].get(SPEED)
+    if course:
+        ends: tuple[Floats, Floats] = course.after(batch.steps_before[which])
+        return ends
+    low, high = (np.full(len(which), speed) for speed in conditions["target_speed"])
+    return low, high
 
 
 def fill_past(batch: Any, which: NDArray[np.int64]) -> None:
@@ -174,7 +232,7 @@ def _draw_between(
     """Draw commanded speeds from the ranges of some conditions."""
     when, which = np.array([generator.random(2) for generator in generators]).reshape(-1, 2).T
     (shortest, longest) = conditions["target_seconds"]
-    (low, high) = conditions["target_speed"]
+    (low, high) = speeds_now(batch, envs, conditions)
     steps = np.rint((shortest + (longest - shortest) * when) / batch.dt)
     present = batch.episode_rows.target[envs]
     step = batch.body.command_step

@@ -8,23 +8,16 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from hoof_env.envs.conditions import RowConditions, conditions_of, enter, under_each
 from hoof_env.errors import ParameterError
 from hoof_env.tasks.disturbances import Push
+from hoof_env.tasks.settings import Settings
 
 Floats = NDArray[np.float64]
 
 
 def state_of(batch: Any) -> dict[str, Any]:
-    """Return everything that changes, except for the generators.
-
-    Raises:
-        ParameterError: some episodes are under older settings than others.
-    """
-    if batch.conditions.are_mixed:
-        raise ParameterError(
-            "get_state: expected one set of settings for all, but some episodes began before they were"
-            " changed; reset() starts all anew"
-        )
+    """Return everything that changes, except for the generators."""
     state = {"engine": batch.engine.get_state(), "episode": batch.episode[:, : batch.num_envs].copy()}
     state["start_values"] = batch.start_values.copy()
     if batch.is_push_unseen or batch.frames.size:
@@ -33,6 +26,10 @@ def state_of(batch: Any) -> dict[str, Any]:
     state |= {name: getattr(batch, name)[: batch.num_envs].copy() for name in kept_arrays(batch)}
     if any(batch.push_plans):
         state["pushes"] = [*batch.push_plans]
+    if batch.conditions.are_mixed or batch.conditions.are_due(np.arange(batch.num_envs)):
+        state["rows"] = batch.conditions.to_plain()
+    if batch.schedule or batch.conditions.all:
+        state["steps_before"] = batch.steps_before.copy()
     return state | ({"paper": batch.paper.get_state()} if batch.paper else {})
 
 
@@ -67,8 +64,11 @@ def spread_state(batch: Any, state: Mapping[str, Any]) -> dict[str, Any]:
         parts = {name: repeated(values) for name, values in engine.items() if name != "layout"}
         spread = {**state, "engine": {**parts, "layout": {**layout, "num_envs": n}}}
         spread |= {name: repeated(state[name]) for name in ("episode", "start_values") if name in state}
-        of_rows = ("pushes", "observations", "frames", "past_actions")
+        of_rows = ("pushes", "observations", "frames", "past_actions", "steps_before")
         spread |= {name: [*state[name]] * n for name in of_rows if name in state}
+        if "rows" in state:
+            each = {name: np.repeat(state["rows"][name], n) for name in ("which", "coming")}
+            spread["rows"] = {**state["rows"], **each}
         if "paper" in state:
             paper = state["paper"]
             spread["paper"] = {"legs": [*paper["legs"]] * n} | {
@@ -95,6 +95,21 @@ def set_state(batch: Any, state: Mapping[str, Any]) -> None:
     Raises:
         ParameterError: a part is missing or broken, or has a shape of another batch.
     """
+    conditions = _read_conditions(batch, state.get("rows"))
+    before = batch.conditions
+    kept = conditions_of(batch), batch.start_values
+    batch.put_under(conditions)
+    try:
+        _set_state(batch, state)
+    except BaseException:
+        batch.conditions = before
+        enter(batch, kept[0])
+        batch.start_values = kept[1]
+        raise
+
+
+def _set_state(batch: Any, state: Mapping[str, Any]) -> None:
+    """Restore a state whose conditions the batch is under."""
     expected = (len(batch.episode), batch.num_envs)
     try:
         episode = np.asarray(state["episode"], np.float64)
@@ -119,18 +134,21 @@ def set_state(batch: Any, state: Mapping[str, Any]) -> None:
     plans = _read_plans(batch, state.get("pushes"))
     seen = {name: _read_seen(batch, name, state.get(name)) for name in ("observations", *kept_arrays(batch))}
     of_paper = batch.paper.read_state(state.get("paper")) if batch.paper else None
+    steps_before = _read_steps(batch, state.get("steps_before"))
     batch.engine.set_state(state["engine"])
     if batch.paper and of_paper:
         batch.paper.set_state(*of_paper)
     batch.episode[:, : batch.num_envs] = episode
     batch.start_values[:] = start_values
     batch.push_plans = plans
+    batch.steps_before[:] = steps_before
     batch.is_push_unseen = "observations" in state
     # The state's engine may have drawn parameters, which the next reset must replace.
     batch.has_overrides[:] = True
-    if batch.conditions.all:
-        batch.conditions.start(np.arange(batch.num_envs))
-    batch.observe_kernel(batch.addresses)
+    if batch.conditions.differ:
+        under_each(batch, np.arange(batch.num_envs), lambda rows: _observe(batch), for_kernels=True)
+    else:
+        batch.observe_kernel(batch.addresses)
     for name, values in seen.items():
         if values is not None:
             getattr(batch, name)[: batch.num_envs] = values
@@ -139,6 +157,56 @@ def set_state(batch: Any, state: Mapping[str, Any]) -> None:
 def kept_arrays(batch: Any) -> list[str]:
     """Return the names of the arrays in which a batch keeps frames and actions, if it does."""
     return [name for name in ("frames", "past_actions") if getattr(batch, name).size]
+
+
+def _observe(batch: Any) -> None:
+    """Observe the present, forces on the present ground included."""
+    batch.engine.observe()
+    batch.observe_kernel(batch.addresses)
+
+
+def _read_steps(batch: Any, given: Any) -> NDArray[np.int64]:
+    """Return the control steps of earlier episodes in a state, by which schedules go on.
+
+    Raises:
+        ParameterError: not a whole number for each environment.
+    """
+    steps = np.zeros(batch.num_envs, np.int64) if given is None else np.asarray(given)
+    if (
+        steps.dtype.kind not in "iuf"
+        or steps.shape != (batch.num_envs,)
+        or not (steps == np.rint(steps)).all()
+    ):
+        raise ParameterError(
+            f"state['steps_before']: expected a whole number for each environment, got {given!r:.60}"
+        )
+    return steps.astype(np.int64)
+
+
+def _read_conditions(batch: Any, given: Any) -> RowConditions:
+    """Return the conditions of the rows in a state, without any those of all rows at present.
+
+    Raises:
+        ParameterError: not such conditions.
+    """
+    n = batch.num_envs
+    conditions = batch.conditions.copied()
+    if given is None:
+        if conditions.all:
+            conditions.place(np.full(n, conditions.which.max()), conditions.coming)
+        return conditions
+    try:
+        each = [batch.conditions_under(Settings(**settings)) for settings in given["settings"]]
+        which, coming = (np.asarray(given[name], np.int64) for name in ("which", "coming"))
+        is_whole = which.shape == coming.shape == (n,) and bool(each)
+    except (KeyError, TypeError, ValueError):
+        is_whole = False
+    if not is_whole or not ((np.minimum(which, coming) >= 0) & (np.maximum(which, coming) < len(each))).all():
+        raise ParameterError(f"state['rows']: expected settings of each environment, got {given!r:.60}")
+    made = RowConditions(n)
+    made.all = each
+    made.place(which, coming)
+    return made
 
 
 def _read_plans(batch: Any, given: Any) -> list[tuple[Push, ...]]:

@@ -77,11 +77,11 @@ class HorseLegEnv(LegBase, gym.Env[NDArray[np.float32], NDArray[np.float32]]):
             batch.actions[0].data,
             batch.direct_kernel(),
             batch.addresses,
-            bool(batch.randomize),
+            bool(batch.drawn_names),
             paid,
             batch.episode_rows.terms[:, 0],
             batch.rewards.data,
-            batch.observations[0].copy,
+            self._checked if batch.has_own_entries else batch.observations[0].copy,
             batch.measurements.reader(batch.engine.arrays[0][:, 0]),
         )
 
@@ -126,6 +126,7 @@ class HorseLegEnv(LegBase, gym.Env[NDArray[np.float32], NDArray[np.float32]]):
         self._check_open("reset")
         checked = check_options(self.batch, options)  # first, so that a refused reset changes nothing
         super().reset(seed=None if seed is None else count("seed", seed, low=0))
+        self.batch.restart_schedules(np.arange(int(seed is not None)))
         before = self.batch.addresses
         parameters = self.batch.reset([0], [self.np_random], checked)
         if self.batch.addresses is not before:  # `change_settings` took effect: other arrays
@@ -139,7 +140,7 @@ class HorseLegEnv(LegBase, gym.Env[NDArray[np.float32], NDArray[np.float32]]):
         info = copy.deepcopy(self._begun[0]()) | {"measured": self._views[-1]()}
         if parameters:
             info["parameters"] = name_columns([values[0] for values in parameters.values()], [*parameters])
-        return self.batch.observations[0].copy(), info
+        return self._checked(), info
 
     def step(
         self, action: NDArray[np.float32]
@@ -204,8 +205,8 @@ class HorseLegEnv(LegBase, gym.Env[NDArray[np.float32], NDArray[np.float32]]):
         first = self.batch.start_row_count
         info = dict[str, Any](zip(body.start_names, row, strict=False))
         info["gait"] = gait = name_columns(row[len(body.start_names) : first], body.gait_names)
-        if self.batch.randomize:
-            info["parameters"] = name_columns(row[first:], [*self.batch.randomize])
+        if self.batch.drawn_names:
+            info["parameters"] = name_columns(row[first:], self.batch.drawn_names)
         if self.batch.target_speed:
             info["target_speed"] = self.batch.episode_rows.target[0]
         info |= {"measured": None, **dict.fromkeys(self.batch.terms, np.float64(0.0))}
@@ -219,7 +220,7 @@ class HorseLegEnv(LegBase, gym.Env[NDArray[np.float32], NDArray[np.float32]]):
     def _read_action(self, action: Any) -> None:
         """Convert and store an action; raise `ParameterError` for a wrong shape or type."""
         array = array_of(action)
-        count = len(self.batch.body.action_names)
+        count = len(self.batch.action_names)
         if array.shape != (count,) or array.dtype.kind not in "fiu":
             raise ParameterError(f"action: expected {count} finite numbers in [-1, 1], got {action!r}")
         with np.errstate(over="ignore"):  # to infinity, which the kernel refuses
@@ -259,13 +260,16 @@ class HorseLegEnv(LegBase, gym.Env[NDArray[np.float32], NDArray[np.float32]]):
         self._check_state(state)
         generator = generator_of(state["generator"])
         set_state(self.batch, state)
+        if "rows" in state:
+            self._take_given()
+            self._attach()
         self.np_random = generator
         self._phase = "ended" if self.batch.episode_rows.ended[0] else "running"
         if self._start_and_target() != self._began_with:  # a planner's states are of one episode
             self._begin()
         if self._watched:
             self._watched[0].begin()
-        return self.batch.observations[0].copy()
+        return self._checked()
 
     def __getstate__(self) -> dict[str, Any]:
         return {k: v for k, v in vars(self).items() if k not in ("_views", "_begun", "_began_with")}

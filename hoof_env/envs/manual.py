@@ -29,6 +29,7 @@ from hoof_env.errors import DataFileError, OutputError, check_choice
 from hoof_env.render.renderer import USUAL_SIZE
 from hoof_env.tasks import observation
 from hoof_env.tasks.body import Body
+from hoof_env.tasks.own_parts import ActionMap, constants_of
 from hoof_env.tasks.parameters import HILLS
 from hoof_env.tasks.plain import to_json
 from hoof_env.tasks.registry import TASKS, Task, task_of
@@ -91,8 +92,8 @@ def page(task: str, film: str = "", score: str = "") -> str:
         score=score,
         about=definition.about,
         body=Template(WORDS[f"{parts.kind}_body"].strip()).safe_substitute(trunk=trunk["moves"]),
-        action_space=f"Box(-1, 1, ({len(body.action_names)},), float32)",
-        actions=parts.actions(body),
+        action_space=f"Box(-1, 1, ({len(_actions(definition, body))},), float32)",
+        actions=parts.actions(body) if definition.action_map is None else _mapped(definition.action_map),
         commands=WORDS[f"{parts.kind}_commands"].strip(),
         observed=WORDS[f"{parts.kind}_observed"].strip(),
         legs=str(body.kernels.legs),
@@ -100,7 +101,7 @@ def page(task: str, film: str = "", score: str = "") -> str:
         observation_space=f"Box(-1, 1, ({len(_observed(definition))},), float32)",
         observations=_observations(definition, body),
         other_groups=", ".join(f"`{group}`" for group in groups if group not in s.observation),
-        rewards=_rewards(definition, weights),
+        rewards=_rewards(definition, weights) + _constants(definition),
         lift_off=f"{100 * LIFT_OFF:g}",
         start=_start(s, definition.start),
         options=markdown_table(("Option", "Unit", "Range", "Meaning"), parts.options()),
@@ -130,6 +131,30 @@ def _rewards(task: Task, weights: Mapping[str, float]) -> str:
     return markdown_table(("Term", "Weight", "Default", "Unit", "Meaning"), rows)
 
 
+def _actions(task: Task, body: Body) -> tuple[str, ...]:
+    """Return the names of the actions."""
+    return task.action_map.names if task.action_map else body.action_names
+
+
+def _mapped(action_map: ActionMap) -> str:
+    """Write the table of actions of one's own."""
+    rows = [(str(k), *pair) for k, pair in enumerate(dict(action_map.actions).items())]
+    return markdown_table(("Num", "Action", "At +1"), rows)
+
+
+def _constants(task: Task) -> str:
+    """Write the table of the constants of terms and entries, and of what terms keep; "" without any."""
+    constants = constants_of(task.terms, task.entries).values()
+    rows = [(f"`{c.name}`", f"{c.value:g}", c.unit, c.meaning) for c in constants]
+    rows += [
+        (f"`{term.name}.{row.name}`", f"{row.begin:g}", row.unit, f"{row.meaning}; kept, from this value on")
+        for term in task.terms
+        for row in term.keeps
+    ]
+    table = markdown_table(("Constant", "Default", "Unit", "Meaning"), rows) if rows else ""
+    return f"\n{table}" if table else ""
+
+
 def page_of(id: str) -> str:
     """Return the manual page of a registered id, or of an id of one's own, which may be "module:id";
     notebooks render it.
@@ -151,7 +176,7 @@ def index() -> str:
         native = "yes" if task in TASKS else "no"
         summary = definition.summary if task in TASKS else str(HorseLegMOEnv.__doc__).splitlines()[0]
         link = f"[`hoof_env/{name}-v0`]({name}.md)"
-        actions = str(len(definition.body(definition.settings({})).action_names))
+        actions = str(len(_actions(definition, definition.body(definition.settings({})))))
         rows.append((link, summary, actions, str(len(_observed(definition))), definition.reference, native))
     head = ("id", "what it is", "action", "observation", "reference gait", "native vector environment")
     return Template(WORDS["index"]).substitute(table=markdown_table(head, rows))

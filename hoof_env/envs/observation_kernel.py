@@ -21,6 +21,7 @@ from hoof_env.simd.user_functions import number_of
 from hoof_env.tasks.body import BodyKernels
 from hoof_env.tasks.episode import Memories, memories_of, task_type
 from hoof_env.tasks.observation import Entry, ObservationInputs
+from hoof_env.tasks.own_parts import Own
 
 
 def slots_of(entries: tuple[Entry, ...]) -> tuple[list[int], int, int]:
@@ -40,24 +41,38 @@ def room_of(slots: int) -> int:
     return -(-slots // LANES) * LANES
 
 
-def _with_entries(entries: tuple[Entry, ...], layouts: Memories, scaled: bool) -> Callable[..., Any]:
+def constants_reader(places: tuple[int, ...]) -> Callable[..., Any]:
+    """Return a function for kernels that reads constants from the task's record, as a tuple."""
+    if not places:
+        return inline_llvm(lambda task: ())
+    (first, *others) = places
+    rest = constants_reader(tuple(others))
+    return inline_llvm(lambda task: (task.constants[first], *rest(task)))
+
+
+def _with_entries(
+    entries: tuple[Entry, ...], layouts: Memories, scaled: bool, constants: tuple[str, ...]
+) -> Callable[..., Any]:
     """Return a function that puts the observed entries into their slots: scaled except for tanh, or as
     measured. Entries of this package are compiled once for all tasks that have them in these slots."""
     placed = tuple(zip(entries, slots_of(entries)[0], strict=True))
     built_in = tuple(each for each in placed if not from_outside(functions_of(each[0])))
     foreign = tuple(each for each in placed if each not in built_in)
-    if not foreign or not built_in:
-        return (_put_ours if built_in else _put_all)(placed, layouts, scaled)
-    return _one_and_other(_put_ours(built_in, layouts, scaled), _put_all(foreign, layouts, scaled))
+    if not foreign:
+        return _put_ours(placed, layouts, scaled)
+    theirs = _put_all(foreign, layouts, scaled, constants)
+    return _one_and_other(_put_ours(built_in, layouts, scaled), theirs) if built_in else theirs
 
 
-def _put_all(placed: tuple[tuple[Entry, int], ...], layouts: Memories, scaled: bool) -> Callable[..., Any]:
+def _put_all(
+    placed: tuple[tuple[Entry, int], ...], layouts: Memories, scaled: bool, constants: tuple[str, ...] = ()
+) -> Callable[..., Any]:
     """Return a function that puts each entry into its slot. numba cannot loop over functions, so each half of
     the entries is a function of its own."""
     if len(placed) == 1:
-        return _with_entry(*placed[0], layouts, scaled)
+        return _with_entry(*placed[0], layouts, scaled, constants)
     middle = len(placed) // 2
-    halves = (_put_all(half, layouts, scaled) for half in (placed[:middle], placed[middle:]))
+    halves = (_put_all(half, layouts, scaled, constants) for half in (placed[:middle], placed[middle:]))
     return _one_and_other(*halves)
 
 
@@ -77,9 +92,12 @@ def _one_and_other(one: Callable[..., Any], other: Callable[..., Any]) -> Callab
     return put_both
 
 
-def _with_entry(entry: Entry, slot: int, layouts: Memories, scaled: bool) -> Callable[..., Any]:
+def _with_entry(
+    entry: Entry, slot: int, layouts: Memories, scaled: bool, constants: tuple[str, ...]
+) -> Callable[..., Any]:
     """Return a function that puts one entry into its slot, lane by lane if its functions take no lanes."""
     measure = inline_llvm(entry.measure)
+    given = constants_reader(tuple(constants.index(one.name) for one in entry.constants))
     apply = entry.scale.apply
     scale = inline_llvm(apply) if scaled and apply is not None else inline_llvm(lambda x, scene: x)
     # Checks, with messages that name the entry, that users' functions return numbers.
@@ -89,7 +107,7 @@ def _with_entry(entry: Entry, slot: int, layouts: Memories, scaled: bool) -> Cal
     @inline_llvm
     def put_entry(addresses, lanes, scene, numbers, n):  # type: ignore[no-untyped-def]
         if scene.task.observation_columns[slot] >= 0:
-            numbers[slot] = scaled_number(scale(number(measure(scene)), scene))
+            numbers[slot] = scaled_number(scale(number(measure(scene, *given(scene.task))), scene))
 
     # For users' functions of ordinary numbers: each lane has memory views of its own.
     @inline_llvm
@@ -100,7 +118,8 @@ def _with_entry(entry: Entry, slot: int, layouts: Memories, scaled: bool) -> Cal
                 own = ObservationInputs(
                     trunk, leg, episode, scene.task, scene.ground, scene.ground_origin, scene.ground_per_metre
                 )
-                set_lane(numbers, slot, lane, scaled_number(scale(number(measure(own)), own)))
+                measured = number(measure(own, *given(own.task)))
+                set_lane(numbers, slot, lane, scaled_number(scale(measured, own)))
 
     return put_one_by_one if entry.scalar else put_entry
 
@@ -135,7 +154,9 @@ def from_outside(functions: list[Callable[..., Any]]) -> list[Callable[..., Any]
 _OBSERVERS = Kept()
 
 
-def observers_of(entries: tuple[Entry, ...], terms: int, features: Features, body: BodyKernels) -> Observers:
+def observers_of(
+    entries: tuple[Entry, ...], terms: int, features: Features, body: BodyKernels, own: Own
+) -> Observers:
     """Return the kernels of the observation for some entries; tasks with the same ones share them.
 
     Args:
@@ -143,26 +164,31 @@ def observers_of(entries: tuple[Entry, ...], terms: int, features: Features, bod
         terms: number of the reward's terms, for the layout of the episode's memory.
         features: features of the engine.
         body: the body's own parts.
+        own: what terms and entries declare.
     """
     foreign = from_outside([part for entry in entries for part in functions_of(entry)])
     # Helpers and constants of a user's function may have changed since, as in a notebook.
-    key = (entries, terms, features, body, fingerprint(*foreign))
-    kernels: Observers = _OBSERVERS.get(key, lambda: _made(entries, terms, features, body), bool(foreign))
+    key = (entries, terms, features, body, own, fingerprint(*foreign))
+    kernels: Observers = _OBSERVERS.get(key, lambda: _made(*key[:-1]), bool(foreign))
     return kernels
 
 
-def _made(entries: tuple[Entry, ...], terms: int, features: Features, body: BodyKernels) -> Observers:
+def _made(
+    entries: tuple[Entry, ...], terms: int, features: Features, body: BodyKernels, own: Own
+) -> Observers:
     """Make the kernels; numba compiles them when they are called."""
-    layouts = memories_of(body.episode, terms, features, body.legs)
+    layouts = memories_of(body.episode, terms, features, body.legs, own)
     slots = slots_of(entries)[2]
     room = room_of(slots)
-    task_record = task_type(terms, slots, layouts.gait, body.task_fields)
+    task_record = task_type(terms, slots, layouts.gait, (*body.task_fields, *own.fields))
     flags = [(entry.scalar, entry.scale.saturates) for entry in entries], (terms, features, body.legs)
     parts = [part for entry in entries for part in functions_of(entry)]
     identity = fingerprint(*parts, flags, layouts.episode.names, str(task_record.descr))
-    put_measured = _with_entries(entries, layouts, scaled=False)
-    inputs_of = _inputs(layouts)
-    observe = _observe(entries, layouts, inputs_of)
+    identity += f" {own}" if any(own) else ""
+    put_measured = _with_entries(entries, layouts, False, own.constants)
+    inputs_of = inputs_reader(layouts)
+    put_scaled = _with_entries(entries, layouts, True, own.constants)
+    observe = _observe(slots_of(entries)[1:], layouts, inputs_of, put_scaled)
     task_at = record_at(task_record)
 
     @inline_source
@@ -193,7 +219,7 @@ def _made(entries: tuple[Entry, ...], terms: int, features: Features, body: Body
     return Observers(observe=observe, **kernels)
 
 
-def _inputs(layouts: Memories) -> Callable[..., Any]:
+def inputs_reader(layouts: Memories) -> Callable[..., Any]:
     """Return a part of kernels that makes the inputs of entries in row n and, with lanes, its neighbours."""
     model_at = record_at(MODEL)
 
@@ -266,12 +292,14 @@ def _write_true(slots: int, saturate: Callable[..., Any]) -> Callable[..., Any]:
 
 
 def _observe(
-    entries: tuple[Entry, ...], layouts: Memories, inputs_of: Callable[..., Any]
+    counts: tuple[int, ...],
+    layouts: Memories,
+    inputs_of: Callable[..., Any],
+    put_scaled: Callable[..., Any],
 ) -> Callable[..., Any]:
     """Return a part of kernels that writes the observation of row n and, with lanes, of its neighbours. Its
     last argument is 0 at the end of a control step, 1 within it: then only a frame is kept."""
-    _, vectors, slots = slots_of(entries)
-    put_scaled = _with_entries(entries, layouts, scaled=True)
+    (vectors, slots) = counts
     add_noise = _add_noise(slots, layouts)
     publish = publisher(layouts)
     room = room_of(slots)

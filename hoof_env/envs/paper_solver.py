@@ -61,6 +61,7 @@ def check_paper(settings: Settings) -> None:
         "drive": "prescribed",
         "terrain": None,
         "randomize": None,
+        "schedule": None,
         "hoof_stiffness": None,
     }
     for name, expected in only.items():

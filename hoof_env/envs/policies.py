@@ -160,6 +160,11 @@ def make_policy(name: str, env: Any, seed: int = 0) -> Scripted:
             f"env: expected an environment of this package, make_policy(name, env), got {env!r}"
         )
     check_choice("policy", name, policy_names(env))
+    if leg.task.action_map and name not in ("random", "bang-bang"):
+        raise ParameterError(
+            f'policy {name!r}: expected actions of the leg, got actions that are {leg.action_form}; "random"'
+            ' and "bang-bang" take any'
+        )
     policy = _scripted(name, env, leg, seed)
     policy.name = name
     return policy
@@ -167,7 +172,7 @@ def make_policy(name: str, env: Any, seed: int = 0) -> Scripted:
 
 def _scripted(name: str, env: Any, leg: Any, seed: int) -> Scripted:
     """Make the policy of a known name, see `make_policy`; `leg` is the unwrapped environment."""
-    count = len(leg.batch.body.action_names)
+    count = len(leg.batch.action_names)
     if name == "reference":
         return Scripted(lambda observation, time: np.zeros(count, np.float32), leg.dt)
     if name == "random":

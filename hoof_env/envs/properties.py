@@ -72,8 +72,7 @@ class LegProperties:
     @property
     def action_names(self) -> tuple[str, ...]:
         """Names of the actions; a horse's carry the leg as prefix."""
-        names: tuple[str, ...] = self.batch.body.action_names
-        return names
+        return self.batch.action_names
 
     @property
     def observation_units(self) -> tuple[str, ...]:
@@ -82,7 +81,7 @@ class LegProperties:
 
     @property
     def action_form(self) -> str:
-        """Meaning of actions: "rates" of the gait parameters of one leg, or "offsets" from a horse's gait.
+        """Meaning of actions: "rates" of the gait parameters of one leg, "offsets" from a horse's gait, or
+        the form of a map of one's own.
         States and files of policies contain it, so that those of another form are refused."""
-        form: str = self.batch.body.action_form
-        return form
+        return self.batch.action_form

@@ -25,6 +25,7 @@ class RowStates(LegBase):
 
     def _observed(self) -> NDArray[np.float32]:
         """Return the observations, a copy that later steps do not change."""
+        self.batch.check_observed()
         return self.batch.observations[: self.num_envs].copy()
 
     def get_state(self) -> dict[str, Any]:
@@ -62,6 +63,8 @@ class RowStates(LegBase):
         # The last checks: nothing has changed until here.
         generators = [generator_of(values) for values in states]
         set_state(self.batch, state)
+        if "rows" in state:
+            self._take_given()
         self._ended = ended
         self._started = np.ones(n, bool)
         self._generators = generators

@@ -35,6 +35,7 @@ class RowSeeds:
     """Generators of the rows, seeded as Gymnasium's `SyncVectorEnv` seeds its environments."""
 
     num_envs: int
+    batch: Any
     _generators: list[np.random.Generator]
     _seeds: list[int]
 
@@ -86,6 +87,7 @@ class RowSeeds:
         for env in np.flatnonzero(mask):
             if seeds[env] is not None:
                 self._generators[env], self._seeds[env] = seeding.np_random(seeds[env])
+                self.batch.restart_schedules(np.array([env]))
 
     def _new_generators(self, seeds: Sequence[int | None]) -> None:
         """Make a generator for each environment, from entropy for a seed of None."""
@@ -102,6 +104,7 @@ class RowAttributes:
     np_random: Any
     batch: Any
     record: Any
+    change_settings: Any
     _attributes: dict[str, dict[int, Any]]
 
     def call(self, name: str, *args: Any, **kwargs: Any) -> tuple[Any, ...]:
@@ -161,6 +164,12 @@ class RowAttributes:
             return [self._attributes[name][env] for env in chosen]
         if name in ("reset", "step"):
             raise ParameterError(f"call: {name!r} is of all together; expected envs.{name}(...)")
+        # Of these environments alone, as by `indices` of Stable-Baselines3.
+        if name == "change_settings":
+            some = None if len(set(chosen)) == self.num_envs else chosen
+            return [self.change_settings(*args, envs=some, **kwargs)] * len(chosen)
+        if name == "settings":
+            return [self.batch.coming_settings(env) for env in chosen]
         # Only environments that are asked for keep their substeps.
         if name == "record":
             return [self.record(env) for env in chosen]

@@ -161,7 +161,7 @@ class Sb3VecEnv(VecEnv):
         Raises:
             ParameterError: `indices` are some environments only, and the method is one of all together.
         """
-        if method_name not in (*PER_ENV, "get_wrapper_attr", "has_wrapper_attr"):
+        if method_name not in (*PER_ENV, "change_settings", "get_wrapper_attr", "has_wrapper_attr"):
             self._whole("env_method", indices)
         return self.envs.call_on(method_name, self._get_indices(indices), *args, **kwargs)
 

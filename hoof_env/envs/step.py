@@ -16,6 +16,7 @@ import numpy as np
 from hoof_env.dynamics.advance import BY_LEGS, LANES, MODEL, advance_kernels
 from hoof_env.dynamics.layout import PLAIN, Features
 from hoof_env.dynamics.limits import PITCH, has_moved
+from hoof_env.envs.action_kernel import converter
 from hoof_env.envs.addresses import AT, BEGIN, END, memories
 from hoof_env.envs.frames_kernel import delayed_actions, remember
 from hoof_env.envs.observation_kernel import (
@@ -46,6 +47,7 @@ from hoof_env.tasks.body import BodyKernels
 from hoof_env.tasks.episode import ACTIONS, FAILED, TRUNCATED, Memories, memories_of, task_type
 from hoof_env.tasks.observation import Entry
 from hoof_env.tasks.one_leg import LEG_KERNELS
+from hoof_env.tasks.own_parts import ActionMap, Own, own_of
 from hoof_env.tasks.reward import Term
 
 NOT_A_NUMBER = -1
@@ -84,6 +86,7 @@ def step_kernels(
     contact_law: Callable[..., Any] | None,
     features: Features = PLAIN,
     body: BodyKernels = LEG_KERNELS,
+    action_map: ActionMap | None = None,
 ) -> StepKernels:
     """Return the kernels of tasks with the same parts, which share them.
 
@@ -93,12 +96,13 @@ def step_kernels(
         contact_law: user's law of the normal force; None for the engine's.
         features: features of the engine.
         body: the body's own parts.
+        action_map: map from actions to those of the body; None for none.
 
     Raises:
         ParameterError: one of the functions refers to something that cannot be read.
     """
-    key = (terms, entries, contact_law, features, body)
-    foreign = from_outside(_functions(terms, entries, contact_law))
+    key = (terms, entries, contact_law, features, body, action_map)
+    foreign = from_outside(_functions(terms, entries, contact_law, action_map))
     # Helpers and constants of a user's function may have changed since, as in a notebook.
     present = fingerprint(*foreign)
     kernels: StepKernels = _KEPT.get((*key, present), lambda: _made(foreign, *key), bool(foreign))
@@ -106,12 +110,16 @@ def step_kernels(
 
 
 def _functions(
-    terms: tuple[Term, ...], entries: tuple[Entry, ...], contact_law: Callable[..., Any] | None
+    terms: tuple[Term, ...],
+    entries: tuple[Entry, ...],
+    contact_law: Callable[..., Any] | None,
+    action_map: ActionMap | None,
 ) -> list[Callable[..., Any]]:
     """Return all functions that a task gives to its kernels."""
     parts: list[Any] = [term.compute for term in terms]
     parts += [part for entry in entries for part in functions_of(entry)]
-    return [*parts, contact_law] if contact_law else parts
+    parts += [contact_law] if contact_law else []
+    return [*parts, action_map.compute] if action_map else parts
 
 
 def _made(
@@ -121,35 +129,35 @@ def _made(
     contact_law: Callable[..., Any] | None,
     features: Features,
     body: BodyKernels,
+    action_map: ActionMap | None,
 ) -> StepKernels:
     """Make the kernels, helpers of a user's functions anew; numba compiles them when they are called."""
     refresh(*foreign)
-    layouts = memories_of(body.episode, len(terms), features, body.legs)
+    own = own_of(terms, entries)
+    layouts = memories_of(body.episode, len(terms), features, body.legs, own)
     slots = slots_of(entries)[2]
-    task_record = task_type(len(terms), slots, layouts.gait, body.task_fields)
-    functions = _functions(terms, entries, contact_law)
+    task_record = task_type(len(terms), slots, layouts.gait, (*body.task_fields, *own.fields))
+    functions = _functions(terms, entries, contact_law, action_map)
     # All that the compiled code depends on: the name under which it is in numba's cache on disk.
     identity = fingerprint(*functions, _flags(terms, entries), layouts.episode.names, (FAILED, TRUNCATED))
-    identity += f" {tuple(features)} {body.legs} legs, {task_record.descr}"
-    observers = observers_of(entries, len(terms), features, body)
-    parts = (apply, finish, observe) = _apply(layouts, body), _finish(terms, layouts, body), observers.observe
+    identity += f" {tuple(features)} {body.legs} legs, {task_record.descr}{_declared(own, action_map)}"
+    observers = observers_of(entries, len(terms), features, body, own)
+    finish = _finish(sum_of_terms(terms, layouts, own.constants), layouts, body)
+    parts = (apply, finish, observe) = _apply(layouts, body, action_map), finish, observers.observe
     advance = advance_kernels(contact_law, features)
     # Bodies without a kernel of their own run side by side: nothing calls their `step_one`.
     advance_one = getattr(advance, f"advance_{BY_LEGS.get(body.legs, 'batch')}")
     advance_batch = advance.advance_batch
-    sums_size = layouts.sums
-    room = room_of(slots)
-    step = _step(task_record, room, layouts, body, parts)
+    sizes = (room, scratch_size, count) = room_of(slots), *_sizes(body, action_map)
+    step = _step(task_record, sizes, layouts, body, parts)
     task_at = record_at(task_record)
+    are_numbers = _are_numbers(count)
 
     def step_one(addresses):  # type: ignore[no-untyped-def]
         return step(addresses, 1, advance_one)
 
     def step_batch(addresses):  # type: ignore[no-untyped-def]
         return step(addresses, LANES, advance_batch)
-
-    are_numbers = _are_numbers(body)
-    scratch_size = body.scratch_size
 
     def apply_one(addresses):  # type: ignore[no-untyped-def]
         task = task_at(addresses[AT.task])[0]
@@ -164,7 +172,7 @@ def _made(
     def finish_one(addresses):  # type: ignore[no-untyped-def]
         task = task_at(addresses[AT.task])[0]
         memory = doubles(2 * room)
-        sums = doubles(sums_size * 2)
+        sums = doubles(layouts.sums * 2 + layouts.own_rows)
         happened = 0
         for n in range(addresses[BEGIN], addresses[END]):
             happened |= finish(addresses, 1, task, n, sums)
@@ -176,6 +184,18 @@ def _made(
     return StepKernels(observers=observers, **kernels)
 
 
+def _sizes(body: BodyKernels, action_map: ActionMap | None) -> tuple[int, int]:
+    """Return the size of the scratch memory for each row, in numbers, and the number of actions of a row."""
+    count = len(action_map.names) if action_map else body.legs * ACTIONS
+    return max(body.scratch_size, count if action_map else 0), count
+
+
+def _declared(own: Own, action_map: ActionMap | None) -> str:
+    """Return what kernels depend on of the declarations of a task; "" without any."""
+    text = f" {own}" if any(own) else ""
+    return f"{text} {action_map.names} {action_map.scalar}" if action_map else text
+
+
 def _flags(terms: tuple[Term, ...], entries: tuple[Entry, ...]) -> Any:
     """Return what kernels depend on besides the functions themselves."""
     of_terms = [(term.scalar, not is_user_term(term)) for term in terms]
@@ -183,10 +203,9 @@ def _flags(terms: tuple[Term, ...], entries: tuple[Entry, ...]) -> Any:
     return of_terms, of_entries
 
 
-def _are_numbers(body: BodyKernels) -> Callable[..., Any]:
+def _are_numbers(actions_per_row: int) -> Callable[..., Any]:
     """Return a part of kernels that is True if all actions are finite, including those of other threads'
     blocks."""
-    actions_per_row = body.legs * ACTIONS
 
     @inline_source
     def are_numbers(addresses):  # type: ignore[no-untyped-def]
@@ -201,25 +220,26 @@ def _are_numbers(body: BodyKernels) -> Callable[..., Any]:
     return are_numbers
 
 
-def _apply(layouts: Memories, body: BodyKernels) -> Callable[..., Any]:
+def _apply(layouts: Memories, body: BodyKernels, action_map: ActionMap | None) -> Callable[..., Any]:
     """Return a part of kernels that turns the actions of row n and, with lanes, of its neighbours into
     commands."""
     command = body.command
     put_action = delayed_actions(layouts)
+    convert = converter(action_map, layouts, body)
 
     @inline_source
     def apply(addresses, lanes, task, n, scratch):  # type: ignore[no-untyped-def]
         put_action(addresses, lanes, task, n)
+        convert(addresses, lanes, task, n, scratch)
         _, leg, episode = memories(addresses, lanes, layouts, n)
-        actions = singles_at(addresses[AT.acted])
+        actions = singles_at(addresses[AT.mapped])
         command(task, actions, episode, leg, layouts.gait, n, rows(scratch, lanes, None))
 
     return apply
 
 
-def _finish(terms: tuple[Term, ...], layouts: Memories, body: BodyKernels) -> Callable[..., Any]:
+def _finish(compute_reward: Callable[..., Any], layouts: Memories, body: BodyKernels) -> Callable[..., Any]:
     """Return a part of kernels that does what follows the engine, but for the observation: reward and end."""
-    compute_reward = sum_of_terms(terms, layouts)
     on_switch = body.on_switch
 
     @inline_source
@@ -278,17 +298,19 @@ def _keep_sums(layouts: Memories) -> Callable[..., Any]:
 
 def _step(
     task_record: np.dtype[Any],
-    room: int,
+    sizes: tuple[int, int, int],
     layouts: Memories,
     body: BodyKernels,
     parts: tuple[Callable[..., Any], ...],
 ) -> Callable[..., Any]:
-    """Return a part of kernels that is a whole control step, made of `parts`: apply, finish and observe."""
+    """Return a part of kernels that is a whole control step, made of `parts`: apply, finish and observe.
+    `sizes` are room for an observation, size of the scratch memory, and number of actions."""
     (apply, finish, observe) = parts
+    (room, scratch_size, actions_per_row) = sizes
+    own_rows = layouts.own_rows
     sums_size = layouts.sums
     keep_sums = _keep_sums(layouts)
-    are_numbers = _are_numbers(body)
-    scratch_size = body.scratch_size
+    are_numbers = _are_numbers(actions_per_row)
     task_at = record_at(task_record)
     model_at = record_at(MODEL)
 
@@ -301,7 +323,7 @@ def _step(
         scratch = doubles(scratch_size * lanes)
         memory = doubles(2 * room * lanes)
         # Also for the sums of one lane, for terms that take no lanes.
-        sums = doubles(sums_size * (lanes + 1))
+        sums = doubles(sums_size * (lanes + 1) + own_rows * lanes)
         kept = doubles((body.legs * sums_size + 1) * lanes)
         # One group of lanes after the other: its memory stays in the cache from action to observation.
         for n in range(addresses[BEGIN], addresses[END], lanes):

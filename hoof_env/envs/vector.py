@@ -139,7 +139,7 @@ class HorseLegVectorEnv(  # type: ignore[misc]  # generators are of all
         rest: Any = dict(options) if isinstance(options, Mapping) else options
         mask = check_mask(rest.pop("reset_mask", None) if isinstance(rest, dict) else None, self.num_envs)
         # Before the generators are seeded, so that a refused reset changes nothing.
-        checked = check_options(self.batch, rest)
+        checked = check_options(self.batch, rest, np.flatnonzero(mask))
         self._seed(seed, mask)
         parameters = self._start(np.flatnonzero(mask), checked)
         self._ended[mask] = False
@@ -181,7 +181,7 @@ class HorseLegVectorEnv(  # type: ignore[misc]  # generators are of all
                 f"step() was called although episodes {np.flatnonzero(again).tolist()} ended: "
                 "expected reset(options={'reset_mask': ...})"
             )
-        batch.actions[:n] = check_actions(actions, (n, len(batch.body.action_names)))
+        batch.actions[:n] = check_actions(actions, (n, len(batch.action_names)))
         some_ended = batch.step(self._generators, again)
         how = batch.episode_rows.ended[:n]
         terminated = how == FAILED

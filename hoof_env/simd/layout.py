@@ -129,6 +129,19 @@ def new_layout(name: str, fields: dict[str, Any]) -> Any:
     return _Named(name, (Layout,), {"__annotations__": fields, "__module__": __name__})
 
 
+def extended(layout: Any, name: str, inner: dict[str, dict[str, Any]]) -> Any:
+    """Return a layout with another field behind its own, whose parts are layouts themselves.
+
+    Args:
+        layout: layout.
+        name: name of the field.
+        inner: fields of each part, by the part's name.
+    """
+    parts = {part: new_layout(f"{part} of {fields}", fields) for part, fields in inner.items()}
+    own = get_type_hints(layout, include_extras=True)
+    return new_layout(f"{layout.__qualname__} with {inner}", {**own, name: new_layout(f"{inner}", parts)})
+
+
 def views(layout: Any, data: NDArray[Any]) -> Any:
     """Return the fields of memory by name, as views of an array. Its first axis is the rows; the view of a
     `Row` does not have that axis."""

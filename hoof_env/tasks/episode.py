@@ -11,7 +11,8 @@ import numpy as np
 from hoof_env.dynamics.form import engine_layout
 from hoof_env.dynamics.layout import PLAIN, Features, StrideSums, stride_peaks
 from hoof_env.gait import PARAMETERS
-from hoof_env.simd.layout import Block, Constants, Layout, Row, Size, Vector
+from hoof_env.simd.layout import Block, Constants, Layout, Row, Size, Vector, extended
+from hoof_env.tasks.own_parts import Own
 from hoof_env.tasks.reward import TERMS
 
 ACTIONS = len(PARAMETERS)
@@ -23,6 +24,9 @@ TRUNCATED = 2
 
 ACTION = Size("action", ACTIONS)
 REWARD = Size("reward", len(TERMS))
+
+NOTHING = Own()
+"""Declarations of a task without any."""
 
 MOST_PARTS = 3
 """Largest number of parts of a control step: an action and an observation may each divide it."""
@@ -54,7 +58,9 @@ class Episode(Layout):
 
 
 @cache
-def episode_layout(layout: Any, terms: int, features: Features = PLAIN, legs: int = 1) -> Any:
+def episode_layout(
+    layout: Any, terms: int, features: Features = PLAIN, legs: int = 1, own: Own = NOTHING
+) -> Any:
     """Return the layout of an episode's memory, sized for an engine.
 
     Args:
@@ -62,8 +68,12 @@ def episode_layout(layout: Any, terms: int, features: Features = PLAIN, legs: in
         terms: number of the reward's terms.
         features: features of the engine.
         legs: number of legs.
+        own: what terms declare; rows that they keep are the field `own`, behind the others.
     """
-    return features.of(layout).sized(action=legs * ACTIONS, reward=terms)
+    made = features.of(layout).sized(action=legs * ACTIONS, reward=terms)
+    if not own.kept:
+        return made
+    return extended(made, "own", {term: dict.fromkeys(names, Row) for term, names in own.kept})
 
 
 class _Memories(NamedTuple):
@@ -79,6 +89,8 @@ class _Memories(NamedTuple):
     stride_sums: Any
     sums: int
     peaks: int
+    own_first: int
+    own_rows: int
 
 
 class Memories(Constants, _Memories):
@@ -93,15 +105,18 @@ class Memories(Constants, _Memories):
         stride_sums: layout of `StrideSums`.
         sums: number of stride sums.
         peaks: bit mask of the stride sums that are peaks.
+        own_first, own_rows: first row that terms keep in the memory of an episode, and number of these rows.
     """
 
 
 @cache
-def memories_of(layout: Any, terms: int, features: Features, legs: int = 1) -> Memories:
+def memories_of(layout: Any, terms: int, features: Features, legs: int = 1, own: Own = NOTHING) -> Memories:
     """Return the layouts of an engine with these features and of episodes with a number of terms and legs."""
     form = engine_layout(features)
+    episode = episode_layout(layout, terms, features, legs, own)
+    kept = episode.rows("own") if own.kept else slice(0, 0)
     return Memories(
-        episode=episode_layout(layout, terms, features, legs),
+        episode=episode,
         trunk=form.trunk_memory,
         leg=form.leg_memory,
         trunk_rows=form.trunk_rows,
@@ -111,6 +126,8 @@ def memories_of(layout: Any, terms: int, features: Features, legs: int = 1) -> M
         stride_sums=features.of(StrideSums),
         sums=form.sums,
         peaks=sum(is_peak << k for k, is_peak in enumerate(stride_peaks(features))),
+        own_first=kept.start,
+        own_rows=kept.stop - kept.start,
     )
 
 

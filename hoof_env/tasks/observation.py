@@ -3,7 +3,7 @@ is a row of the table and needs no other change."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
@@ -16,6 +16,7 @@ from hoof_env.simd import where
 from hoof_env.simd.compile import inline_llvm
 from hoof_env.simd.math import cos_sin
 from hoof_env.simd.user_functions import check_function
+from hoof_env.tasks.own_parts import Constant, check_arguments, check_parts
 
 LOW, HIGH = (np.array([limit[i] for limit in LIMITS.values()]) for i in (0, 1))
 MIDDLE = (LOW + HIGH) / 2
@@ -77,6 +78,7 @@ class Entry:
         measure: function of `ObservationInputs` that returns the number; compiled like `reward.Term.compute`.
         scale: scaling of the number.
         scalar: True if `measure` and the scale are functions of ordinary numbers, see `reward.Term`.
+        constants: further arguments of `measure`, which the setting `constants` changes.
 
     Raises:
         ParameterError: a name or group is missing, `measure` is not a function of one argument, or `scale` is
@@ -86,15 +88,18 @@ class Entry:
     name: str
     group: str
     unit: str
-    measure: Callable[[Any], Any]
+    measure: Callable[..., Any]
     scale: Scale
     scalar: bool = False
+    constants: Sequence[Constant] = ()
 
     def __post_init__(self) -> None:
         for text in (self.name, self.group):
             if not isinstance(text, str) or not text:
                 raise ParameterError(f"name and group: expected a text, got {text!r}")
-        check_function(f"{self.title}: measure", self.measure, 1)
+        constants = check_parts(f"{self.title}: constants", Constant, self.constants)
+        object.__setattr__(self, "constants", constants)
+        check_arguments(f"{self.title}: measure", self.measure, 1, constants)
         if not isinstance(self.scale, Scale):
             raise ParameterError(f"{self.title}: scale: expected a hoof_env.Scale, got {self.scale!r}")
 

@@ -18,7 +18,7 @@ from typing import Any, TypeVar
 import gymnasium as gym
 import numpy as np
 
-from hoof_env.errors import ParameterError, UnknownArgumentError, check_choice
+from hoof_env.errors import ParameterError, UnknownArgumentError, check_choice, one_of
 from hoof_env.simd.user_functions import check_function, function_name
 from hoof_env.tasks.body import Body
 from hoof_env.tasks.effects import check_effect
@@ -27,6 +27,7 @@ from hoof_env.tasks.horse_gaits import checked_size
 from hoof_env.tasks.horse_terms import HORSE_ENTRIES, HORSE_TERMS
 from hoof_env.tasks.observation import ENTRIES, Entry, check_groups, groups_of
 from hoof_env.tasks.one_leg import OneLeg
+from hoof_env.tasks.own_parts import ActionMap, check_constants, constants_of
 from hoof_env.tasks.plain import as_plain, json_value
 from hoof_env.tasks.reward import TERMS, Term, check_weights
 from hoof_env.tasks.settings import SETTINGS, Settings
@@ -49,6 +50,7 @@ class Task:
         speeds: range of commanded speeds for a `target_speed` of None, of a horse of size 1; proportional to
             the root of the size [m/s].
         contact_law: user's law instead of `normal_law`, see `dynamics.hoof.law_of`.
+        action_map: map from actions to those of the body.
         module: module that registers the task, which other processes import.
     """
 
@@ -63,6 +65,7 @@ class Task:
     body: Callable[[Settings], Body] = OneLeg
     speeds: tuple[float, float] | None = None
     contact_law: Callable[..., Any] | None = None
+    action_map: ActionMap | None = None
     module: str = ""
 
     @property
@@ -78,9 +81,10 @@ class Task:
         return next(key for key, task in TASKS.items() if task.name == self.name)
 
     def names(self) -> tuple[list[str], ...]:
-        """Return the names of the task's terms, entries and contact law."""
-        law = [function_name(self.contact_law)] if self.contact_law else []
-        return [term.name for term in self.terms], [entry.name for entry in self.entries], law
+        """Return the names of the task's terms, entries, and contact law and map of actions."""
+        others = [function_name(self.contact_law)] if self.contact_law else []
+        others += [self.action_map.form] if self.action_map else []
+        return [term.name for term in self.terms], [entry.name for entry in self.entries], others
 
     def __reduce__(self) -> Any:
         """Pickle the task by its name: its functions may be lambdas, which cannot be pickled."""
@@ -305,6 +309,23 @@ def _check_twice(env_id: str, names: list[str]) -> None:
         raise ParameterError(f"{env_id}: expected names that differ, got {', '.join(twice)} twice")
 
 
+def _check_laws(env_id: str, contact_law: Any, action_map: Any) -> None:
+    """Check a contact law and a map of actions of one's own, each None for none."""
+    if contact_law is not None:
+        check_function(f"{env_id}: contact_law", contact_law, 4)
+    if action_map is not None:
+        one_of(f"{env_id}: action_map", action_map, ActionMap)
+
+
+def _checked(task: Task, changes: Mapping[str, Any]) -> Settings:
+    """Return the settings of a task with changes, of which those that name its parts are checked."""
+    settings = task.chosen(changes)
+    check_groups(settings.observation, groups_of(task.entries))
+    check_weights(settings.reward_weights, task.terms)
+    check_constants(settings.constants, constants_of(task.terms, task.entries))
+    return settings
+
+
 def register(
     env_id: str,
     *,
@@ -312,6 +333,7 @@ def register(
     terms: Iterable[Term] = (),
     entries: Iterable[Entry] = (),
     contact_law: Callable[..., Any] | None = None,
+    action_map: ActionMap | None = None,
     **defaults: Any,
 ) -> None:
     """Register an id of one's own, for `gymnasium.make` and `make_vec`: a task of this package with more
@@ -327,6 +349,7 @@ def register(
         entries: entries of the observation, behind those of the base; their groups are observed by default.
         contact_law: function of penetration [m], its rate [m/s], inverse approach speed [s/m] and the
             ground's constants, which returns the normal force [N]; see `dynamics.hoof.law_of`.
+        action_map: actions of one's own, from which those of the body follow.
         defaults: settings, see the manual pages.
 
     Raises:
@@ -339,30 +362,28 @@ def register(
     if not isinstance(env_id, str) or not re.fullmatch(r"(?!hoof_env/)[\w-]+/[\w-]+-v\d+", env_id):
         raise ParameterError(f"env_id: expected 'namespace/Name-v0' of a namespace of yours, got {env_id!r}")
     old = task_of(base)
-    if contact_law is not None:
-        check_function(f"{env_id}: contact_law", contact_law, 4)
+    _check_laws(env_id, contact_law, action_map)
     _check_twice(env_id, [term.name for term in new_terms])
     _check_twice(env_id, [entry.name for entry in (*old.entries, *new_entries)])
     added = {term.name: term for term in new_terms}
     kept = [added.pop(term.name, term) for term in old.terms]
-    of_law = f" The normal force is that of `{function_name(contact_law)}`." if contact_law else ""
+    law = f" The normal force is that of `{function_name(contact_law)}`." if contact_law else ""
     caller = str(sys._getframe(1).f_globals.get("__name__", ""))
     task = replace(
         old,
         name=env_id,
         module="" if caller in ("__main__", "__mp_main__") else caller,  # other processes import it
         summary=f"{old.summary} With terms, entries or laws from outside this package.",
-        about=old.about + of_law,
+        about=old.about + law,
         terms=(*kept, *added.values()),
         entries=(*old.entries, *new_entries),
         contact_law=contact_law or old.contact_law,
+        action_map=action_map or old.action_map,
     )
     groups = dict.fromkeys((*old.chosen({}).observation, *groups_of(new_entries)))
-    settings = task.chosen({"observation": tuple(groups), **defaults})
-    check_groups(settings.observation, groups_of(task.entries))
-    check_weights(settings.reward_weights, task.terms)
-    changed = {name: getattr(settings, name) for name in ("observation", *old.defaults, *defaults)}
-    task = replace(task, defaults=changed)
+    settings = _checked(task, {"observation": tuple(groups), **defaults})
+    names = "observation", *old.defaults, *defaults
+    task = replace(task, defaults={name: getattr(settings, name) for name in names})
     _add_to_gymnasium(task)
     _OWN[env_id] = task
 

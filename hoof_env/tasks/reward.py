@@ -6,7 +6,7 @@ the weights and their consequences."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
@@ -14,7 +14,7 @@ import numpy as np
 
 from hoof_env.errors import ParameterError, check_choice, check_number
 from hoof_env.simd import absolute, maximum, minimum, where
-from hoof_env.simd.user_functions import check_function
+from hoof_env.tasks.own_parts import Constant, Kept, check_arguments, check_parts
 
 
 class Outcome(NamedTuple):
@@ -131,6 +131,9 @@ class Term:
             side: + - * /, comparisons, and the functions of `hoof_env.simd`; `where` instead of `if`.
         scalar: True if `compute` is a function of ordinary numbers, which may use `if` and `math`; it is
             called for one environment after the other, which takes longer.
+        constants: further arguments of `compute`, which the setting `constants` changes.
+        keeps: numbers that the term keeps in an episode: `compute` reads and sets them, as
+            `step.episode.own.<term>.<name>`; entries read them, too.
         objective: one of `OBJECTIVES`, to which `HorseLegMO-v0` adds the term; None divides it among all in
             equal parts.
 
@@ -145,9 +148,11 @@ class Term:
     weight: float
     unit: str
     meaning: str
-    compute: Callable[[Any, Any], Any]
+    compute: Callable[..., Any]
     scalar: bool = False
     objective: str | None = None
+    constants: Sequence[Constant] = ()
+    keeps: Sequence[Kept] = ()
 
     def __post_init__(self) -> None:
         if not isinstance(self.name, str) or not self.name:
@@ -156,7 +161,13 @@ class Term:
         # Without one the term is divided among all objectives.
         if self.objective is not None:
             check_choice(f"{self.title}: objective", self.objective, OBJECTIVES)
-        check_function(f"{self.title}: compute", self.compute, 2)
+        # Tuples, because kernels are found by the hash of their terms.
+        constants = check_parts(f"{self.title}: constants", Constant, self.constants)
+        object.__setattr__(self, "constants", constants)
+        object.__setattr__(self, "keeps", check_parts(f"{self.title}: keeps", Kept, self.keeps))
+        if self.keeps and not self.name.isidentifier():
+            raise ParameterError(f"{self.title}: expected the name of a variable of a term that keeps rows")
+        check_arguments(f"{self.title}: compute", self.compute, 2, constants)
 
     @property
     def title(self) -> str:

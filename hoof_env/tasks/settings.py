@@ -204,6 +204,10 @@ class TaskSettings(BodySettings):
     reward_weights: Annotated[
         Mapping[str, float] | None, About("", "mapping of the weights that are to differ from those above")
     ] = None
+    constants: Annotated[
+        Mapping[str, float] | None,
+        About("", "values of [constants](../own_task.md#constants) of terms and entries, by name"),
+    ] = None
     randomize: Annotated[
         Mapping[str, Range] | None,
         About(
@@ -219,6 +223,15 @@ class Settings(TaskSettings):
     The types are those that callers may pass: the fields are keyword arguments of the environments, too, see
     `envs.arguments`.
     """
+
+    # Curricula
+    schedule: Annotated[
+        Mapping[str, Sequence[Any]] | None,
+        About(
+            "control steps",
+            "[first, last, steps between] by setting, see [curricula](../own_task.md#curricula)",
+        ),
+    ] = None
 
     # Disturbances
     noise: Annotated[

@@ -107,16 +107,21 @@ def test_a_refused_reset_keeps_the_episode():
     assert "target_speed" not in env.reset()[1]
 
 
-def test_states_are_of_one_set_of_settings():
+def test_a_state_has_the_settings_of_each_row():
+    """Those that come, too: an environment that was made with the first ones goes on alike."""
     envs = gym.make_vec(LEG, 4, **SHORT).unwrapped
     envs.reset(seed=0)
     envs.change_settings(reward_weights={"peak": 1.0})
-    envs.get_state()
     envs.reset(options={"reset_mask": np.array([True, False, False, False])})
-    with pytest.raises(ParameterError, match="get_state: expected one set of settings for all"):
-        envs.get_state()
-    envs.reset()
-    envs.set_state(pickle.loads(pickle.dumps(envs)).get_state())
+    state = pickle.loads(pickle.dumps(envs.get_state()))
+    other = gym.make_vec(LEG, 4, **SHORT).unwrapped
+    same(other.set_state(state), envs._observed())
+    for action in actions(1, 25, 4):
+        same(other.step(action)[:4], envs.step(action)[:4])
+    assert not other.batch.conditions.are_mixed
+    broken = {**state, "rows": {**state["rows"], "which": [0, 0, 0, 9]}}
+    with pytest.raises(ParameterError, match=r"state\['rows'\]: expected settings of each environment"):
+        other.set_state(broken)
 
 
 def test_sb3_asks_all_at_once():

@@ -244,6 +244,7 @@ CHANGED = OTHER | {
     "drive": "motor", "solver": "paper", "baumgarte_alpha": 10.0, "baumgarte_beta": 10.0,
     "integrator": "rk3", "sim_dt": 5e-4, "dt": 0.01, "episode_seconds": 5.0, "target_speed": 2.0,
     "target_seconds": (1.0, 2.0), "observation": ("crank",), "reward_weights": {"peak": 2.0},
+    "constants": {"free": 1.0}, "schedule": {"strength": [0.0, 1.0, 5]},
     "randomize": {"friction": 0.5}, "noise": {"trunk": 0.1}, "bias": {"trunk": 0.1}, "push_impulse": 9.0,
     "push_seconds": (1.0, 2.0), "pushes": [[1.0, 9.0, 0.0]], "strength": 0.5, "observation_delay": 1.0,
     "action_delay": 1.0, "observation_history": 2, "last_actions": 1, "privileged": ["trunk"],

@@ -392,10 +392,19 @@ def test_the_page_has_every_name_that_functions_reach():
     assert reached == expected
 
 
-def test_the_page_shows_the_example():
-    example = (Path(__file__).parents[2] / "examples" / "own_task.py").read_text(encoding="utf-8")
+def test_the_page_shows_the_examples():
+    """All but the program at the end of the first, in its order; the parts of the second; the rest runs."""
+    folder = Path(__file__).parents[2] / "examples"
+    first, second = ((folder / f"own_{name}.py").read_text(encoding="utf-8") for name in ("task", "actions"))
     blocks = re.findall(r"```python\n(.*?)```", PAGE, re.DOTALL)
-    places = [example.index(block) for block in blocks]  # an error where one is not there
+    shown = [block for block in blocks if block in first]
+    places = [first.index(block) for block in shown]
     assert places == sorted(places)
-    assert len("".join(blocks).split()) > 0.6 * len(example.split())  # all but the program at the end
-    assert len([line for line in example.splitlines() if line.strip()]) <= 75
+    assert len("".join(shown).split()) > 0.6 * len(first.split())
+    assert len([line for line in first.splitlines() if line.strip()]) <= 75
+    rest = [block for block in blocks if block not in first]
+    assert len([block for block in rest if block in second]) == 4
+    (curricula,) = (block for block in rest if block not in second)
+    known = {}
+    exec(compile(curricula, "own_task.md", "exec"), known)
+    assert known["envs"].call("settings")[1].target_speed == [3.0, 3.5]

@@ -1,0 +1,117 @@
+"""Schedules: settings that go from one value to another over a number of control steps."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hoof_env.errors import ParameterError, check_number, count
+from hoof_env.tasks.body import Body
+from hoof_env.tasks.disturbances import MOST_STRENGTH
+from hoof_env.tasks.parameters import check_parameters
+from hoof_env.tasks.settings import PER_EPISODE, Settings
+
+MOST_STEPS = 10**12
+"""Largest number of control steps of a schedule."""
+
+STRENGTH = "strength"
+SPEED = "target_speed"
+SCHEDULED = (STRENGTH, SPEED, *PER_EPISODE)
+"""Settings that can be scheduled."""
+
+Ends = tuple[float, float]
+Floats = NDArray[np.float64]
+
+
+class Course(NamedTuple):
+    """Course of a setting.
+
+    Attributes:
+        first, last: lowest and highest value at the begin and from `steps` on.
+        steps: control steps between.
+        is_range: True if an episode draws between both values.
+    """
+
+    first: Ends
+    last: Ends
+    steps: int
+    is_range: bool
+
+    @property
+    def hull(self) -> Ends:
+        """Lowest and highest value at any time."""
+        return min(self.first[0], self.last[0]), max(self.first[1], self.last[1])
+
+    def after(self, steps: Any) -> tuple[Floats, Floats]:
+        """Return the lowest and highest value after a number of control steps, or each of several."""
+        part = np.minimum(np.asarray(steps) / self.steps, 1.0)
+        low, high = (
+            (1.0 - part) * first + part * last for first, last in zip(self.first, self.last, strict=True)
+        )
+        # No rounding leaves the range that was checked.
+        return np.maximum(low, self.hull[0]), np.minimum(high, self.hull[1])
+
+
+def check_schedule(given: Any, settings: Settings, body: Body) -> dict[str, Course]:
+    """Return the courses of scheduled settings, by name.
+
+    Args:
+        given: the setting `schedule`; None for none.
+        settings: settings of the environment.
+        body: its body, which knows the range of commanded speeds.
+
+    Raises:
+        ParameterError: not a mapping of settings that can be scheduled to [first, last, control steps], a
+            value out of range, or a setting that is drawn, too.
+    """
+    if given is None:
+        return {}
+    if not isinstance(given, Mapping) or not set(given) <= set(SCHEDULED):
+        raise ParameterError(
+            f"schedule: expected a mapping with some of {', '.join(SCHEDULED)}, got {given!r}"
+        )
+    return {name: _course(name, each, settings, body) for name, each in given.items()}
+
+
+def _course(name: str, given: Any, settings: Settings, body: Body) -> Course:
+    """Return the course of one setting."""
+    title = f"schedule[{name!r}]"
+    if not isinstance(given, (list, tuple)) or len(given) != 3:
+        raise ParameterError(f"{title}: expected [first, last, control steps], got {given!r}")
+    steps = count(f"{title}, control steps", given[2], most=MOST_STEPS)
+    if name in (settings.randomize or {}):
+        raise ParameterError(f"{title}: expected none beside randomize[{name!r}], got {given!r}")
+    first, last = (
+        _ends(name, f"{title}, {which}", value, settings, body)
+        for which, value in zip(("first", "last"), given, strict=False)
+    )
+    is_range = any(low < high for low, high in (first, last))
+    return Course(first, last, steps, is_range)
+
+
+def _ends(name: str, title: str, value: Any, settings: Settings, body: Body) -> Ends:
+    """Return the lowest and highest of a value of the course, a number or a range."""
+    if name == STRENGTH:
+        number = check_number(title, value, low=0.0, high=MOST_STRENGTH)
+        return number, number
+    if name == SPEED:
+        if settings.target_speed is None:
+            raise ParameterError(f"{title}: expected a target_speed beside it, got None")
+        try:
+            speeds = body.commanded_speeds(replace(settings, target_speed=value))
+        except ParameterError as error:
+            raise ParameterError(f"{title}: {error}") from None
+        if speeds is None:
+            raise ParameterError(f"{title}: expected a speed or two, got {value!r}")
+        return speeds
+    checked = check_parameters(title, {name: value}, settings)[name]
+    return checked if isinstance(checked, tuple) else (checked, checked)
+
+
+def drawn_names(schedule: Mapping[str, Course]) -> list[str]:
+    """Return the names of the scheduled physical parameters, which an episode draws."""
+    return [name for name in schedule if name in PER_EPISODE]

@@ -1,0 +1,228 @@
+"""Settings that rows change apart, and schedules by steps: as if single environments had them, and over
+states."""
+
+import copy
+import pickle
+
+import gymnasium as gym
+import numpy as np
+import pytest
+from family import HORSE, actions, same
+
+from hoof_env import Sb3VecEnv
+from hoof_env.errors import FixedSettingError, ParameterError
+from hoof_env.tasks.plain import to_json
+from hoof_env.tasks.schedules import Course
+
+LEG, SPEED = (f"hoof_env/HorseLeg{name}-v0" for name in ("", "Speed"))
+SHORT = {"episode_seconds": 0.2}
+"""Ten control steps."""
+
+LEVELS = [
+    {"friction": 0.2},
+    {"randomize": {"trunk_mass": (40.0, 60.0)}, "strength": 2.0},
+    {"target_speed": [0.5, 1.5], "target_seconds": [0.1, 0.2]},
+    {"reward_weights": {"peak": 3.0}, "noise": {"trunk": 0.1}},
+    {"schedule": {"strength": [0.0, 1.0, 15]}, "pushes": None},
+    {"terrain": {"kind": "hills", "seed": 5, "stiffness": [0.5, 2.0]}},
+]
+
+
+def follow(envs, singles, taken, over, at=None):
+    """Step all; single environments start again where rows do. `at` is called before each step."""
+    for step, action in enumerate(taken):
+        if at:
+            at(step)
+        rows = envs.step(action)
+        for k, one in enumerate(singles):
+            if over[k]:
+                observation, info = one.reset()
+                reward, ended = 0.0, (False, False)
+            else:
+                observation, reward, *ended, info = one.step(action[k])
+            same(rows[0][k], observation)
+            same(rows[4]["measured"][k], info["measured"])
+            assert (rows[1][k], rows[2][k], rows[3][k]) == (reward, *ended), (step, k)
+            over[k] = any(ended)
+
+
+@pytest.mark.parametrize("n", [3, 9])
+def test_each_row_has_the_bits_of_one_that_was_given_its_changes(n):
+    """Levels are drawn for rows at random, over copies, pickles and states."""
+    generator = np.random.default_rng(n)
+    envs = gym.make_vec(LEG, n, **SHORT, noise={"gait": 0.05}, push_impulse=5.0).unwrapped
+    singles = [gym.make(LEG, **SHORT, noise={"gait": 0.05}, push_impulse=5.0).unwrapped for _ in range(n)]
+    same(envs.reset(seed=4)[0], np.array([one.reset(seed=4 + k)[0] for k, one in enumerate(singles)]))
+    over = np.zeros(n, bool)
+
+    def at(step):
+        if step % 4 == 1:
+            rows = np.flatnonzero(generator.random(n) < 0.4)
+            level = LEVELS[generator.integers(len(LEVELS))]
+            level = {k: v for k, v in level.items() if k != "pushes"}
+            envs.change_settings(envs=rows, **level)
+            for k in rows:
+                singles[k].change_settings(**level)
+
+    for part in range(3):
+        follow(envs, singles, actions(part, 25, n), over, at)
+        assert envs.batch.conditions.are_mixed
+        settings = envs.call("settings")
+        for one, asked in zip(singles, settings, strict=True):
+            assert to_json(one.batch.coming_settings(0)) == to_json(asked)
+        state = envs.get_state()
+        if part == 0:
+            envs = copy.deepcopy(envs)
+        elif part == 1:
+            envs = pickle.loads(pickle.dumps(envs))
+        fresh = gym.make_vec(LEG, n, **SHORT, noise={"gait": 0.05}, push_impulse=5.0).unwrapped
+        same(fresh.set_state(pickle.loads(pickle.dumps(state))), envs._observed())
+        envs = fresh if part == 1 else envs
+
+
+def test_levels_that_act_at_starts_cost_no_further_run_of_a_kernel():
+    """Strength, parameters and ranges of speeds are of the rows; weights are constants of a kernel."""
+    envs = gym.make_vec(SPEED, 4, **SHORT).unwrapped
+    envs.reset(seed=0)
+    conditions = envs.batch.conditions
+    each = {"strength": 0.5}, {"randomize": {"trunk_mass": (45.0, 55.0)}}, {"target_speed": [1.0, 2.0]}
+    for row, level in enumerate(each):
+        envs.change_settings(envs=[row], **level)
+    envs.reset()
+    assert len(conditions.all) == 4
+    assert conditions.are_mixed
+    assert not conditions.differ
+    envs.change_settings(envs=[0], reward_weights={"peak": 1.0})
+    envs.reset()
+    assert conditions.differ
+    envs.change_settings(strength=1.0, reward_weights=None, randomize=None, target_speed=[1.0, 3.5])
+    envs.reset()
+    assert len(conditions.all) == 1
+
+
+def test_rows_that_ask_for_what_others_have_share_it():
+    envs = gym.make_vec(LEG, 6, **SHORT).unwrapped
+    envs.reset(seed=0)
+    for row in range(6):
+        envs.change_settings(envs=[row], strength=0.5)
+    envs.reset()
+    assert len(envs.batch.conditions.all) == 1
+
+
+def test_a_callback_of_stable_baselines_promotes_rows():
+    """By `env_method` with indices; `get_attr` tells the level of each."""
+    envs = Sb3VecEnv(SPEED, num_envs=4, **SHORT)
+    envs.seed(0)
+    envs.reset()
+    envs.env_method("change_settings", indices=[1, 3], target_speed=[3.0, 3.25])
+    for _ in range(12):
+        envs.step(np.zeros((4, 4), np.float32))
+    fast = [info["target_speed"] >= 3.0 for info in envs.reset_infos]
+    assert all(fast[1::2])
+    assert [one.target_speed for one in envs.get_attr("settings", [0, 1])] == [(1.0, 3.5), [3.0, 3.25]]
+
+
+@pytest.mark.parametrize(
+    ("words", "kind", "changes"),
+    [
+        ("dt', which stays as", FixedSettingError, {"dt": 0.04}),
+        ("observation_delay', which stays as", FixedSettingError, {"observation_delay": 1}),
+        ("friction: expected", ParameterError, {"friction": -1.0}),
+        ("strength: expected", ParameterError, {"strength": 11.0}),
+        (r"envs: expected indices below 3", ParameterError, {"envs": [3], "strength": 1.0}),
+        (r"noise: expected a mapping with some of the groups that are observed", ParameterError,
+         {"noise": {"target": 1.0}}),
+    ],
+)  # fmt: skip
+def test_refused_changes_change_nothing(words, kind, changes):
+    envs = gym.make_vec(LEG, 3, **SHORT).unwrapped
+    envs.reset(seed=0)
+    with pytest.raises(kind, match=words):
+        envs.change_settings(**{"envs": [1], **changes})
+    assert not envs.batch.conditions.all
+    assert envs.settings == gym.make(LEG, **SHORT).unwrapped.settings
+
+
+# Schedules
+
+
+def test_a_course_stays_within_its_ends_and_reaches_them():
+    generator = np.random.default_rng(0)
+    for _ in range(200):
+        first, last = (tuple(np.sort(generator.uniform(-5, 5, 2))) for _ in range(2))
+        course = Course(first, last, int(generator.integers(1, 100)), True)
+        low, high = course.after(np.arange(200))
+        assert (low[0], high[0]) == first
+        assert (low[-1], high[-1]) == last
+        assert (low <= high).all()
+        assert min(low) >= course.hull[0]
+        assert max(high) <= course.hull[1]
+        assert (np.sign(np.diff(low)) * np.sign(last[0] - first[0]) >= 0).all()
+
+
+SCHEDULE = {
+    "strength": [0.0, 2.0, 40], "friction": [0.8, [0.2, 0.4], 30], "target_speed": [1.0, [2.0, 3.0], 35],
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("env_id", [SPEED, HORSE])
+def test_a_schedule_follows_the_steps_of_each_row(env_id):
+    """Rows that end at other times are elsewhere in it, and have the bits of one; a seed begins it anew."""
+    settings = {**SHORT, "schedule": SCHEDULE, "noise": {"trunk": 0.05}}
+    envs = gym.make_vec(env_id, 3, **settings).unwrapped
+    singles = [gym.make(env_id, **settings).unwrapped for _ in range(3)]
+    infos = envs.reset(seed=4)[1]
+    for k, one in enumerate(singles):
+        one.reset(seed=4 + k)
+    assert (infos["parameters"]["friction"] == 0.8).all()
+    assert (infos["target_speed"] == 1.0).all()
+    over = np.zeros(3, bool)
+    taken = actions(1, 60, 3, env_id=env_id)
+    follow(envs, singles, taken[:5], over)
+    envs.reset(options={"reset_mask": np.array([False, True, False])})
+    singles[1].reset()
+    assert np.allclose(envs.batch.episode_rows.strength[:3], [0.0, 2.0 * 5 / 40, 0.0])
+    follow(envs, singles, taken[5:30], over)
+    state = envs.get_state()
+    fresh = gym.make_vec(env_id, 3, **settings).unwrapped
+    fresh.set_state(state)
+    follow(fresh, singles, taken[30:], over)
+    assert (fresh.batch.episode_rows.strength[:3] == 2.0).all()
+    friction = fresh.batch.start_values[-1]
+    assert ((friction >= 0.2) & (friction <= 0.4)).all()
+    infos = fresh.reset(seed=4)[1]
+    assert (infos["parameters"]["friction"] == 0.8).all()
+
+
+def test_options_go_before_a_schedule():
+    env = gym.make(LEG, schedule=SCHEDULE)
+    _, info = env.reset(options={"strength": 0.7, "parameters": {"friction": 0.5}})
+    assert info["parameters"]["friction"] == 0.5
+    assert env.unwrapped.batch.episode_rows.strength[0] == 0.7
+
+
+@pytest.mark.parametrize(
+    ("words", "schedule"),
+    [
+        (r"schedule: expected a mapping with some of strength, .*, got \{'dt'", {"dt": [1, 2, 3]}),
+        (r"schedule: expected a mapping", [1, 2]),
+        (r"schedule\['strength'\]: expected \[first, last, control steps\], got", {"strength": [0, 1]}),
+        (r"schedule\['strength'\], last: expected .*10.*, got 11", {"strength": [0, 11, 5]}),
+        (r"schedule\['strength'\], control steps: expected .*, got 0", {"strength": [0, 1, 0]}),
+        (r"schedule\['strength'\], control steps: expected .*, got 2.5", {"strength": [0, 1, 2.5]}),
+        (r"friction: expected .*, got -0.1", {"friction": [0.5, -0.1, 5]}),
+        (r"schedule\['friction'\], first.*expected .*, got nan", {"friction": [float("nan"), 0.1, 5]}),
+        (r"schedule\['target_speed'\], last: target_speed", {"target_speed": [1.0, [3.0, 2.0], 5]}),
+        (r"schedule\['motor_gain'\], first.*expected drive='motor'", {"motor_gain": [50.0, 90.0, 5]}),
+    ],
+)  # fmt: skip
+def test_refused_schedules(words, schedule):
+    with pytest.raises(ParameterError, match=words):
+        gym.make(LEG, schedule=schedule)
+
+
+def test_what_is_drawn_and_scheduled_is_refused():
+    with pytest.raises(ParameterError, match=r"schedule\['friction'\]: expected none beside randomize"):
+        gym.make(LEG, schedule={"friction": [0.1, 0.2, 5]}, randomize={"friction": (0.2, 0.3)})
+    with pytest.raises(ParameterError, match=r"schedule.*expected a target_speed beside it, got None"):
+        gym.make("hoof_env/HorseLegRail-v0", schedule={"target_speed": [1.0, 2.0, 5]})
