@@ -66,7 +66,9 @@ def learner(num_envs: int = 64, **settings: Any) -> PPO:
     envs = VecMonitor(Sb3VecEnv("hoof_env/HorseLeg-v0", num_envs=num_envs, **noisy))
     names = envs.get_attr("observation_names", [0])[0]
     seen = sum(not name.startswith("true ") for name in names)
-    return PPO(AsymmetricPolicy, envs, n_steps=64, batch_size=16 * num_envs, policy_kwargs={"seen": seen}, seed=0)
+    return PPO(
+        AsymmetricPolicy, envs, n_steps=64, batch_size=16 * num_envs, policy_kwargs={"seen": seen}, seed=0
+    )
 
 
 if __name__ == "__main__":

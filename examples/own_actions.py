@@ -52,6 +52,13 @@ def steps(action, scene):
     )
 
 
+STEPS = hoof_env.ActionMap(
+    "steps",
+    {"rate of crank speed": "faster", "rate of step length": "longer", "rate of step height": "higher"},
+    steps,
+)
+
+
 def impact(step, weight, free):
     """Charge each newton by which the episode's highest force rises, above a force that is free."""
     own = step.episode.own.impact
@@ -71,11 +78,7 @@ FREE = hoof_env.Constant("free", 1000.0, "N", "force that costs nothing", low=1.
 hoof_env.register(
     "my_lab/Steps-v0",
     base="leg",
-    action_map=hoof_env.ActionMap(
-        "steps",
-        {"rate of crank speed": "faster", "rate of step length": "longer", "rate of step height": "higher"},
-        steps,
-    ),
+    action_map=STEPS,
     terms=[
         hoof_env.Term(
             "impact",

@@ -403,7 +403,7 @@ def test_the_page_shows_the_examples():
     assert len("".join(shown).split()) > 0.6 * len(first.split())
     assert len([line for line in first.splitlines() if line.strip()]) <= 75
     rest = [block for block in blocks if block not in first]
-    assert len([block for block in rest if block in second]) == 4
+    assert len([block for block in rest if block in second]) == 3
     (curricula,) = (block for block in rest if block not in second)
     known = {}
     exec(compile(curricula, "own_task.md", "exec"), known)
