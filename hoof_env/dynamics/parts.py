@@ -309,7 +309,11 @@ class Result(IntEnum):
 def broken(results: NDArray[Any]) -> NDArray[np.bool_]:
     """Return a mask of the outcomes, values of `Result`, that mean that an environment could not be simulated
     and kept its old state."""
-    return (results != Result.OK) & (results < Result.PITCH)
+    return (results != _OK) & (results < _PITCH)
+
+
+_OK = int(Result.OK)
+_PITCH = int(Result.PITCH)
 
 
 _PUT_BACK = "the state was put back to the last good one"

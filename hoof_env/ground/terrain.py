@@ -181,12 +181,15 @@ class Terrain:
         return knots
 
     @cached_property
-    def _heights(self) -> NDArray[np.float64]:
-        return np.array(self.height)
+    def heights(self) -> NDArray[np.float64]:
+        """Heights of the knots [m]; read-only."""
+        knots = np.array(self.height)
+        knots.flags.writeable = False
+        return knots
 
     def height_at(self, x: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return the height [m] at `x` [m], same shape."""
-        return np.interp(x, self.x, self._heights)
+        return np.interp(x, self.x, self.heights)
 
     def to_grid(self) -> TerrainGrid:
         """Return the terrain for the kernel `surface`."""
@@ -200,6 +203,13 @@ class Terrain:
         (rise, harder, rougher) = rises
         cells = np.column_stack([height, rise, 0.0 - slope * ny, ny, stiffness, harder, friction, rougher])
         return TerrainGrid(np.ascontiguousarray(cells), self.start - self.spacing, 1 / self.spacing)
+
+    @cached_property
+    def grid(self) -> TerrainGrid:
+        """The grid of `to_grid`, made once; read-only."""
+        grid = self.to_grid()
+        grid.cells.flags.writeable = False
+        return grid
 
 
 def _knots(start: float, end: float, spacing: float) -> NDArray[np.float64]:

@@ -88,7 +88,9 @@ def _to_surface(at: Complex, along: Complex, terrain: Terrain) -> NDArray[np.flo
     Returns:
         Ways, shape (n,) [m].
     """
-    height = np.array(terrain.height)
+    if not len(at):
+        return np.zeros(0)
+    height = terrain.heights
     # The ground goes on level at both ends: piece 0 lies before the first knot, the last behind the last.
     slope = np.diff(height, prepend=height[0], append=height[-1]) / terrain.spacing
     last = len(height)
@@ -140,7 +142,7 @@ def above_threshold(record: Columns, threshold: float, terrain: Terrain) -> Colu
 
 def _normal(terrain: Terrain, x: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Return the unit normal of the surface at `x` [m], its components forward and up, shape of `x`."""
-    grid = terrain.to_grid()
+    grid = terrain.grid
     cell = np.clip(np.floor((x - grid.origin) * grid.per_metre), 0, len(grid.cells) - 1).astype(int)
     return grid.cells[cell, 2], grid.cells[cell, 3]
 

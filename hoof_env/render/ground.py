@@ -12,9 +12,9 @@ from numpy.typing import NDArray
 
 from hoof_env.ground.terrain import Terrain
 from hoof_env.render.brush import Brush
-from hoof_env.render.colours import ROUGHER, SLIPPERY, SOFTER, SOIL_LINE, STIFFER, Colour
+from hoof_env.render.colours import SOIL_LINE, Colour
 from hoof_env.render.instant import Instant
-from hoof_env.render.kinds import ALIKE, BODY, SKIN, find_patches, shade
+from hoof_env.render.kinds import ALIKE, BODY, SKIN, find_patches, kinds_of, shade
 
 FLANK_M = 0.09  # how far from the hoof the footprint draws the ground down; the model has no width [m]
 COLUMN = 6  # distance of the places where the surface is drawn [pixels of the usual picture]
@@ -29,6 +29,7 @@ class GroundPainter:
     def __init__(
         self, brush: Brush, terrain: Terrain, size: tuple[int, int], scale: float, clear: float
     ) -> None:
+        self._terrain = terrain
         self._brush, self._size, self._scale, self._clear = brush, size, scale, clear
         self._knots, self._heights = terrain.x, terrain.height_at(terrain.x)
         self._stiffness, self._friction = np.array(terrain.stiffness), np.array(terrain.friction)
@@ -41,15 +42,8 @@ class GroundPainter:
         return np.interp(x, self._knots, self._heights)
 
     def kinds(self) -> list[tuple[str, Colour]]:
-        """Name and colour of every kind of ground in the terrain but the usual."""
-        stiffness, friction = self._stiffness, self._friction
-        all_kinds = (
-            ("stiffer ground", STIFFER, stiffness.max() > 1 + ALIKE),
-            ("softer ground", SOFTER, stiffness.min() < 1 - ALIKE),
-            ("more slippery", SLIPPERY, friction.min() < 1 - ALIKE),
-            ("less slippery", ROUGHER, friction.max() > 1 + ALIKE),
-        )
-        return [(name, colour) for name, colour, there in all_kinds if there]
+        """Return name and colour of every kind of ground in the terrain but the usual."""
+        return kinds_of(self._terrain)
 
     def draw(self, canvas: Any, feet: Sequence[Instant], corner: complex) -> None:
         """Draw the ground under some legs; `corner` is the place in the world of the picture's upper left

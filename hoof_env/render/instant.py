@@ -243,13 +243,14 @@ def ground_at(terrain: Terrain, x: NDArray[np.float64]) -> tuple[NDArray[np.floa
     """Height [m] of the ground at `x` [m] and its unit normal as a complex number, of the piece that a point
     there meets."""
     place = (x - terrain.start) / terrain.spacing
-    last, heights = len(terrain.height) - 1, terrain.height
+    heights = terrain.heights
+    last = len(heights) - 1
     before = np.clip(np.floor(place), -1, last)  # the knot before x; -1 and the last lead to level ground
-    knots = [(max(k, 0), min(k + 1, last)) for k in before.astype(int).tolist()]
-    ends = np.array([(heights[i], heights[j]) for i, j in knots]).reshape(-1, 2)
-    rise = ends[:, 1] - ends[:, 0]
+    knots = before.astype(int)
+    begin = heights[np.maximum(knots, 0)]
+    rise = heights[np.minimum(knots + 1, last)] - begin
     normal = (terrain.spacing * 1j - rise) / np.hypot(terrain.spacing, rise)
-    return ends[:, 0] + np.where(rise != 0, (place - before) * rise, 0.0), normal
+    return begin + np.where(rise != 0, (place - before) * rise, 0.0), normal
 
 
 @np.errstate(invalid="ignore", over="ignore")  # what is not finite is left out later

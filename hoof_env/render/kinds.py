@@ -47,6 +47,19 @@ def find_patches(terrain: Terrain) -> list[Patch]:
     return patches
 
 
+def kinds_of(terrain: Terrain) -> list[tuple[str, Colour]]:
+    """Return name and colour of every kind of ground in the terrain but the usual."""
+    stiffness = np.array(terrain.stiffness)
+    friction = np.array(terrain.friction)
+    all_kinds = (
+        ("stiffer ground", STIFFER, stiffness.max() > 1 + ALIKE),
+        ("softer ground", SOFTER, stiffness.min() < 1 - ALIKE),
+        ("more slippery", SLIPPERY, friction.min() < 1 - ALIKE),
+        ("less slippery", ROUGHER, friction.max() > 1 + ALIKE),
+    )
+    return [(name, colour) for name, colour, there in all_kinds if there]
+
+
 def shade(factor: Any) -> Any:
     """Index of the colour for a factor of stiffness or friction: `SHADES` where it is 1."""
     strength = np.log(np.maximum(factor, 1e-3)) / np.log(STRONG)

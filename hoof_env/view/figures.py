@@ -6,14 +6,15 @@ from collections.abc import Collection, Mapping, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
-from bokeh.models import ColumnDataSource, CustomJSTickFormatter, FixedTicker, Range1d, Span
+from bokeh.models import CDSView, ColumnDataSource, CustomJSTickFormatter, FixedTicker, Range1d, Span
+from bokeh.models.glyphs import HBar, Line, MultiLine, Patches, Scatter, VArea
 from bokeh.plotting import figure
 
 from hoof_env.ground.terrain import Terrain
 from hoof_env.render import colours, kinds
 from hoof_env.render.colours import Colour
 from hoof_env.view.drawing import Drawing
-from hoof_env.view.history import paths_of
+from hoof_env.view.history import path_columns, paths_of
 
 SECONDS = 3.0  # time that curves show [s]
 DEEP = 9.0  # how far below the surface the soil is drawn [m]
@@ -55,7 +56,7 @@ TICKS = (
 """Script of the texts at ticks: thousands as k, and without the digits that rounding errors add."""
 
 
-class Line(NamedTuple):
+class Trace(NamedTuple):
     """A curve: its column, its name in the legend, colour and dash."""
 
     column: str
@@ -118,12 +119,17 @@ class Scene:
         f.min_border_left = 0
         return f
 
+    def _add(self, source: ColumnDataSource, glyph: Any, **more: Any) -> None:
+        """Add a glyph to the figure."""
+        add_glyph(self.figure, source, glyph, **more)
+
     def _paint_ground(self, terrain: Terrain) -> None:
         """Draw the soil, stretches of another kind, and the surface."""
         x = np.concatenate([[terrain.x[0] - 1e4], terrain.x, [terrain.x[-1] + 1e4]])
         height = terrain.height_at(x)
         soil = hex_of(colours.SOIL)
-        self.figure.varea(x=x, y1=height - DEEP, y2=height, fill_color=soil, level="underlay")
+        surface = ColumnDataSource({"x": x, "deep": height - DEEP, "y": height})
+        self._add(surface, VArea(x="x", y1="deep", y2="y", fill_color=soil), level="underlay")
         # In one glyph: hills have hundreds of stretches, of which a browser paints those that are seen.
         shapes: dict[str, list[Any]] = {"xs": [], "ys": [], "fill_color": []}
         for patch in kinds.find_patches(terrain):
@@ -139,8 +145,8 @@ class Scene:
                     shapes["ys"].append(np.concatenate([top, top[::-1] - depth]))
                     shapes["fill_color"].append(hex_of(shade))
         source = ColumnDataSource(shapes)
-        self.figure.patches("xs", "ys", fill_color="fill_color", line_color=None, source=source)
-        self.figure.line(x=x, y=height, line_color=hex_of(colours.SOIL_LINE), line_width=2)
+        self._add(source, Patches(xs="xs", ys="ys", fill_color="fill_color", line_color=None))
+        self._add(surface, Line(x="x", y="y", line_color=hex_of(colours.SOIL_LINE), line_width=2))
 
     def _patches(
         self, name: str, fill: Colour | None, edge: Colour = colours.GREY, alpha: float = 1.0
@@ -148,12 +154,17 @@ class Scene:
         """Draw outlines with their edges behind all of them, or a line where there is nothing to fill."""
         source = self.sources[name]
         if fill is None:
-            self.figure.line("x", "y", source=source, line_color=hex_of(edge), line_width=2)
+            self._add(source, Line(x="x", y="y", line_color=hex_of(edge), line_width=2))
             return
-        rim = {"line_color": hex_of(edge), "line_width": 3.0, "line_join": "round", "line_alpha": alpha}
-        self.figure.patches("xs", "ys", source=source, fill_color=None, **rim)
-        look = {"fill_color": hex_of(fill), "line_color": None, "fill_alpha": alpha}
-        self.figure.patches("xs", "ys", source=source, **look)
+        rim: dict[str, Any] = {
+            "line_color": hex_of(edge),
+            "line_width": 3.0,
+            "line_join": "round",
+            "line_alpha": alpha,
+        }
+        self._add(source, Patches(xs="xs", ys="ys", fill_color=None, **rim))
+        look: dict[str, Any] = {"fill_color": hex_of(fill), "line_color": None, "fill_alpha": alpha}
+        self._add(source, Patches(xs="xs", ys="ys", **look))
 
     def _paint_legs(self, group: str, alpha: float) -> None:
         """Draw flesh, hooves, links and joints of some legs."""
@@ -161,15 +172,15 @@ class Scene:
         hoof = self.sources[f"{group}_hoof"]
         hooves = len(hoof.data["xs"]) // 2
         hoof.data["fill"] = [hex_of(colours.PASTERN), hex_of(colours.HOOF)] * hooves
-        self.figure.patches("xs", "ys", source=hoof, fill_color="fill", line_color=None, fill_alpha=alpha)
+        self._add(hoof, Patches(xs="xs", ys="ys", fill_color="fill", line_color=None, fill_alpha=alpha))
         links = self.sources[f"{group}_links"]
         each = len(links.data["xs"]) // (hooves or 1)
         links.data["line"] = ([hex_of(colours.CRANK)] + [hex_of(colours.LINK)] * (each - 1)) * hooves
         look: dict[str, Any] = {"line_width": LEG_WIDTH, "line_cap": "round", "line_alpha": alpha}
-        self.figure.multi_line("xs", "ys", source=links, line_color="line", **look)
+        self._add(links, MultiLine(xs="xs", ys="ys", line_color="line", **look))
         dots: dict[str, Any] = {"fill_color": "white", "line_color": INK, "line_width": 1.2}
         joints = self.sources[f"{group}_joints"]
-        self.figure.scatter("x", "y", source=joints, size=5.5, fill_alpha=alpha, line_alpha=alpha, **dots)
+        self._add(joints, Scatter(x="x", y="y", size=5.5, fill_alpha=alpha, line_alpha=alpha, **dots))
 
     def _paint_arrows(self) -> None:
         """Draw the forces on toe, heel and whole hoof."""
@@ -177,17 +188,32 @@ class Scene:
         count = len(source.data["xs"]) // 3
         source.data["fill"] = [hex_of(c) for c in (colours.TOE, colours.HEEL, colours.FORCE)] * count
         look: dict[str, Any] = {"line_color": "white", "line_width": 1.0, "line_join": "round"}
-        self.figure.patches("xs", "ys", source=source, fill_color="fill", **look)
+        self._add(source, Patches(xs="xs", ys="ys", fill_color="fill", **look))
 
-    def paint_paths(self) -> ColumnDataSource:
-        """Draw the paths of toe and heel; return their source, whose columns are some of the curves'."""
+    def paint_paths(self, legs: Sequence[str]) -> ColumnDataSource:
+        """Draw the paths of hooves; return their source, whose columns are some of the curves'."""
         has_heel = self.drawing.has_heel
-        source = ColumnDataSource({name: [] for name in paths_of(has_heel)})
-        points = (("toe", colours.TOE), ("heel", colours.HEEL))
-        for point, colour in points if has_heel else points[:1]:
+        source = ColumnDataSource({name: [] for name in path_columns(legs, has_heel)})
+        shades = colours.OF_LEGS if len(legs) > 1 else (colours.TOE, colours.HEEL)
+        for point, colour in zip(paths_of(legs, has_heel), shades, strict=False):
             look: dict[str, Any] = {"line_color": hex_of(colour), "line_width": 1.4, "line_alpha": 0.8}
-            self.figure.line(f"{point}_x", f"{point}_y", source=source, **look)
+            self._add(source, Line(x=f"{point}_x", y=f"{point}_y", **look))
         return source
+
+
+def ground_key(terrain: Terrain) -> list[tuple[str, str]]:
+    """Return names and colours of the kinds of ground that a terrain has, the usual one left out."""
+    return [(name, hex_of(colour)) for name, colour in kinds.kinds_of(terrain)]
+
+
+def add_glyph(f: Any, source: ColumnDataSource, glyph: Any, **more: Any) -> None:
+    """Add a glyph to a figure; glyphs of a source share its view.
+
+    `figure.line` and its like make three glyphs and a view each, and Bokeh goes through all models of a
+    page for each message.
+    """
+    views = {renderer.data_source.id: renderer.view for renderer in f.renderers}
+    f.add_glyph(source, glyph, view=views.get(source.id) or CDSView(), **more)
 
 
 def dress(f: Any) -> None:
@@ -218,7 +244,7 @@ class Curves(NamedTuple):
     """
 
     title: str
-    lines: Sequence[Line]
+    lines: Sequence[Trace]
     figure: Any
     source: ColumnDataSource
     window: Range1d
@@ -226,7 +252,7 @@ class Curves(NamedTuple):
 
 
 def curve_figure(
-    name: str, title: str, lines: Sequence[Line], master: str = "curves", height: int = 200
+    name: str, title: str, lines: Sequence[Trace], master: str = "curves", height: int = 200
 ) -> Curves:
     """Return a figure of curves against time.
 
@@ -254,13 +280,13 @@ def curve_figure(
     f.yaxis.formatter = CustomJSTickFormatter(code=TICKS)
     for line in lines:
         look: dict[str, Any] = {"line_color": hex_of(line.colour), "line_dash": line.dash, "line_width": 1.7}
-        f.line("time", line.column, source=source, **look)
+        add_glyph(f, source, Line(x="time", y=line.column, **look))
     return Curves(title, lines, f, source, window, master)
 
 
 def footfall_figure(legs: Sequence[str]) -> Curves:
     """Return the footfall diagram: a bar for each leg while its hoof stands."""
-    lines = [Line(f"{leg}stance", leg_name(leg), colours.OF_LEGS[k]) for k, leg in enumerate(legs)]
+    lines = [Trace(f"{leg}stance", leg_name(leg), colours.OF_LEGS[k]) for k, leg in enumerate(legs)]
     made = curve_figure("footfall", "footfall", lines)
     f = made.figure
     for renderer in f.renderers:
@@ -287,13 +313,14 @@ def bars_figure(source: ColumnDataSource, terms: Sequence[str]) -> Any:
     )
     dress(f)
     f.min_border_left = 78
-    f.hbar(y="term", right="total", left=0, height=0.7, source=source, fill_color="colour", line_color=None)
+    bar = HBar(y="term", right="total", left=0, height=0.7, fill_color="colour", line_color=None)
+    add_glyph(f, source, bar)
     f.add_layout(Span(location=0, dimension="height", line_color=GREY, line_width=1))
     f.ygrid.visible = False
     return f
 
 
-def line_sets(legs: Sequence[str], columns: Collection[str]) -> Mapping[str, tuple[str, list[Line]]]:
+def line_sets(legs: Sequence[str], columns: Collection[str]) -> Mapping[str, tuple[str, list[Trace]]]:
     """Return the figures of curves by name: title with unit, and lines.
 
     Args:
@@ -302,25 +329,26 @@ def line_sets(legs: Sequence[str], columns: Collection[str]) -> Mapping[str, tup
             angle of the hoof, where there are such columns.
     """
 
-    def each(column: str) -> list[Line]:
+    def each(column: str) -> list[Trace]:
         if len(legs) == 1:
-            return [Line(column, column, colours.INK)]
-        return [Line(f"{leg}{column}", leg_name(leg), colours.OF_LEGS[k]) for k, leg in enumerate(legs)]
+            return [Trace(column, column, colours.INK)]
+        return [Trace(f"{leg}{column}", leg_name(leg), colours.OF_LEGS[k]) for k, leg in enumerate(legs)]
 
     normal = each("normal")
     if "elastic" in columns:
         normal = [
-            Line("elastic", "elastic ground", colours.TOE, "dashed"),
-            Line("inelastic", "inelastic ground", colours.CRANK, "dotted"),
-            Line("normal", "this ground", colours.FORCE),
+            Trace("elastic", "elastic ground", colours.TOE, "dashed"),
+            Trace("inelastic", "inelastic ground", colours.CRANK, "dotted"),
+            Trace("normal", "this ground", colours.FORCE),
         ]
+    sets = {"normal": ("normal force [N]", normal)}
     if len(legs) == 1:
-        forces = [Line("grf", "resultant", colours.FORCE), Line("friction", "friction", colours.TOE)]
+        forces = [Trace("grf", "resultant", colours.FORCE), Trace("friction", "friction", colours.TOE)]
+        sets["forces"] = ("ground reaction force [N]", forces)
     else:
-        forces = each("friction")
-    sets = {
-        "normal": ("normal force [N]", normal),
-        "forces": ("ground reaction force [N]" if len(legs) == 1 else "friction [N]", forces),
+        sets["friction"] = ("friction [N]", each("friction"))
+        sets["forces"] = ("ground reaction force, resultant [N]", each("grf"))
+    sets |= {
         "hoof_angle": ("hoof angle, heel up [deg]", each("hoof_angle")),
         "crank_speed": ("crank speed [rad/s]", each("crank_speed")),
         "torque": ("crank torque [N m]", each("torque")),

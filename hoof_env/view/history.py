@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections import deque
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from typing import Any
 
 import numpy as np
@@ -25,13 +25,25 @@ STANCE = {"peak": "N", "mean": "N", "impulse": "N s", "duty": "-", "loading rate
 part of the last stride in which the hoof stood, steepest rise of the normal force before the peak."""
 
 
-PATHS = ("toe_x", "toe_y", "heel_x", "heel_y")
-"""Columns of a single leg's paths."""
+PATHS = ("toe", "heel")
+"""Points of a single leg that leave paths; of a horse it is the toe of each leg."""
 
 
-def paths_of(has_heel: bool) -> tuple[str, ...]:
-    """Return the columns of a single leg's paths, without those of a heel where it has one foot."""
-    return PATHS if has_heel else PATHS[:2]
+def paths_of(legs: Sequence[str], has_heel: bool) -> tuple[str, ...]:
+    """Return the names of the points that leave paths, each with a column for x and one for y.
+
+    Args:
+        legs: prefixes of the legs.
+        has_heel: False for legs with one foot.
+    """
+    if len(legs) > 1:
+        return tuple(f"{leg}toe" for leg in legs)
+    return PATHS if has_heel else PATHS[:1]
+
+
+def path_columns(legs: Sequence[str], has_heel: bool) -> tuple[str, ...]:
+    """Return the columns of `paths_of` the same legs."""
+    return tuple(f"{point}_{axis}" for point in paths_of(legs, has_heel) for axis in "xy")
 
 
 def curves_of(
@@ -63,8 +75,7 @@ def curves_of(
             rise = columns[f"{leg}heel_y"] - columns[f"{leg}toe_y"]
             run = columns[f"{leg}toe_x"] - columns[f"{leg}heel_x"]
             curves[f"{leg}hoof_angle"] = np.degrees(np.arctan2(rise, run))
-    if len(legs) == 1:
-        curves |= {name: columns[name] for name in paths_of(has_heel)}
+    curves |= {name: columns[name] for name in path_columns(legs, has_heel)}
     return curves | chunk.normals
 
 
@@ -113,7 +124,7 @@ class StanceNumbers:
 
 
 class History:
-    """Curves and rows that a page can show again; what is older than `KEPT` is dropped."""
+    """Curves, rewards and rows that a page can show again; what is older than `KEPT` is dropped."""
 
     def __init__(self) -> None:
         self.clear()
@@ -121,6 +132,7 @@ class History:
     def clear(self) -> None:
         """Drop everything."""
         self._curves: deque[Columns] = deque()
+        self._steps: deque[Columns] = deque()
         self._rows: deque[NDArray[np.float32]] = deque()
 
     def add_curves(self, curves: Columns) -> None:
@@ -128,6 +140,11 @@ class History:
         if len(curves["time"]):
             self._curves.append(curves)
             self._drop(curves["time"][-1] - KEPT)
+
+    def add_steps(self, steps: Columns) -> None:
+        """Keep terms of the reward of control steps."""
+        if len(steps["time"]):
+            self._steps.append(steps)
 
     def add_row(self, row: NDArray[np.float64]) -> None:
         """Keep a row, unless the last one is not a hundredth of a second older."""
@@ -138,6 +155,8 @@ class History:
         """Drop what is older than a time [s]."""
         while self._curves[0]["time"][-1] < before:
             self._curves.popleft()
+        while self._steps and self._steps[0]["time"][-1] < before:
+            self._steps.popleft()
         while self._rows and self._rows[0][0] < before:
             self._rows.popleft()
 
@@ -152,15 +171,24 @@ class History:
 
     def curves_between(self, first: float, last: float) -> Columns:
         """Return the curves from one time to another [s]."""
-        parts = [part for part in self._curves if part["time"][-1] >= first and part["time"][0] <= last]
-        if not parts:
-            return {}
-        whole = {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
-        inside = (whole["time"] >= first) & (whole["time"] <= last)
-        return {name: values[inside] for name, values in whole.items()}
+        return between(self._curves, first, last)
+
+    def steps_between(self, first: float, last: float) -> Columns:
+        """Return the terms of the reward from one time to another [s]."""
+        return between(self._steps, first, last)
 
     @property
     def size(self) -> int:
         """Numbers in memory."""
-        curves = sum(len(part) * len(part["time"]) for part in self._curves)
-        return curves + sum(len(row) for row in self._rows)
+        columns = sum(len(part) * len(part["time"]) for part in (*self._curves, *self._steps))
+        return columns + sum(len(row) for row in self._rows)
+
+
+def between(parts: Iterable[Columns], first: float, last: float) -> Columns:
+    """Return the rows of parts from one time to another [s], {} if there is none."""
+    near = [part for part in parts if part["time"][-1] >= first and part["time"][0] <= last]
+    if not near:
+        return {}
+    whole = {name: np.concatenate([part[name] for part in near]) for name in near[0]}
+    inside = (whole["time"] >= first) & (whole["time"] <= last)
+    return {name: values[inside] for name, values in whole.items()}

@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from bokeh.document import Document
 from bokeh.embed import file_html
-from bokeh.models import ColumnDataSource, CustomJS, Span
+from bokeh.models import CDSView, ColumnDataSource, CustomJS, Span
 from bokeh.resources import INLINE
 from numpy.typing import NDArray
 
@@ -31,7 +31,7 @@ SHADES: tuple[Colour, ...] = (colours.FORCE, colours.TOE, colours.CRANK, colours
 ROWS = 50.0  # rows of the scene a second [1/s]
 SHOWN = {"normal": "normal force [N]", "friction": "friction [N]", "torque": "crank torque [N m]"}
 """Titles of the curves of a page with several records, by column."""
-OF_ONE = ("normal", "forces", "hoof_angle", "crank_speed", "torque", "power")
+OF_ONE = ("normal", "friction", "forces", "hoof_angle", "crank_speed", "torque", "power")
 """Figures of a page of one record."""
 
 
@@ -129,9 +129,8 @@ class Playback:
                 record.player.drawing, record.player.simulation.setting.terrain, f"scene_{k}"
             )
             parts = scene_arguments(scene, record.player)
-            if parts["paths"] is not None:
-                paths = parts["paths"]
-                paths.data = {name: record.curves[name] for name in paths.data}
+            paths = parts["paths"]
+            paths.data = {name: record.curves[name] for name in paths.data}
             data = ColumnDataSource({"row": np.ascontiguousarray(record.rows).ravel()})
             views.append({"parts": parts, "rows": data, "count": len(record.rows)})
             doc.add_root(scene.figure)
@@ -169,7 +168,7 @@ class Playback:
         sets = figures.line_sets(record.player.legs, record.curves)
         shown = [figures.curve_figure(name, *sets[name]) for name in OF_ONE if name in sets]
         if len(record.player.legs) > 1:
-            shown = shown[:3]
+            shown = shown[:4]
             shown.append(figures.footfall_figure(record.player.legs))
         for each in shown:
             each.source.data = {name: record.curves[name] for name in each.source.data}
@@ -185,13 +184,13 @@ class Playback:
         for column, title in SHOWN.items():
             for k, (group, records) in enumerate(groups.items()):
                 lines = [
-                    figures.Line(str(i), record.label, SHADES[i % len(SHADES)])
+                    figures.Trace(str(i), record.label, SHADES[i % len(SHADES)])
                     for i, record in enumerate(records)
                 ]
                 made = figures.curve_figure(f"{column}_{k}", f"{group}: {title}", lines)
                 for line, renderer, record in zip(lines, made.figure.renderers, records, strict=True):
                     data = {"time": record.curves["time"], line.column: record.curves[column]}
-                    renderer.data_source = ColumnDataSource(data)
+                    renderer.update(data_source=ColumnDataSource(data), view=CDSView())
                 shown.append(made)
         return shown
 

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from hoof_env import records
 from hoof_env.render.instant import Columns
 from hoof_env.view.drawing import drawing_of, legs_of
-from hoof_env.view.history import PATHS, STANCE, History, StanceNumbers, curves_of, thinned
+from hoof_env.view.history import STANCE, History, StanceNumbers, curves_of, path_columns, thinned
 from hoof_env.view.recording import Recording
 from hoof_env.view.simulation import Chunk, Simulation
 
@@ -127,7 +127,8 @@ class Player:
         curves = curves_of(chunk, self.legs, lift_off, self._base, self.drawing.has_heel)
         if not chunk.terms and self._base:
             # The start of a further episode is not joined to the end of the last one.
-            curves |= {name: np.full(len(curves["time"]), np.nan) for name in PATHS if name in curves}
+            gap = np.full(len(curves["time"]), np.nan)
+            curves |= dict.fromkeys(path_columns(self.legs, self.drawing.has_heel), gap)
         self._waiting.append((chunk.columns, curves))
         if self.recording is not None:
             self.recording.add(chunk)
@@ -170,11 +171,14 @@ class Player:
         self.history.add_curves(drawn)
         return drawn
 
-    def steps(self) -> dict[str, list[float]]:
-        """Return times and terms of the control steps that are new since the last call, by name."""
+    def steps(self) -> Columns:
+        """Return times and terms of the control steps that are new since the last call, and keep them."""
         steps = self._steps
         self._steps = []
-        return {name: [step[name] for step in steps] for name in ("time", *self.simulation.terms)}
+        names = ("time", *self.simulation.terms)
+        news = {name: np.array([step[name] for step in steps]) for name in names}
+        self.history.add_steps(news)
+        return news
 
     def row(self) -> NDArray[np.float64]:
         """Return the row of the present instant, and keep it."""

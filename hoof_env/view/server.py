@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import errno
+import logging
 import os
 import secrets
 import socket
@@ -161,6 +162,8 @@ def view(
         "seed": seed,
     }
     server, url = start(setup, address, port, out)
+    # A tab that is closed would be told in a line for each message that was under way to it.
+    logging.getLogger("bokeh.server.views.ws").setLevel(logging.ERROR)
     if address not in HERE:
         print(
             f"hoof-env view: warning: all who reach {address} can use this page, load files and write"

@@ -3,17 +3,17 @@
 from __future__ import annotations
 
 import json
+import math
 import time
 import warnings
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from bokeh.models import ColumnDataSource
-
 from hoof_env.errors import HoofEnvError, ParameterError, check_number, parse_pairs
 from hoof_env.view import controls, figures, layout
 from hoof_env.view.layout import SPEEDS
+from hoof_env.view.news import News
 from hoof_env.view.player import Player
 from hoof_env.view.recording import Recording
 from hoof_env.view.simulation import Simulation
@@ -21,8 +21,6 @@ from hoof_env.view.simulation import Simulation
 TICK = 1 / 30  # time between two states that are sent [s]
 CURVES_EVERY = 2  # states between two pieces of the curves
 LONGEST_TICK = 0.1  # time of which a late tick makes up [s]
-POINTS = round(1.15 * figures.SECONDS / 0.002)  # of a curve that the browser keeps
-STEPS = 2000  # of the reward that the browser keeps
 
 Setup = dict[str, Any]
 """Arguments of `Simulation`, by name."""
@@ -56,11 +54,9 @@ class Tab:
         self.speed = 1.0
         self._ticks = 0
         self._last = time.monotonic()
-        self.told = ColumnDataSource({"message": ["{}"]})
-        self.asked = ColumnDataSource({"message": ["{}"]})
         self.look = layout.new_look(self.player)
-        layout.fill(doc, self.look, self.told, self.asked)
-        self.asked.on_change("data", self._on_asked)
+        layout.fill(doc, self.look)
+        self.look.asked.on_change("data", self._on_asked)
         doc.on_session_destroyed(lambda _: self.close())
         doc.add_periodic_callback(self._tick, round(1000 * TICK))
 
@@ -93,29 +89,34 @@ class Tab:
             if self.player.recording is not None:
                 self._stop_recording()
 
-    def _send(self, is_last: bool = False) -> None:
-        """Send row, curves and totals of the present instant; curves with every other state and the last."""
+    def _send(self) -> None:
+        """Send row and totals of the present instant, and curves with every other state."""
         self._ticks += 1
-        self.look.frame.data = {"row": self.player.row()}
-        if not is_last and self._ticks % CURVES_EVERY:
-            return
-        drawn = self.player.curves()
-        if drawn:
-            self.look.curves.stream(drawn, POINTS)
-        steps = self.player.steps()
-        if steps["time"]:
-            self.look.steps.stream(steps, STEPS)
-        self.look.bars.patch({"total": [(slice(None), [*self.player.totals.values()])]})
+        player = self.player
+        row = player.row()
+        if self._ticks % CURVES_EVERY:
+            self._put(News(row, {}, {}, player.totals.values()))
+        else:
+            self._put(News(row, player.curves(), player.steps(), player.totals.values()))
+
+    def _put(self, news: News) -> None:
+        """Send news, and end a recording that is full."""
+        self.look.news.data = {"numbers": news.packed()}
         if self.player.recording is not None and self.player.recording.is_full:
             self._stop_recording()
 
-    def _send_anew(self) -> None:
-        """Send all that is shown at present, after a jump in time."""
-        self.player.curves()
-        shown = self.player.shown
-        drawn = self.player.history.curves_between(shown - figures.SECONDS, shown)
-        if drawn:
-            self.look.curves.data = drawn
+    def _send_anew(self, row: Any = None) -> None:
+        """Send all that is shown at the time of a row, by default at present, after a jump in time."""
+        player = self.player
+        player.curves()
+        player.steps()
+        # Steps that are simulated already count at present, although their substeps are not shown yet.
+        end = math.inf if row is None else float(row[0]) + 1e-6
+        row = player.row() if row is None else row
+        window = (float(row[0]) - figures.SECONDS, end)
+        curves = player.history.curves_between(*window)
+        steps = player.history.steps_between(*window)
+        self._put(News(row, curves, steps, player.totals.values(), anew=True))
 
     # Requests
 
@@ -140,7 +141,11 @@ class Tab:
 
     def _tell(self, **message: Any) -> None:
         """Send a message to the page."""
-        self.told.data = {"message": [json.dumps({"kind": "note"} | message | {"at": time.monotonic()})]}
+        self.look.told.data = {"message": [json.dumps({"kind": "note"} | message | {"at": time.monotonic()})]}
+
+    def show(self) -> None:
+        """Send all that is shown, as a page asks that has just opened."""
+        self._send_anew()
 
     def play(self, value: bool | None = None) -> None:
         """Play or pause; None for the other of both."""
@@ -152,9 +157,8 @@ class Tab:
     def step(self) -> None:
         """Take one control step, and pause."""
         self.playing = False
-        self._send_anew()
         self._say_end(self.player.step())
-        self._send(is_last=True)
+        self._send_anew()
         self._tell(playing=False, span=self.player.history.span)
 
     def reset(self, seed: Any = None, policy: str | None = None) -> None:
@@ -166,9 +170,7 @@ class Tab:
         if self.player.recording is not None:
             self._stop_recording()
         self.player.reset(chunk)
-        self.look.steps.data = self.player.steps()
         self._send_anew()
-        self._send(is_last=True)
         text = " ".join(str(one.message) for one in said)
         text = text or f"Seed {self.player.simulation.seed}."
         is_driven = self.player.simulation.hand is not None
@@ -184,11 +186,7 @@ class Tab:
         row = self.player.history.row_at(min(max(check_number("time", value), first), last))
         self.playing = False
         if row is not None:
-            at = float(row[0])
-            drawn = self.player.history.curves_between(at - figures.SECONDS, at + 1e-6)
-            if drawn:
-                self.look.curves.data = drawn
-            self.look.frame.data = {"row": row.astype(float)}
+            self._send_anew(row)
         self._tell(playing=False, span=(first, last))
 
     def touch(self, setting: str, value: Any) -> None:
@@ -279,6 +277,7 @@ class Tab:
 
 
 HANDLERS: dict[str, Callable[..., None]] = {
+    "show": Tab.show,
     "play": Tab.play,
     "step": Tab.step,
     "reset": Tab.reset,

@@ -15,8 +15,36 @@ const all = (what) => [...document.querySelectorAll(what)]
 
 // States
 
+const masters = {
+  curves: new GrowingColumns(names.curves, most.curves),
+  steps: new GrowingColumns(names.steps, most.steps),
+}
+let row = new Float64Array(names.row)
+let totals = []
+
+// The order of numbers is that of `News.packed`.
+function take() {
+  const numbers = Float64Array.from(news.data.numbers)
+  const [anew, ...counts] = numbers.subarray(0, 3)
+  let at = 3
+  const next = (length) => {
+    at += length
+    return numbers.subarray(at - length, at)
+  }
+  row = next(names.row)
+  Object.values(masters).forEach((master, k) => {
+    if (anew) {
+      master.clear()
+    }
+    master.add(next(master.names.length * counts[k]), counts[k])
+  })
+  totals = numbers.subarray(at)
+  if (anew || counts[0] > 0) {
+    queue_curves()
+  }
+}
+
 function show_frame() {
-  const {row} = frame.data
   view.show(row)
   const scrub = find("[data-ask=back]")
   if (going) {
@@ -30,8 +58,9 @@ function show_frame() {
 // States that come faster than the browser paints are not drawn: the last one is.
 let is_new = false
 
-frame.connect(frame.properties.data.change, () => {
+news.connect(news.properties.data.change, () => {
   is_new = true
+  take()
   document.body.dataset.states = String(Number(document.body.dataset.states ?? 0) + 1)
 })
 
@@ -40,26 +69,24 @@ const turns = []
 
 function refresh({source, window: range, master}) {
   const {data} = masters[master]
-  const end = Math.max(masters.curves.data.time.at(-1) ?? 0, seconds)
+  const end = Math.max(masters.curves.last_time ?? 0, seconds)
   // Bokeh warns of axes without data, as after the start of an episode.
   const columns = Object.keys(source.data).map((name) => [name, data[name].length > 0 ? data[name] : [0]])
-  // A full column is shifted in place, which would look the same.
+  // Columns are views of numbers that change in place, which would look the same.
   source.setv({data: Object.fromEntries(columns)}, {sync: false, check_eq: false})
   range.setv({start: end - seconds, end}, hidden)
 }
 
+const refreshes = shown.map((figure) => () => refresh(figure))
+refreshes.push(() => view.trace(masters.curves.data))
+refreshes.push(() => bars.setv({data: {...bars.data, total: [...totals]}}, hidden))
+
 function queue_curves() {
-  view.trace(masters.curves.data)
-  for (const figure of shown) {
-    if (!turns.includes(figure)) {
-      turns.push(figure)
+  for (const act of refreshes) {
+    if (!turns.includes(act)) {
+      turns.push(act)
     }
   }
-}
-
-for (const master of Object.values(masters)) {
-  master.connect(master.streaming, queue_curves)
-  master.connect(master.properties.data.change, queue_curves)
 }
 
 // Messages
@@ -133,6 +160,9 @@ for (const input of all("input[type=range][data-ask]")) {
   const more = input.dataset.name != null ? {setting: input.dataset.name} : {}
   const send = throttled(() => ask(input.dataset.ask, {...more, value: value_of(input)}))
   input.addEventListener("input", () => {
+    if (input.dataset.ask == "back") {
+      going = false  // at once, or states that are under way would move the slider under the hand
+    }
     write_output(input)
     if (input.dataset.late == null) {
       send()
@@ -194,11 +224,13 @@ const count = () => {
     show_frame()
   }
   if (turns.length > 0) {
-    refresh(turns.shift())
+    turns.shift()()
   }
   requestAnimationFrame(count)
 }
+take()
 requestAnimationFrame(count)
 show_frame()
-queue_curves()
+// Numbers that came while the page was made are not there yet.
+ask("show")
 document.body.dataset.ready = "true"

@@ -43,9 +43,6 @@ class SceneView {
   // Paths of toe and heel in the last second of the curves.
   trace(curves) {
     const {paths} = this.parts
-    if (paths == null) {
-      return
-    }
     const end = curves.time.at(-1)
     const start = curves.time.findLastIndex((time) => time < end - 1) + 1
     const last = Object.keys(paths.data).map((name) => [name, curves[name].slice(start)])
