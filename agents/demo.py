@@ -29,7 +29,7 @@ from hoof_env.errors import check_number
 from hoof_env.film import render_episode
 from hoof_env.paper.report import format_error, format_number
 from hoof_env.paper.reproduce import GAITS, SOLVERS, reproduce, write_reproduction
-from hoof_env.paper.rows import Reproduction, counted
+from hoof_env.paper.rows import OURS, REPORTED, Reproduction, counted
 
 ENV_ID = "hoof_env/HorseLeg-v0"
 FIXED_ID = "hoof_env/HorseLegFixed-v0"
@@ -37,7 +37,18 @@ TRAINED = "trained agent"
 OPEN_LOOP = "open-loop"
 SCRIPTED = ("walk", "run", OPEN_LOOP, "idle", "random", "bang-bang")
 FIRST_SEED = 1000  # first of the scored episodes; training starts its own from another seed
-SLOW = 4  # how many times slower than life the films of the fixed trunk play
+BETTER = {
+    "distance_m": 1,
+    "highest_grf_n": -1,
+    "stance_peak_n": -1,
+    "weight_share": 1,
+    "cost_of_transport": -1,
+    "failed": -1,
+    "loading_rate_n_s": -1,
+}
+"""Figures of an episode: 1 where more is better, -1 where less is."""
+
+SLOW = 4  # factor of the slow motion in which the films of the fixed trunk play
 
 
 @dataclass(frozen=True)
@@ -177,7 +188,7 @@ def film_all(scores: Sequence[evaluate.Score], budget: Budget, stage: Path) -> l
         path = stage / f"{gait}-fixed.mp4"
         seconds = min(1.0, budget.film_seconds)
         render_episode(path, gait, FIXED_ID, (f"gait={gait}",), seconds=seconds, slow=SLOW, size=size)
-        caption = f"one cycle of 1 s as in the paper, {SLOW} times slower than life"
+        caption = f"one cycle of 1 s as in the paper, in slow motion, {SLOW} x"
         title = f"{gait.capitalize()}, fixed trunk"
         clips.append({"title": title, "caption": caption, "film": data_uri(path)})
         say(f"filmed {gait} on a fixed trunk")
@@ -224,6 +235,9 @@ def render(
         episodes=episodes,
         seeds=(FIRST_SEED, FIRST_SEED + episodes - 1),
         by_policy={score.policy: score.estimates for score in scores},
+        reported=REPORTED,
+        ours=[shape["claim"] for shape in reproduction.shapes if shape["claim"].startswith(OURS)],
+        worse=worse(agent, next(score for score in gaits if score.policy == "run")),
         agent=agent.policy,
         open_loop=OPEN_LOOP,
         gaits=[score.policy for score in gaits],
@@ -234,6 +248,18 @@ def render(
         command=runs.command(),
         versions=runs.versions(),
     )
+
+
+def worse(agent: evaluate.Score, run: evaluate.Score) -> list[str]:
+    """Return the figures of an agent that are worse than those of a gait, both in words."""
+    found = []
+    for key, sense in BETTER.items():
+        if key in agent.estimates and key in run.estimates:
+            own, other = agent.estimates[key], run.estimates[key]
+            if sense * own.mean < sense * other.mean:
+                title = evaluate.METRICS[key].title.replace("\n", " ")
+                found.append(f"{title} {evaluate.cell(key, own)[0]} against {evaluate.cell(key, other)[0]}")
+    return found
 
 
 def data_uri(path: Path) -> str:

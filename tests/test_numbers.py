@@ -56,6 +56,8 @@ def score(policy_id: str, policy: str, figure: str) -> float:
         return found["distance_m"] / 10.0  # no episode failed, and each lasts 10 s
     if figure == "peak_kn":
         return found["stance_peak_n"] / 1000.0
+    if figure == "loading_kn_s":
+        return found["loading_rate_n_s"] / 1000.0
     return found[figure]
 
 

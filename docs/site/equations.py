@@ -36,6 +36,8 @@ def draw(tex: str, block: bool) -> str:
     height = float(size["height"]) / SIZE
     top = float(size["viewBox"].split()[1]) / SIZE
     place = f'style="width:{width:.3f}em;height:{height:.3f}em;vertical-align:{-(height + top):.3f}em"'
+    # A tenth of a pixel is finer than a screen.
+    svg = re.sub(r"(?<=[ -])-?\d+\.\d{2,}", lambda found: f"{float(found.group()):.1f}", svg)
     drawn = re.sub(r"<svg ([^>]*?)width=\S+ height=\S+", rf'<svg aria-hidden="true" {place} \1', svg, count=1)
     spoken = convert(tex, display="block" if block else "inline")
     return f'{drawn}<span class="spoken">{spoken}</span>'

@@ -168,17 +168,29 @@ def page_of(id: str) -> str:
     return Markdown(page(ids[check_choice("id", id, ids)]))
 
 
-def index() -> str:
-    """Write the page with the table of all ids, in Markdown."""
+def index(scores: Mapping[str, Mapping[str, float]] | None = None) -> str:
+    """Write the page that says which id is for what, in Markdown.
+
+    Args:
+        scores: mean returns of policies by name of the page, with the names of `SCORED`; None for no returns.
+    """
     rows = []
     for task, name in _NAMES.items():
         definition = TASKS.get(task, TASKS["leg"])
-        native = "yes" if task in TASKS else "no"
         summary = definition.summary if task in TASKS else str(HorseLegMOEnv.__doc__).splitlines()[0]
         link = f"[`hoof_env/{name}-v0`]({name}.md)"
-        actions = str(len(_actions(definition, definition.body(definition.settings({})))))
-        rows.append((link, summary, actions, str(len(_observed(definition))), definition.reference, native))
-    head = ("id", "what it is", "action", "observation", "reference gait", "native vector environment")
+        actions = _actions(definition, definition.body(definition.settings({})))
+        sizes = f"{len(actions)}, {len(_observed(definition))}"
+        found = (scores or {}).get(name, {})
+        returns = ", ".join(f"{found[policy]:.3g}" for policy in reversed(SCORED) if policy in found)
+        rows.append((link, summary, TABLES["uses"].get(task, ""), sizes, returns))
+    head = (
+        "id",
+        "what it is",
+        "use it for",
+        "actions, observations",
+        "returns: scripted, open loop, shipped",
+    )
     return Template(WORDS["index"]).substitute(table=markdown_table(head, rows))
 
 
@@ -198,10 +210,15 @@ def write_pages(out: Path, films: Path | None = None) -> list[Path]:
         OutputError: the folder cannot be written.
     """
     whole = {}
+    returns = {}
     for task, name in _NAMES.items():
-        policy = None if films is None else _find_policy(films, name)
-        film = "" if policy is None else Path(os.path.relpath(policy / "film.gif", out)).as_posix()
-        whole[name] = page(task, film, _score(policy) if policy else "")
+        if films is None:
+            whole[name] = page(task)
+            continue
+        policy = _find_policy(films, name)
+        returns[name] = _returns(policy)
+        film = Path(os.path.relpath(policy / "film.gif", out)).as_posix()
+        whole[name] = page(task, film, _score(returns[name]))
     usual = whole[COMMON]
     texts = {"common.md": WORDS["common"].lstrip() + shared_sections(usual)}
     for name, text in whole.items():
@@ -211,7 +228,7 @@ def write_pages(out: Path, films: Path | None = None) -> list[Path]:
         if name == COMMON:
             del others[COMMON]
         texts[f"{name}.md"] = without_common(text, others)
-    texts["README.md"] = index()
+    texts["README.md"] = index(returns)
     try:
         out.mkdir(parents=True, exist_ok=True)
         for name, text in texts.items():
@@ -253,23 +270,24 @@ def _find_policy(films: Path, name: str) -> Path:
     raise DataFileError(f"films {films}: expected {name}-v0/film.gif, as agents.ship writes it, found none")
 
 
-def _score(policy: Path) -> str:
-    """Write the sentence that says which returns are good.
+def _returns(policy: Path) -> dict[str, float]:
+    """Read the mean returns of a policy that ships and of gaits in the same episodes.
 
     Raises:
         DataFileError: the policy has no scores.
     """
     path = policy / "score.json"
     try:
-        scores = json.loads(path.read_text(encoding="utf-8"))
-        first, last = scores["seeds"]
-        means = {name: values["mean"]["return"] for name, values in scores["policies"].items()}
+        policies = json.loads(path.read_text(encoding="utf-8"))["policies"]
+        return {name: policies[name]["mean"]["return"] for name in SCORED if name in policies}
     except (OSError, ValueError, KeyError, TypeError) as error:
         raise DataFileError(f"scores {path}: expected those that agents.ship writes: {error!r}") from None
-    shown = [f"{SCORED[name]} {means[name]:.3g}" for name in SCORED if name in means]
-    return Template(WORDS["score"].strip()).substitute(
-        returns=", ".join(shown), count=str(last - first), id=str(scores["env_id"])
-    )
+
+
+def _score(returns: Mapping[str, float]) -> str:
+    """Write the sentence that says which returns are good."""
+    shown = ", ".join(f"{SCORED[name]} {value:.3g}" for name, value in returns.items())
+    return Template(WORDS["score"].strip()).substitute(returns=shown)
 
 
 def _film(name: str, kind: str, film: str) -> str:
