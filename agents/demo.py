@@ -255,7 +255,8 @@ def worse(agent: evaluate.Score, run: evaluate.Score) -> list[str]:
     found = []
     for key, sense in BETTER.items():
         if key in agent.estimates and key in run.estimates:
-            own, other = agent.estimates[key], run.estimates[key]
+            own = agent.estimates[key]
+            other = run.estimates[key]
             if sense * own.mean < sense * other.mean:
                 title = evaluate.METRICS[key].title.replace("\n", " ")
                 found.append(f"{title} {evaluate.cell(key, own)[0]} against {evaluate.cell(key, other)[0]}")
