@@ -84,11 +84,6 @@ def write(args: Args) -> Path:
         ParameterError: a policy, an id or a number does not fit.
         MissingExtraError: Minari is not installed.
     """
-    try:
-        import minari
-        import minari.data_collector  # which asks for more than reading does
-    except ImportError:
-        raise MissingExtraError('agents.dataset needs Minari: pip install "hoof-env[minari]"') from None
     # All arguments are checked before Minari makes a folder
     _check_policies(args.policies)
     episodes = count("episodes", args.episodes)
@@ -96,6 +91,11 @@ def write(args: Args) -> Path:
     folder = args.out / dataset_id
     if folder.exists():
         raise OutputError(f"{folder}: expected no dataset there; choose another --dataset-id or --out")
+    try:
+        import minari
+        import minari.data_collector  # which asks for more than reading does
+    except ImportError:
+        raise MissingExtraError('agents.dataset needs Minari: pip install "hoof-env[minari]"') from None
     args.out.mkdir(parents=True, exist_ok=True)
     kwargs = parse_pairs("--env-kwargs", args.env_kwargs)
     # Minari finds its folder by the environment alone

@@ -143,11 +143,12 @@ class Objective:
 
     def __init__(self, env_id: str, env_kwargs: dict[str, Any], family: str) -> None:
         self.leg: Any = runs.make_env(env_id, **env_kwargs).unwrapped
+        # Before many are made, whose kernels would have to be compiled
+        if hasattr(self.leg, "action_form") and self.leg.action_form != "rates":
+            raise ParameterError(f"env_id: expected an id of one leg, got {env_id!r}")
         envs = make_rows(env_id, ROWS, **env_kwargs)
         if envs is None:
             raise ParameterError(f"env_id: expected an id of this package with many at once, got {env_id!r}")
-        if envs.action_form != "rates":
-            raise ParameterError(f"env_id: expected an id of one leg, got {env_id!r}")
         self.envs = envs
         self.spent = 0
         self.family = family

@@ -47,7 +47,7 @@ from agents.statistics import (
     over_episodes,
 )
 from hoof_env.envs.policies import open_loop
-from hoof_env.errors import DataFileError, ParameterError
+from hoof_env.errors import DataFileError
 from tests.agents.conftest import SHORT, TINY
 
 # The plan
@@ -70,14 +70,6 @@ def test_no_training_starts_from_a_scored_seed_or_shares_a_folder(plan):
     for one in every:
         rows = load_settings(FOLDER / f"{one.entry.algo}.yml", one.entry.env_id)["n_envs"]
         assert one.seed + rows <= CURVE_SEEDS.start < CURVE_SEEDS.stop <= FINAL_SEEDS.start
-
-
-def test_a_plan_that_is_none(tmp_path, monkeypatch):
-    monkeypatch.setattr(baselines_run, "PLANS", tmp_path)
-    for text in ("- {algo: ppo}", "3", "- {"):
-        (tmp_path / "full.yml").write_text(text)
-        with pytest.raises(DataFileError, match=r"full\.yml: expected a list of entries"):
-            load_plan("full")
 
 
 def test_a_training_is_told_its_arguments_as_the_command_takes_them():
@@ -207,11 +199,6 @@ def test_an_interrupt_ends_what_runs(tmp_path, monkeypatch):
     assert time.monotonic() - began < 30
     assert len(alive) == 2
     assert all(process.poll() is not None for process in alive)
-
-
-def test_a_name_that_nothing_has(tmp_path):
-    with pytest.raises(ParameterError, match="gallop"):
-        baselines.train_all(baselines.Args(only=("gallop",), out=tmp_path))
 
 
 # Statistics
@@ -411,8 +398,3 @@ def test_what_the_plan_does_not_ask_for_is_not_shown(page, tmp_path):
     (folder / FINAL).write_text(json.dumps({**final, "env_kwargs": {"friction": 0.1}}))
     with pytest.raises(DataFileError, match=r"-s1: expected .*'friction': None.*got .*0.1"):
         read_results(SMALL, tmp_path / "runs")
-
-
-def test_nothing_done(tmp_path):
-    with pytest.raises(DataFileError, match="found none"):
-        read_results(SMALL, tmp_path)

@@ -7,9 +7,6 @@ import sys
 
 import pytest
 
-from agents import command
-from hoof_env.errors import ParameterError
-
 
 @pytest.mark.parametrize(
     ("given", "expected"),
@@ -23,11 +20,3 @@ def test_commands_take_one_thread_and_let_others_work_unless_the_user_says_so(gi
     ours = {k: v for k, v in os.environ.items() if not k.startswith(("OMP_", "MKL_", "KMP_", "GOMP_"))}
     said = subprocess.check_output([sys.executable, "-c", code], env=ours | given, text=True, timeout=120)
     assert said.strip() == expected
-
-
-def test_more_threads_than_this_process_has_cores_are_refused(monkeypatch):
-    monkeypatch.setattr(os, "sched_getaffinity", lambda pid: {3, 5}, raising=False)
-    command.check_threads(2)
-    for threads in (0, 3):
-        with pytest.raises(ParameterError, match=rf"torch_threads: expected .* \[1, 2\], got {threads}"):
-            command.check_threads(threads)

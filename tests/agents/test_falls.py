@@ -3,7 +3,6 @@
 import pytest
 
 from agents import falls
-from hoof_env.errors import ParameterError
 from hoof_env.tasks.disturbances import ROUGH_PUSH, ROUGH_SLOPE, ROUGHNESS, rough_ground
 from hoof_env.tasks.parameters import make_terrain
 
@@ -30,8 +29,3 @@ def test_strengths_are_in_units(strength):
     low, high = settings["push_impulse"]
     assert settings["strength"] * high / 100.0 == pytest.approx(ROUGH_PUSH * strength)
     assert low == -high
-
-
-def test_what_cannot_be_is_refused():
-    with pytest.raises(ParameterError, match="--strengths"):
-        falls.main(["--strengths", "11"])

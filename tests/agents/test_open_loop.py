@@ -1,7 +1,6 @@
 """CMA-ES over open-loop gaits: it finds what is known, files are whole, searches go on where they ended."""
 
 import json
-import sys
 import warnings
 from dataclasses import replace
 
@@ -15,7 +14,7 @@ from agents.score import find_policy, play, score_vector
 from hoof_env import records
 from hoof_env.envs import policies
 from hoof_env.envs.policies import GAITS, load_open_loop, open_loop_record
-from hoof_env.errors import DataFileError, HoofEnvError, ParameterError
+from hoof_env.errors import DataFileError
 from hoof_env.tasks.observation import HIGH, LOW
 from tests.agents.conftest import ENV_ID, KWARGS, SHORT
 
@@ -169,29 +168,6 @@ def test_the_command_prints_scores(tmp_path, capsys):
     printed = capsys.readouterr().out
     assert "stance_peak_n" in printed
     assert str(out) in printed
-
-
-@pytest.mark.parametrize(
-    ("changes", "message"),
-    [
-        ({"restarts": 0}, "restarts"), ({"episodes": 10}, "episodes"),
-        ({"test_episodes": 1}, "test_episodes"),
-        ({"env_id": "hoof_env/Cow-v0"}, "Cow"),
-        ({"env_id": "Pendulum-v1", "env_kwargs": ()}, "many at once"),
-        ({"env_id": "hoof_env/Horse-v0"}, "expected an id of one leg, got 'hoof_env/Horse-v0'"),
-        ({"env_kwargs": ('observation=["crank"]',)}, "'gait' among the observed groups"),
-    ],
-)  # fmt: skip
-def test_bad_input(tmp_path, changes, message):
-    with pytest.raises(ParameterError, match=message):
-        optimise(arguments(tmp_path, **changes))
-    assert not (tmp_path / "gait.json").exists()
-
-
-def test_without_cma_the_command_that_brings_it_is_named(tmp_path, monkeypatch):
-    monkeypatch.setitem(sys.modules, "cma", None)
-    with pytest.raises(HoofEnvError, match=r'needs cma: pip install "hoof-env\[train,identify\]"'):
-        optimise(arguments(tmp_path))
 
 
 HIGHEST = sorted((*GAITS.glob("*-constant.json"), *GAITS.glob("*-clocked.json")))

@@ -174,12 +174,6 @@ def test_other_versions_and_threads_are_told_on_a_resume(tmp_path):
     assert len([one for one in told if "--resume" in str(one.message)]) == 1
 
 
-def test_a_checkpoint_without_its_record_is_not_said_to_be_resumed(tmp_path):
-    (tmp_path / CHECKPOINTS / "100").mkdir(parents=True)
-    with pytest.raises(OutputError, match=r"found checkpoints and no run\.json; choose another folder$"):
-        train(arguments("ppo", tmp_path, resume=True))
-
-
 def test_a_full_disk_is_told_and_the_last_checkpoint_stays(tmp_path):
     full = Path("/dev/full")
     if not full.exists():

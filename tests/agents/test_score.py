@@ -14,7 +14,7 @@ from agents.open_loop import decode
 from agents.runs import make_env
 from agents.score import Args, find_policy, play, score_vector
 from hoof_env.envs.policies import GAITS, Scripted, open_loop
-from hoof_env.errors import DataFileError, HoofEnvError, ParameterError
+from hoof_env.errors import DataFileError, HoofEnvError
 from hoof_env.saved_record import environment_of
 from tests.agents.conftest import ENV_ID, KWARGS, SHORT
 
@@ -76,12 +76,6 @@ def test_an_environment_without_rows_is_played_one_by_one(monkeypatch):
     rows = score_vector("run", ENV_ID, SEEDS, **KWARGS)
     monkeypatch.setattr(score, "make_rows", lambda *_, **__: None)
     assert score_vector("run", ENV_ID, SEEDS, **KWARGS) == rows
-
-
-@pytest.mark.parametrize("policy", [np.zeros(4), None, "gallop"])
-def test_bad_policy(policy):
-    with pytest.raises(ParameterError, match="policy"):
-        score_vector(policy, ENV_ID, SEEDS)
 
 
 # The command

@@ -20,7 +20,6 @@ from agents.settings import (
     load_settings,
     model_arguments,
 )
-from hoof_env.errors import DataFileError, ParameterError
 
 FILES = {name: yaml.safe_load((FOLDER / f"{name}.yml").read_text()) for name in ALGORITHMS}
 ENTRIES = FILES["ppo"]
@@ -85,14 +84,6 @@ def test_noise_and_episodes_in_the_zoo_s_form():
     assert arguments["action_noise"]().shape == (3,)
 
 
-def test_an_algorithm_that_is_not_there(monkeypatch):
-    with pytest.raises(ParameterError, match="dqn"):
-        algorithm_class("dqn")
-    monkeypatch.setitem(ALGORITHMS, "tqc", "sb3_contrib_of_tomorrow")
-    with pytest.raises(ParameterError, match=r"pip install 'hoof-env\[train\]'"):
-        algorithm_class("tqc")
-
-
 def test_the_algorithm_takes_the_entry():
     settings = load_settings(FOLDER / "ppo.yml", "hoof_env/HorseLeg-v0")
     assert load_settings(FOLDER / "ppo.yml", "Pendulum-v1") == ENTRIES["default"]
@@ -111,31 +102,3 @@ def test_network_arguments_in_the_zoo_s_text_form():
         "activation_fn": nn.ELU,
         "log_std_init": -1.5,
     }
-
-
-CODE = ("dict(a=print(1))", "print(1)", "dict(a=nn.Nothing)", "[1]", "dict(a=", "dict(__import__('os'))")
-
-
-@pytest.mark.parametrize(
-    "settings",
-    [
-        *({"policy_kwargs": text} for text in CODE),
-        *({"learning_rate": value} for value in ("lin_", "exp_1", "0.001x", "lin_1_2")),
-        {"noise_type": "pink"},
-        {"noise_type": "normal", "noise_std": -1},
-    ],
-    ids=str,
-)
-def test_a_bad_setting_is_named_and_never_run_as_code(settings):
-    with pytest.raises(DataFileError, match=next(iter(settings))):
-        model_arguments(settings)
-
-
-@pytest.mark.parametrize("content", ["a: [", "[1, 2]", "Pendulum-v1: {n_envs: 1}", "other: {}", b"\xff\xfe"])
-def test_unusable_file(tmp_path, content):
-    path = tmp_path / "ppo.yml"
-    with pytest.raises(DataFileError, match=r"ppo\.yml"):
-        load_settings(path, "Pendulum-v1")  # it is not there
-    path.write_bytes(content if isinstance(content, bytes) else content.encode())
-    with pytest.raises(DataFileError, match=r"ppo\.yml"):
-        load_settings(path, "Pendulum-v1")

@@ -144,12 +144,6 @@ def test_a_run_is_shipped_by_one_command(tmp_path, monkeypatch, capsys):
     ship.gaits.cache_clear()
 
 
-def test_nothing_to_ship(tmp_path):
-    with pytest.raises(DataFileError, match="got none"):
-        ship.main([str(tmp_path), "--out", str(tmp_path / "out")])
-    assert not [*tmp_path.iterdir()]
-
-
 @pytest.mark.parametrize("missing", ["policy.safetensors", "config.yml", "monitor.csv"])
 def test_half_a_run_is_refused_in_one_line_and_leaves_nothing(tmp_path, trained, missing):
     run = tmp_path / "run"

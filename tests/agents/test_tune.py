@@ -12,7 +12,7 @@ from agents.train import Args as TrainArgs
 from agents.train import train
 from agents.tune import SPACES, Args, TrialScorer, draw, finished, load_space, tune
 from agents.watch import DivergedError
-from hoof_env.errors import DataFileError, ParameterError
+from hoof_env.errors import ParameterError
 from tests.agents.conftest import KWARGS, SHORT, TINY
 
 optuna = pytest.importorskip("optuna")
@@ -121,22 +121,11 @@ def test_every_algorithm_has_a_space(algo):
     assert yaml.safe_load(yaml.safe_dump(settings)) == settings
 
 
-def test_refusals(folder, tmp_path):
+def test_a_study_of_another_base_is_not_gone_on_with(folder):
+    before = trials(folder)
     with pytest.raises(ParameterError, match="other base"):
         tune(tiny(folder, steps=512))
-    with pytest.raises(ParameterError, match="trials: expected"):
-        tune(tiny(tmp_path, trials=0))
-    for text in (
-        "ppo: {gamma: []}",
-        "ppo: {gamma: {uniform: [1, 0]}}",
-        "ppo: {gamma: {log: [0, 1]}}",
-        "sac: {}",
-        "ppo: 3",
-    ):
-        path = tmp_path / "space.yml"
-        path.write_text(text)
-        with pytest.raises(DataFileError, match="search space"):
-            load_space(path, "ppo")
+    assert trials(folder) == before
 
 
 def test_a_trial_that_diverges_counts_as_pruned(tmp_path, monkeypatch):
@@ -164,28 +153,3 @@ def test_an_error_is_no_divergence_and_told_once(tmp_path, monkeypatch, caplog, 
     with pytest.raises(type(error), match=str(error)):
         tune(tiny(tmp_path))
     assert not caplog.records
-
-
-@pytest.mark.parametrize(
-    ("changes", "said"),
-    [
-        ({"env_id": "hoof_env/HorseLegMO-v0"}, "one number for a reward"),
-        ({"params": ("gama=1",)}, "'gama'"),
-        ({"params": ("n_envs=0",)}, "n_envs: expected"),
-        ({"space": "ppo: {gama: {uniform: [0.9, 1]}}"}, "'gama'"),
-        ({"space": "ppo: {policy_kwargs.net_arc: [1]}"}, "'net_arc'"),
-    ],
-)
-def test_what_no_trial_can_train_with_is_refused_before_there_is_a_study(tmp_path, changes, said):
-    if "space" in changes:
-        (tmp_path / "space.yml").write_text(changes["space"])
-        changes = {"space": tmp_path / "space.yml", "params": HELD[:-1]}
-    with pytest.raises(ParameterError, match=said):
-        tune(tiny(tmp_path / "study", **changes))
-    assert not (tmp_path / "study").exists()
-
-
-def test_a_damaged_study_is_refused(tmp_path):
-    (tmp_path / "study.db").write_text("no database")
-    with pytest.raises(DataFileError, match=r"study\.db: expected the database of a study.* not a database$"):
-        tune(tiny(tmp_path))

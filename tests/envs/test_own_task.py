@@ -338,7 +338,7 @@ import hoof_env
 
 sys.stderr = open(os.devnull, "w")
 seen = []
-for trial in range(4):
+for trial in range(3):
     names = {"__name__": "__main__"}
     exec(f"def slip(step, weight): return weight * step.sums.slip * {trial + 1}.25", names)
     hoof_env.register("own/Trial-v0", terms=[hoof_env.Term("slip", 0.5, "1/m", "slip", names["slip"])])
@@ -349,7 +349,7 @@ for trial in range(4):
     gc.collect()
     with open("/proc/self/statm") as file:
         seen.append(int(file.read().split()[1]) * os.sysconf("SC_PAGE_SIZE") / 1e6)
-print((seen[3] - seen[1]) / 2)
+print(seen[2] - seen[1])
 """
 
 
