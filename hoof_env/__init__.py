@@ -13,7 +13,6 @@ import gymnasium as _gym
 from hoof_env._version import __version__
 
 if TYPE_CHECKING:
-    from hoof_env.dynamics.constrained import ConstrainedLeg as ConstrainedLeg
     from hoof_env.dynamics.engine import TrunkEngine as TrunkEngine
     from hoof_env.dynamics.parts import HoofSpring as HoofSpring
     from hoof_env.dynamics.parts import Limb as Limb
@@ -29,6 +28,7 @@ if TYPE_CHECKING:
     from hoof_env.envs.policies import make_policy as make_policy
     from hoof_env.envs.sb3 import Sb3VecEnv as Sb3VecEnv
     from hoof_env.envs.vector import HorseLegVectorEnv as HorseLegVectorEnv
+    from hoof_env.eq8.solver import ConstrainedLeg as ConstrainedLeg
     from hoof_env.errors import DataFileError as DataFileError
     from hoof_env.errors import GeometryError as GeometryError
     from hoof_env.errors import HoofEnvError as HoofEnvError
@@ -53,7 +53,7 @@ if TYPE_CHECKING:
     from hoof_env.tasks.reward import Term as Term
 
 _MODULES = {
-    "dynamics.constrained": "ConstrainedLeg",
+    "eq8.solver": "ConstrainedLeg",
     "dynamics.engine": "TrunkEngine",
     "dynamics.parts": "HoofSpring Limb Limits Motor Prescribed Result Trunk",
     "dynamics.step_length": "StepWarning",

@@ -467,7 +467,13 @@ def run_engine(
 def solvers() -> Cases:
     """The paper's own solver, and the leg that the package has."""
     from hoof_env import ConstrainedLeg, Ground, load_gait, load_geometry
-    from hoof_env.dynamics.constrained import INTEGRATORS, new_trace
+
+    # the solver had no room of its own before
+    try:
+        from hoof_env.eq8.integrators import INTEGRATORS
+        from hoof_env.eq8.solver import new_trace
+    except ModuleNotFoundError:
+        from hoof_env.dynamics.constrained import INTEGRATORS, new_trace
 
     leg = load_geometry("identified")
     digests = Digests()

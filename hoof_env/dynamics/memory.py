@@ -222,7 +222,7 @@ def features_of(limbs: Sequence[Limb], harmonics: int, has_limits: bool, reacts:
             raise ParameterError(
                 f"limbs[{k}].geometry: expected the mechanism of the first leg, {first.name!r}, and the same "
                 f"bodies with a centre of mass of their own, since legs on one trunk share their kernels; "
-                f"{limb.geometry.name!r} has another"
+                f"{limb.geometry.name!r} has another; give all legs lengths of one mechanism"
             )
     needed = structure if has_limits or reacts else PAPER_STRUCTURE
     springs = limbs[0].spring is not None

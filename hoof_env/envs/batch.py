@@ -20,9 +20,11 @@ from hoof_env.dynamics.parts import broken
 from hoof_env.envs.batch_build import (
     check_choices,
     check_delays,
+    check_paper,
     check_vary,
     make_engine,
     make_memory,
+    make_paper,
     task_record,
 )
 from hoof_env.envs.batch_changes import BatchChanges
@@ -35,7 +37,6 @@ from hoof_env.envs.conditions import (
     under_each,
 )
 from hoof_env.envs.outcome import MOVED
-from hoof_env.envs.paper_solver import PaperSolver, check_paper
 from hoof_env.envs.step import NOT_A_NUMBER, SOME_ENDED, SOME_PUSHED, SOME_SWITCHED
 from hoof_env.errors import ParameterError, check_number
 from hoof_env.simd.threads import run_together
@@ -140,8 +141,7 @@ class EpisodeBatch(BatchKernels, BatchChanges):
         self.settings = resolved(settings)
         self._check_settings()
         self.engine = make_engine(self, num_threads)
-        is_paper = self.settings.solver == "paper"
-        self.paper = PaperSolver(self.settings, self.engine, self.substeps) if is_paper else None
+        self.paper = make_paper(self.settings, self.engine, self.substeps)
         self._allocate()
         self._open()
         self.episode_rows.weight[:] = self.engine.weight

@@ -9,12 +9,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from hoof_env.dynamics.constrained import INTEGRATORS
 from hoof_env.dynamics.engine import TrunkEngine
 from hoof_env.dynamics.parts import LARGEST
 from hoof_env.dynamics.step_length import StepLength
 from hoof_env.dynamics.stepping import SCHEMES
 from hoof_env.envs.observation_kernel import slots_of
+from hoof_env.eq8.episodes import PaperSolver, Scheme
+from hoof_env.eq8.integrators import INTEGRATORS
 from hoof_env.errors import ParameterError, check_choice, check_number
 from hoof_env.leg.profile import leg_profile
 from hoof_env.tasks.delays import check_delay, check_kept, parts_of
@@ -22,7 +23,7 @@ from hoof_env.tasks.episode import ACTIONS, task_type
 from hoof_env.tasks.observation import check_groups, groups_of, observed
 from hoof_env.tasks.own_parts import own_of
 from hoof_env.tasks.parameters import extremes
-from hoof_env.tasks.settings import Settings
+from hoof_env.tasks.settings import ResolvedSettings, Settings
 
 MOST_BAUMGARTE = 1e6
 """Largest of Baumgarte's parameters [1/s]; larger ones are unstable even with a substep of 1 us."""
@@ -40,6 +41,35 @@ def check_choices(s: Settings) -> None:
         check_number(name, getattr(s, name), low=0.0, high=MOST_BAUMGARTE)
     for name in ("motor_gain", "motor_torque", "motor_inertia"):
         check_number(name, getattr(s, name), low=0.0, high=LARGEST)
+
+
+def check_paper(settings: Settings) -> None:
+    """Check that the paper's solver supports the settings.
+
+    Raises:
+        ParameterError: it does not.
+    """
+    only = {
+        "trunk": "fixed",
+        "drive": "prescribed",
+        "terrain": None,
+        "randomize": None,
+        "schedule": None,
+        "hoof_stiffness": None,
+    }
+    for name, expected in only.items():
+        value = getattr(settings, name)
+        # An empty mapping is as good as None.
+        if value != expected and not (expected is None and not value):
+            raise ParameterError(f'{name}: expected {expected!r} with solver="paper", got {value!r}')
+
+
+def make_paper(s: ResolvedSettings, engine: TrunkEngine, substeps: int) -> PaperSolver | None:
+    """Make the paper's solver for an engine, if the settings ask for it."""
+    if s.solver != "paper":
+        return None
+    scheme = Scheme(s.sim_dt, s.baumgarte_alpha, s.baumgarte_beta, s.integrator)
+    return PaperSolver(scheme, engine, substeps)
 
 
 def make_engine(batch: Any, num_threads: int) -> TrunkEngine:

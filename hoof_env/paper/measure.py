@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from hoof_env.dynamics.constrained import TRACE
+from hoof_env.eq8.solver import TRACE
 from hoof_env.errors import ParameterError
 
 Interval = tuple[float, float]

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from hoof_env.constants import GRAVITY
-from hoof_env.dynamics.constrained import ConstrainedLeg
 from hoof_env.dynamics.engine import TrunkEngine
 from hoof_env.dynamics.parts import Limb, Motor, Prescribed, Trunk
+from hoof_env.eq8.solver import ConstrainedLeg
 from hoof_env.gait import load_gait
 from hoof_env.ground.terrain import Terrain
 from hoof_env.leg.geometry import load_geometry

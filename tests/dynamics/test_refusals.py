@@ -7,9 +7,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from hoof_env.dynamics.constrained import ConstrainedLeg, new_trace
 from hoof_env.dynamics.engine import TrunkEngine
 from hoof_env.dynamics.parts import HoofSpring, Limb, Limits, Motor, Prescribed, Result, Trunk
+from hoof_env.eq8.solver import ConstrainedLeg, new_trace
 from hoof_env.errors import NotStartedError, ParameterError
 from hoof_env.gait import HarmonicGait
 from hoof_env.ground.contact import Ground

@@ -7,7 +7,7 @@ import mpmath
 import numpy as np
 import pytest
 
-from hoof_env.dynamics.constrained import ConstrainedLeg
+from hoof_env.eq8.solver import ConstrainedLeg
 from hoof_env.errors import GeometryError, ParameterError
 from hoof_env.ground.contact import Ground
 from hoof_env.leg.assembly import transmission_margin

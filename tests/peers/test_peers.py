@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from benchmarks.common import ALL, RIGID, Start
-from hoof_env.dynamics.constrained import ConstrainedLeg
 from hoof_env.dynamics.parts import Limb, Motor, Prescribed, Trunk
+from hoof_env.eq8.solver import ConstrainedLeg
 from hoof_env.gait import GaitParameters
 from hoof_env.ground.contact import Ground
 from hoof_env.leg.geometry import load_geometry

@@ -11,20 +11,15 @@ closed form.
 Phi_q is square, so the second row of Eq. 8 alone fixes qdd: contact, masses and weight change the multipliers
 (joint reactions, drive torques) and never the motion.
 
-q holds (x, y, th) of the bodies of the leg's mechanism in the frame of the paper's drawing: O at the origin,
-crank turning clockwise; hoof points go to the world, and ground forces come back, through one mirror. The
-leg's frame, which carries the pivot C and turns by phi about O, is treated as one more body whose motion
-is prescribed. So one expression serves every joint, and the Jacobian's column of the frame's orientation is
-d Phi / d phi.
+The coordinates q are those of `constraints`. Hoof points go to the world, and ground forces come back,
+through one mirror.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from dataclasses import dataclass
-from types import MappingProxyType
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -32,6 +27,8 @@ from numpy.typing import NDArray
 from hoof_env.constants import GRAVITY
 from hoof_env.dynamics.layout import LEG_REPORT, LEG_STATE, TRUNK_REPORT, TRUNK_STATE
 from hoof_env.dynamics.parts import Reactions, Result, Trunk
+from hoof_env.eq8.constraints import Closure, Constraints, Vector, closed_form
+from hoof_env.eq8.integrators import INTEGRATORS
 from hoof_env.errors import ParameterError, check_choice, check_number
 from hoof_env.gait import (
     MOTION,
@@ -45,104 +42,10 @@ from hoof_env.gait import (
     steady_filters,
 )
 from hoof_env.ground.contact import Ground, new_contacts, touch
-from hoof_env.leg.assembly import body_coordinate, check_full_revolution, weld_angles
+from hoof_env.leg.assembly import body_coordinate, check_full_revolution
 from hoof_env.leg.geometry import Geometry
-from hoof_env.leg.kinematics import FrameMotion, mirror, pose
-from hoof_env.leg.mechanism import FRAME
+from hoof_env.leg.kinematics import mirror
 from hoof_env.leg.profile import cross
-
-Vector = NDArray[np.float64]
-
-
-class Closure(NamedTuple):
-    """The constraint equations at one instant: rows x, y of every joint [m], then welds and driver [rad]."""
-
-    error: Vector  # Phi(q, t)
-    error_rate: Vector  # Phi_q qd + Phi_t
-    jacobian: Vector  # Phi_q, square (Eq. 3)
-    by_phi: Vector  # d Phi / d phi; d Phi / d theta is 1 in the driver's row and 0 elsewhere
-    gamma: Vector  # what Phi_q qdd must be, -(Phi_q qd)_q qd - 2 Phi_qt qd - Phi_tt
-
-
-class Constraints:
-    """Eq. 2 of one leg: rows x and y of every joint in the order of the mechanism's list, its welds, and the
-    driver."""
-
-    def __init__(self, geometry: Geometry) -> None:
-        mechanism = geometry.mechanism
-        joints = mechanism.joints
-        self.size = 3 * len(mechanism.bodies)  # of coordinates and of equations: nothing is free
-        self.joint_rows = 2 * len(joints)
-        self.driver_row = self.size - 1
-        self.crank = mechanism.crank
-        self._x_rows = np.arange(0, self.joint_rows, 2)
-        self._y_rows = self._x_rows + 1
-        self._i = np.array([joint.i for joint in joints])
-        self._j = np.array([joint.j for joint in joints])  # FRAME is -1: the last of all bodies
-        self._place_i = np.array([body_coordinate(geometry, joint.point, joint.i) for joint in joints])
-        self._place_j = np.array([body_coordinate(geometry, joint.point, joint.j) for joint in joints])
-        self._welds = np.array(mechanism.welds, dtype=np.int64).reshape(-1, 2)
-        self._weld_angles = np.array(weld_angles(geometry))
-        self._weld_rows = self.joint_rows + np.arange(len(self._welds))
-        constant = np.zeros((self.size, self.size + 3))
-        for rows, axis in ((self._x_rows, 0), (self._y_rows, 1)):
-            constant[rows, 3 * self._i + axis] = 1.0
-            constant[rows, 3 * self._j + axis] = -1.0
-        for bodies, sign in ((self._welds[:, 0], 1.0), (self._welds[:, 1], -1.0)):
-            constant[self._weld_rows, 3 * bodies + 2] = sign
-        constant[self.driver_row, 3 * self.crank + 2] = 1.0
-        constant[self.driver_row, 3 * FRAME + 2] = -1.0
-        self._constant = constant
-
-    def __call__(self, q: Vector, qd: Vector, motion: Any) -> Closure:
-        """Evaluate everything at coordinates q, rates qd (shape (size,) each) and a `MOTION` record."""
-        x = np.append(q, (0.0, 0.0, motion["phi"])).reshape(-1, 3)
-        v = np.append(qd, (0.0, 0.0, motion["phi_rate"]))
-        i, j, x_rows, y_rows = self._i, self._j, self._x_rows, self._y_rows
-        centre = x[:, 0] + 1j * x[:, 1]
-        e = np.exp(1j * x[:, 2])
-        rate = v[2::3]
-        arm_i = self._place_i * e[i]
-        arm_j = self._place_j * e[j]
-
-        error = np.empty(self.size)
-        gap = centre[i] + arm_i - centre[j] - arm_j
-        error[x_rows] = gap.real
-        error[y_rows] = gap.imag
-        error[self._weld_rows] = x[self._welds[:, 0], 2] - x[self._welds[:, 1], 2] - self._weld_angles
-        error[self.driver_row] = x[self.crank, 2] + motion["theta"] - motion["phi"]
-
-        jacobian = self._constant.copy()
-        for body, slope in ((i, 1j * arm_i), (j, -1j * arm_j)):
-            jacobian[x_rows, 3 * body + 2] = slope.real
-            jacobian[y_rows, 3 * body + 2] = slope.imag
-        by_phi = jacobian[:, 3 * FRAME + 2]
-
-        error_rate = jacobian @ v
-        error_rate[self.driver_row] += motion["theta_rate"]
-
-        gamma = -by_phi * motion["phi_acc"]
-        turning = arm_i * rate[i] ** 2 - arm_j * rate[j] ** 2
-        gamma[x_rows] += turning.real
-        gamma[y_rows] += turning.imag
-        gamma[self.driver_row] -= motion["theta_acc"]
-        return Closure(error, error_rate, jacobian[:, : self.size], by_phi, gamma)
-
-
-def closed_form(geometry: Geometry, motion: Any) -> tuple[Vector, Vector]:
-    """The q and qd, shape (size,) each, that solve Eq. 2 for a `MOTION` record, welds and driver included."""
-    drawn = geometry.replace(travel=1)  # the paper's own frame, not the world's
-    frame = FrameMotion(motion["phi"], motion["phi_rate"])
-    p = pose(drawn, motion["theta"], motion["theta_rate"], frame=frame)
-    angles = p.angles.copy()
-    # pose returns angles but for whole turns
-    angles[geometry.mechanism.crank] = motion["phi"] - motion["theta"]
-    for (one, other), angle in zip(geometry.mechanism.welds, weld_angles(geometry), strict=True):
-        angles[one] = angles[other] + angle
-    q = np.column_stack([p.centres, angles])
-    qd = np.column_stack([p.centre_velocities, p.angular_velocities])
-    return q.ravel(), qd.ravel()
-
 
 MOTION_NAMES = LEG_STATE[:2] + LEG_REPORT[:4]
 """Names of the fields of `MOTION`, whose own are the symbols of Eq. 8's motion law."""
@@ -394,42 +297,3 @@ class ConstrainedLeg:
         stabilised = closure.gamma - 2 * self.alpha * closure.error_rate - self.beta**2 * closure.error
         solution = np.linalg.solve(self._system, np.concatenate([self._weight + load, stabilised]))
         return solution[:size], solution[size:]
-
-
-Acceleration = Callable[[float, Vector, Vector], Vector]
-Scheme = Callable[[Acceleration, Vector, Vector, float], tuple[Vector, Vector]]
-
-
-def euler(acceleration: Acceleration, q: Vector, qd: Vector, h: float) -> tuple[Vector, Vector]:
-    """Explicit Euler, first order: the paper's scheme (Eq. 9)."""
-    return q + h * qd, qd + h * acceleration(0.0, q, qd)
-
-
-def semi_implicit_euler(acceleration: Acceleration, q: Vector, qd: Vector, h: float) -> tuple[Vector, Vector]:
-    """Semi-implicit Euler, first order: the new rate moves the coordinates."""
-    qd = qd + h * acceleration(0.0, q, qd)
-    return q + h * qd, qd
-
-
-def midpoint(acceleration: Acceleration, q: Vector, qd: Vector, h: float) -> tuple[Vector, Vector]:
-    """Explicit midpoint rule, second order."""
-    q1, v1 = euler(acceleration, q, qd, h / 2)
-    return q + h * v1, qd + h * acceleration(h / 2, q1, v1)
-
-
-def rk4(acceleration: Acceleration, q: Vector, qd: Vector, h: float) -> tuple[Vector, Vector]:
-    """The classical Runge-Kutta scheme, fourth order."""
-    a0 = acceleration(0.0, q, qd)
-    v1 = qd + h / 2 * a0
-    a1 = acceleration(h / 2, q + h / 2 * qd, v1)
-    v2 = qd + h / 2 * a1
-    a2 = acceleration(h / 2, q + h / 2 * v1, v2)
-    v3 = qd + h * a2
-    a3 = acceleration(h, q + h * v2, v3)
-    return q + h / 6 * (qd + 2 * v1 + 2 * v2 + v3), qd + h / 6 * (a0 + 2 * a1 + 2 * a2 + a3)
-
-
-INTEGRATORS = MappingProxyType(
-    {"euler": euler, "semi_implicit_euler": semi_implicit_euler, "midpoint": midpoint, "rk4": rk4}
-)
-"""The schemes by name."""

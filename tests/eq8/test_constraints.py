@@ -8,7 +8,7 @@ import sympy
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from hoof_env.dynamics.constrained import Constraints, closed_form
+from hoof_env.eq8.constraints import Constraints, closed_form
 from hoof_env.gait import MOTION
 from hoof_env.leg.geometry import load_geometry
 from tests.legs import FIRST_FIT

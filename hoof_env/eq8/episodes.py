@@ -1,4 +1,4 @@
-"""The paper's solver (Eq. 8, `dynamics.constrained`) in place of the engine's kernels.
+"""The paper's solver (Eq. 8, `eq8.solver`) in place of the engine's kernels.
 
 It reads commands from the engine's memory and writes there the values that reward and observation read, so
 that these are the same for both. It solves one environment after the other and is some ten thousand times
@@ -10,21 +10,20 @@ from __future__ import annotations
 import copy
 from collections.abc import Mapping, Sequence
 from dataclasses import astuple
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from hoof_env.dynamics.constrained import TRACE, ConstrainedLeg, ConstrainedState, new_trace
 from hoof_env.dynamics.engine import TrunkEngine
 from hoof_env.dynamics.layout import LEG_REPORT, LEG_STATE, TRUNK_REPORT, TRUNK_STATE, stride_sums
 from hoof_env.dynamics.memory import LIFT_OFF, Memory, memory_of
 from hoof_env.dynamics.names import NamedColumns
 from hoof_env.dynamics.observables import StanceCounter
 from hoof_env.dynamics.parts import Result
+from hoof_env.eq8.solver import TRACE, ConstrainedLeg, ConstrainedState, new_trace
 from hoof_env.errors import ParameterError
 from hoof_env.gait import GaitParameters
-from hoof_env.tasks.settings import ResolvedSettings, Settings
 
 Floats = NDArray[np.float64]
 Records = NDArray[np.void]
@@ -50,25 +49,13 @@ APART = 1.0
 finite, up to 1e300."""
 
 
-def check_paper(settings: Settings) -> None:
-    """Check that the paper's solver supports the settings.
+class Scheme(NamedTuple):
+    """How the paper's solver integrates: time step [s], Baumgarte's parameters [1/s], name of the scheme."""
 
-    Raises:
-        ParameterError: it does not.
-    """
-    only = {
-        "trunk": "fixed",
-        "drive": "prescribed",
-        "terrain": None,
-        "randomize": None,
-        "schedule": None,
-        "hoof_stiffness": None,
-    }
-    for name, expected in only.items():
-        value = getattr(settings, name)
-        # An empty mapping is as good as None.
-        if value != expected and not (expected is None and not value):
-            raise ParameterError(f'{name}: expected {expected!r} with solver="paper", got {value!r}')
+    sim_dt: float
+    alpha: float
+    beta: float
+    integrator: str
 
 
 class PaperSolver:
@@ -81,24 +68,23 @@ class PaperSolver:
             then failed; shape (num_envs,).
 
     Args:
-        settings: settings for which `check_paper` passes.
+        scheme: how they are integrated.
         engine: engine with the memory that the solver reads and writes.
         substeps: substeps of a control step.
     """
 
-    def __init__(self, settings: ResolvedSettings, engine: TrunkEngine, substeps: int) -> None:
-        s = settings
+    def __init__(self, scheme: Scheme, engine: TrunkEngine, substeps: int) -> None:
         self.engine = engine
         self.substeps = substeps
         self.legs = [
             ConstrainedLeg(
                 engine.limbs[0].geometry,
                 engine.ground,
-                s.sim_dt,
+                scheme.sim_dt,
                 engine.filters,
-                s.baumgarte_alpha,
-                s.baumgarte_beta,
-                s.integrator,
+                scheme.alpha,
+                scheme.beta,
+                scheme.integrator,
                 engine.trunk.height,
             )
             for _ in range(engine.num_envs)

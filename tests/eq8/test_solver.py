@@ -13,10 +13,12 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from hoof_env.dynamics.constrained import INTEGRATORS, TRACE, ConstrainedLeg, closed_form, new_trace
 from hoof_env.dynamics.engine import TrunkEngine
 from hoof_env.dynamics.parts import Limb, Prescribed, Result, Trunk
 from hoof_env.dynamics.step_length import StepWarning
+from hoof_env.eq8.constraints import closed_form
+from hoof_env.eq8.integrators import INTEGRATORS
+from hoof_env.eq8.solver import TRACE, ConstrainedLeg, new_trace
 from hoof_env.gait import LIMITS, GaitParameters
 from hoof_env.ground.contact import Ground
 from hoof_env.leg.geometry import load_geometry
