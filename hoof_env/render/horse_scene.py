@@ -58,7 +58,7 @@ class HorseScene(Scene):
         level = float(self._ground.height(now.x + self._animal * AROUND_M).mean())
         self._camera = complex(now.x, level)
         canvas.blit(self._sky, (0, 0))
-        self._ground.draw(canvas, now.legs, self.corner)
+        self._ground.draw(canvas, self._soles(now.legs), self.corner)
         for i in range(len(now.legs)):
             if i not in NEAR:
                 self._draw_far_leg(canvas, self.points_of(now.legs[i]))

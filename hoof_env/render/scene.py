@@ -112,13 +112,19 @@ class Scene:
         while paths[0][0] < instants[-1].time - PATH_SECONDS:
             paths.popleft()
 
+    def _soles(self, legs: Sequence[Instant]) -> Sequence[Instant]:
+        """Return legs with the heel in the toe if they have one foot: their engine has the heel at (0, 0)."""
+        if self._geometry.heel is not None:
+            return legs
+        return [leg._replace(heel_x=leg.toe_x, heel_y=leg.toe_y, heel_depth=leg.toe_depth) for leg in legs]
+
     def draw(self, canvas: Any, now: Instant, full_scale: float) -> None:
         """Draw an instant; the arrow of a force `full_scale` [N] is `ARROW_M` long."""
         pixels = self.look_at(now)
         canvas.blit(self._sky, (0, 0))
         hip = pixels[self._geometry.mechanism.centre]
         self._draw_support(canvas, hip)
-        self._ground.draw(canvas, [now], self.corner)
+        self._ground.draw(canvas, self._soles([now]), self.corner)
         self._draw_trunk(canvas, hip, now.pitch)
         self._draw_paths(canvas, pixels)
         self._draw_leg(canvas, pixels)
@@ -305,23 +311,19 @@ class Scene:
         force = full_scale / 5
         length = force / full_scale * ARROW_M * self._metre
         kinds = self._ground.kinds()
-        words = (
-            f"{force / self._newtons:g} {self._unit} on the hoof",
-            "toe: force and path",
-            "heel: force and path",
-            "crank",
-        )
-        rows = [20 + (20 + 20 * k) * 1j for k in range(4)]
+        bars = [("toe: force and path", TOE, 1.2), ("heel: force and path", HEEL, 1.2), ("crank", CRANK, 3.3)]
+        if self._geometry.heel is None:
+            del bars[1]
+        words = (f"{force / self._newtons:g} {self._unit} on the hoof", *(text for text, *_ in bars))
+        rows = [20 + (20 + 20 * k) * 1j for k in range(len(words))]
         places = [row * unit for row in rows] + [row * unit + self._centre for row in rows[: len(kinds)]]
         image = pygame.Surface((round(2 * self._centre), round(100 * unit)), pygame.SRCALPHA, 32)
 
         def paint(fine: Any, place: Any) -> None:
             arrow(fine, FORCE, place(places[0]), place(places[0] + length), 7 * unit * FINE)
-            for at, (colour, radius) in zip(
-                places[1:4], ((TOE, 1.2), (HEEL, 1.2), (CRANK, 3.3)), strict=True
-            ):
+            for at, (_, colour, radius) in zip(places[1 : len(words)], bars, strict=True):
                 bar(fine, colour, place(at), place(at + length), radius * unit * FINE, radius * unit * FINE)
-            for at, (_, colour) in zip(places[4:], kinds, strict=True):
+            for at, (_, colour) in zip(places[len(words) :], kinds, strict=True):
                 x, y = place(at - 6j * unit)
                 swatch = pygame.Rect(x, y, length * FINE, 12 * unit * FINE)
                 pygame.draw.rect(fine, SOIL_LINE, swatch)

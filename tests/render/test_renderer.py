@@ -18,7 +18,7 @@ from hoof_env.dynamics.engine import TrunkEngine
 from hoof_env.dynamics.parts import Limb, Trunk
 from hoof_env.envs.policies import make_policy
 from hoof_env.errors import ParameterError
-from hoof_env.gait import LIMITS, PARAMETERS, load_gait
+from hoof_env.gait import LIMITS, PARAMETERS, GaitParameters, load_gait
 from hoof_env.ground.contact import Ground
 from hoof_env.ground.terrain import Terrain
 from hoof_env.leg.geometry import load_geometry
@@ -219,6 +219,31 @@ def test_the_ground_gives_way_under_the_hoof(run):
     deep = 0.1 * metre * np.exp(-((0.06 / 0.09) ** 2))
     found = surface(draw(loaded(run, 900.0, **both)), beside) - surface(draw(run[0]), beside)
     assert found == pytest.approx(deep, abs=2.5)
+
+
+def test_a_leg_of_one_foot_has_no_heel_in_the_picture():
+    """Its engine has a heel at (0, 0): neither the key nor a print in the ground shows it."""
+    leg = load_geometry("jansen")
+    trunk = Trunk("fixed", height=leg.hip_height - 0.1)
+    engine = TrunkEngine(Limb(leg), trunk, Ground())
+    pictures = []
+    for x in (0.0, 50.0):
+        engine.reset(GaitParameters(0.0, 0.0, 0.0, 0.0), 1.5, x=x)
+        assert engine.report["toe_normal"].item() > 0
+        now = instants(columns_of_engine(engine.state | engine.report))
+        picture = Renderer(leg, "rgb_array", 50, trunk="fixed")
+        picture.add(now)
+        pictures.append(picture.frame())
+        assert now[0].cop_x == pytest.approx(now[0].toe_x)
+        assert now[0].cop_y == pytest.approx(now[0].toe_y)
+    near, far = pictures
+    # after 50 m, from which the print would run back to the heel, the ground looks as at the start
+    for column in (5, 45, 85, 540, 580, 620):
+        assert surface(far, column) == pytest.approx(surface(near, column), abs=1)
+    for frame in pictures:
+        assert not len(pixels(frame, PURPLE, (slice(0, 110), slice(0, 300)))[0])
+        assert len(pixels(frame, BLUE, (slice(0, 110), slice(0, 300)))[0])
+    assert len(pixels(draw(*simulate(0.02)), PURPLE, (slice(0, 110), slice(0, 300)))[0])
 
 
 def test_the_camera_follows_the_trunk_uphill(run):
