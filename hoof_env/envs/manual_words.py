@@ -8,13 +8,14 @@ from pathlib import Path
 from string import Template
 from typing import Any
 
-from hoof_env.dynamics.constrained import INTEGRATORS
 from hoof_env.dynamics.parts import ONE_LEG
 from hoof_env.dynamics.stepping import SCHEMES
 from hoof_env.envs.batch_reports import SUCCESS_SPEED
+from hoof_env.eq8.integrators import INTEGRATORS
 from hoof_env.gait import WIDEST, FilterSettings
 from hoof_env.ground.laws import FRICTION_LAWS, NORMAL_LAWS
-from hoof_env.leg.geometry import preset_names
+from hoof_env.leg.geometry import load_geometry, preset_names
+from hoof_env.leg.mechanism_list import PAPER
 from hoof_env.tasks import horse, leg_starts
 from hoof_env.tasks.body_settings import About
 from hoof_env.tasks.horse_gaits import FASTEST, FOLLOWED, SIZES, horse_gaits
@@ -31,6 +32,7 @@ def tables() -> dict[str, dict[str, Any]]:
     the words of a page. Words that begin with $ are replaced by numbers and choices."""
     names = {
         "presets": preset_names(),
+        "horse_presets": [name for name in preset_names() if load_geometry(name).mechanism == PAPER],
         "trunks": ONE_LEG,
         "schemes": SCHEMES,
         "paper_schemes": INTEGRATORS,

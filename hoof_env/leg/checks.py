@@ -107,8 +107,26 @@ def checked_pivot(given: Any, pivots: Sequence[str]) -> Any:
     return places[pivots[0]] if len(pivots) == 1 else MappingProxyType(places)
 
 
-def checked_solids(given: Any, mechanism: Mechanism) -> dict[str, Mapping[str, Any]]:
-    """Return the bodies that are no uniform rods.
+def merged_solids(given: Any, listed: Solids, labels: Mapping[str, str]) -> Any:
+    """Return the bodies that are no uniform rods of both places where they may stand.
+
+    Raises:
+        ParameterError: a body stands in both.
+    """
+    if not isinstance(given, Mapping):
+        return given
+    for name in listed:
+        if name in given:
+            raise ParameterError(
+                f"solids[{name!r}]: {labels[name]} has numbers of {name!r}, too; leave one out"
+            )
+    return {**given, **listed}
+
+
+def checked_solids(
+    given: Any, mechanism: Mechanism, labels: Mapping[str, str] = MappingProxyType({})
+) -> dict[str, Mapping[str, Any]]:
+    """Return the bodies that are no uniform rods; `labels` are names of entries in errors.
 
     Raises:
         ParameterError: no such body, an unknown entry, or a number that is not finite or, of mass and
@@ -118,7 +136,7 @@ def checked_solids(given: Any, mechanism: Mechanism) -> dict[str, Mapping[str, A
     check_keys("solids", given, (), names)
     solids: dict[str, Mapping[str, Any]] = {}
     for name, solid in given.items():
-        what = f"solids[{name!r}]"
+        what = labels.get(name, f"solids[{name!r}]")
         check_keys(what, solid, (), ("mass", "centre", "inertia"))
         checked: dict[str, Any] = {
             key: check_number(f"{what}[{key!r}]", solid[key], low=0, exclusive_low=True)

@@ -27,13 +27,14 @@ from hoof_env.leg.checks import (
     checked_masses,
     checked_pivot,
     checked_solids,
+    merged_solids,
     numbers_of,
     plain_solids,
     scaled_solids,
     with_solids,
 )
 from hoof_env.leg.mechanism import Mechanism
-from hoof_env.leg.mechanism_list import PAPER, read_mechanism
+from hoof_env.leg.mechanism_list import PAPER, read_mechanism, split_solids
 from hoof_env.leg.mobility import check_motion
 
 if TYPE_CHECKING:
@@ -75,7 +76,8 @@ class Geometry:
             `TrunkEngine` alone takes such a leg.
         mechanism: the structure, or the list of it; that of the paper by default.
         solids: bodies that are no uniform rods, by name: "mass" [kg], "centre" along and across from the tail
-            [m], "inertia" about it [kg m^2]; what is left out is that of a rod.
+            [m], "inertia" about it [kg m^2]; what is left out is that of a rod. They may also stand in the
+            `bodies` of a list.
         name, provenance: where the numbers come from.
 
     Raises:
@@ -101,8 +103,12 @@ class Geometry:
 
     def __post_init__(self) -> None:
         given: Any = self.mechanism
+        solids: Any = self.solids
+        labels: dict[str, str] = {}
         if not isinstance(given, Mechanism):
+            given, listed, labels = split_solids(given)
             object.__setattr__(self, "mechanism", read_mechanism(given))
+            solids = merged_solids(solids, listed, labels)
         names = self.mechanism.lengths
         check_keys("lengths", self.lengths, names)
         lengths = {k: check_number(f"lengths[{k!r}]", self.lengths[k], low=1e-3, high=1e3) for k in names}
@@ -120,7 +126,8 @@ class Geometry:
         object.__setattr__(self, "lengths", MappingProxyType(lengths))
         object.__setattr__(self, "pivot", checked_pivot(self.pivot, self.mechanism.pivots))
         object.__setattr__(self, "assembly", MappingProxyType({p: int(self.assembly[p]) for p in points}))
-        object.__setattr__(self, "solids", MappingProxyType(checked_solids(self.solids, self.mechanism)))
+        solids = checked_solids(solids, self.mechanism, labels)
+        object.__setattr__(self, "solids", MappingProxyType(solids))
         flag("full_turn", self.full_turn)
         check_motion(self)
 
@@ -244,7 +251,9 @@ class Geometry:
         # what is the paper's or the default is left out
         if content.pop("full_turn") is False:
             content["full_turn"] = False
-        if content.pop("mechanism") != PAPER:
+        # mechanisms that differ in the roles of their bodies are equal
+        del content["mechanism"]
+        if self.mechanism.to_mapping() != PAPER.to_mapping():
             content["mechanism"] = self.mechanism.to_mapping()
         if content.pop("solids"):
             content["solids"] = plain_solids(self.solids)

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from hoof_env.errors import check_number
+from hoof_env.errors import check_choice, check_number
 from hoof_env.leg.assembly import centres, solve
 from hoof_env.leg.geometry import Geometry
 from hoof_env.leg.mechanism import Mechanism
@@ -94,7 +94,12 @@ class Pose:
     angular_accelerations: NDArray[np.float64]
 
     def point(self, name: str) -> NDArray[np.float64]:
-        """Position (x, y) of a named point [m]."""
+        """Position (x, y) of a named point [m].
+
+        Raises:
+            ParameterError: the mechanism has no such point.
+        """
+        check_choice("point", name, self.mechanism.points)
         return self.points[self.mechanism.number[name]]
 
 

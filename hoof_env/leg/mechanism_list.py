@@ -13,6 +13,8 @@ from hoof_env.leg.mechanism import FRAME, FRAME_NAME, Body, BodyPoint, Dyad, Joi
 
 PARTS = ("fixed", "crank", "points", "bodies", "joints", "feet")
 OPTIONAL_PARTS = ("welds",)
+SOLID = ("mass", "centre", "inertia")
+"""Numbers of a body that is no uniform rod; they are part of a `Geometry`."""
 
 
 def read_mechanism(given: Any) -> Mechanism:
@@ -67,10 +69,34 @@ def read_mechanism(given: Any) -> Mechanism:
     return mechanism
 
 
+def split_solids(given: Any) -> tuple[Any, dict[str, dict[str, Any]], dict[str, str]]:
+    """Return a list without the numbers of its bodies, these by the names of the bodies, and the entries from
+    which they are, for errors. What is no list is returned as it is, for `read_mechanism` to refuse."""
+    bodies = given.get("bodies") if isinstance(given, Mapping) else None
+    if not isinstance(bodies, (list, tuple)):
+        return given, {}, {}
+    plain: list[Any] = []
+    solids: dict[str, dict[str, Any]] = {}
+    labels: dict[str, str] = {}
+    for k, entry in enumerate(bodies):
+        numbers = {key: entry[key] for key in SOLID if key in entry} if isinstance(entry, Mapping) else {}
+        if numbers and isinstance(entry.get("name"), str):
+            solids[entry["name"]] = numbers
+            labels[entry["name"]] = f"mechanism.bodies[{k}]"
+            entry = {key: value for key, value in entry.items() if key not in SOLID}
+        plain.append(entry)
+    return {**given, "bodies": plain}, solids, labels
+
+
 def _read_bodies(given: Any) -> dict[str, dict[str, Any]]:
     bodies: dict[str, dict[str, Any]] = {}
     for k, entry in enumerate(_list("mechanism.bodies", given)):
         where = f"mechanism.bodies[{k}]"
+        if isinstance(entry, Mapping) and any(key in entry for key in SOLID):
+            raise ParameterError(
+                f"{where}: a structure has no {', '.join(SOLID)}, which are numbers of a Geometry; give the "
+                "list to Geometry(mechanism=...), or the numbers to its `solids`"
+            )
         keys = _entries(where, entry, ("name", "tail", "head"), ("length", "points", "role"))
         name = _name(f"{where}.name", keys["name"])
         if name in bodies or name == FRAME_NAME:

@@ -180,6 +180,8 @@ def leg_to_mjcf(
     options = Options(timestep, floor=None if ground is None else ground.friction)
     text = write_mjcf([leg], trunk, (0.0, trunk.height), options)
     if path is not None:
+        if not isinstance(path, (str, Path)):
+            raise ParameterError(f"path: expected the path of a file that ends in .xml, got {path!r}")
         path = Path(path)
         if path.suffix != ".xml":
             raise ParameterError(f"path: expected a file that ends in .xml, got {str(path)!r}")

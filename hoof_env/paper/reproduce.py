@@ -7,7 +7,7 @@ exactly in its gait.
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Collection, Mapping
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
@@ -17,7 +17,9 @@ import numpy as np
 
 import hoof_env  # noqa: F401  (registers the environments)
 from hoof_env._output import staged
-from hoof_env.errors import HoofEnvError
+from hoof_env.errors import HoofEnvError, ParameterError
+from hoof_env.leg.geometry import Geometry
+from hoof_env.leg.mechanism_list import PAPER
 from hoof_env.paper import report
 from hoof_env.paper.measure import Trace, cycle_of, measure_stance
 from hoof_env.paper.rows import CONDITIONS, EXACT, Published, compare, counted, load_published, settings_of
@@ -79,11 +81,15 @@ def reproduce(progress: Callable[[str], None] | None = None, *, preset: str | No
     Args:
         progress: function that is called with one line of text after each run.
         preset: name or file of a geometry; None takes the environment's default.
+
+    Raises:
+        ParameterError: the preset is no leg of the paper's mechanism, or lacks its gaits.
     """
     tell = progress or (lambda line: None)
     settings: dict[str, Any] = {} if preset is None else {"preset": preset}
     leg: Any = gymnasium.make(ENVIRONMENT, **settings).unwrapped
     geometry = leg.geometry
+    _check_paper(preset, geometry, leg.gaits)
     ground = leg.engine.ground
     published = load_published()
     traces: dict[tuple[str, str, str], Trace] = {}
@@ -112,6 +118,16 @@ def reproduce(progress: Callable[[str], None] | None = None, *, preset: str | No
     for solver in SOLVERS:
         tell(f"{solver}: {counted(rows, shapes, solver)}")
     return Reproduction(rows, shapes, traces, geometry, published, ground)
+
+
+def _check_paper(preset: str | None, geometry: Geometry, gaits: Collection[str]) -> None:
+    """Raise `ParameterError` unless a leg has the paper's mechanism and gaits."""
+    if geometry.mechanism != PAPER or not {*GAITS} <= {*gaits}:
+        feet = ", ".join(geometry.mechanism.feet)
+        raise ParameterError(
+            f"preset: expected a leg of the paper's mechanism with the gaits {', '.join(GAITS)}, whose "
+            f"stances the paper prints; {preset!r} has the feet {feet} and the gaits {', '.join(gaits)}"
+        )
 
 
 def _judge_all(

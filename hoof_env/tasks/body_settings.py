@@ -51,8 +51,8 @@ class BodySettings:
                 "JSON file"
             ),
             of_horse=(
-                "the legs' linkage: $presets, or [your own](../own_task.md#a-leg-of-your-own): a mapping "
-                "or a JSON file"
+                "the legs' linkage, with the paper's mechanism: $horse_presets, or [your "
+                "own](../own_task.md#a-leg-of-your-own): a mapping or a JSON file"
             ),
         ),
     ] = DEFAULT_PRESET

@@ -69,6 +69,58 @@ def test_solids_cannot_be_changed_from_outside():
     assert Geometry.from_dict(leg.to_dict()) == leg
 
 
+def listed(**numbers):
+    """The list, with numbers of the body AC in it."""
+    mechanism = copy.deepcopy(FOUR_BAR)
+    mechanism["bodies"][1] |= numbers
+    return mechanism
+
+
+def test_numbers_of_a_body_may_stand_in_the_list():
+    solid = {"mass": 2.0, "centre": [0.1, 0.2], "inertia": 0.3}
+    leg = Geometry(**VALUES | {"mechanism": listed(**solid)})
+    assert leg == Geometry(**VALUES | {"solids": {"AC": solid}})
+    assert leg.body_masses[1] == 2.0
+    assert Geometry.from_dict(leg.to_dict()) == leg
+    # a rod is uniform unless said
+    assert Geometry(**VALUES | {"mechanism": listed(mass=2.0)}).body_centres[1] == 0.5
+
+
+@pytest.mark.parametrize(
+    ("numbers", "more", "words"),
+    [
+        ({"mass": -1}, {}, r"^mechanism\.bodies\[1\]\['mass'\]: expected a finite number in \(0, inf\]"),
+        ({"centre": 3}, {}, r"^mechanism\.bodies\[1\]\['centre'\]: expected two numbers"),
+        ({"colour": 3}, {}, r"^mechanism\.bodies\[1\]: expected exactly name, .*; unknown colour"),
+        ({"mass": 1}, {"AC": {}}, r"^solids\['AC'\]: mechanism\.bodies\[1\] has numbers of 'AC', too"),
+    ],
+)
+def test_wrong_numbers_in_the_list_are_named(numbers, more, words):
+    with pytest.raises(ParameterError, match=words):
+        Geometry(**VALUES | {"mechanism": listed(**numbers), "solids": more})
+
+
+def test_a_structure_has_no_numbers():
+    with pytest.raises(ParameterError, match=r"bodies\[1\]: a structure has no mass.*Geometry\(mechanism"):
+        read_mechanism(listed(mass=2.0))
+
+
+def test_roles_are_written_with_the_leg():
+    given = PAPER.to_mapping()
+    given["bodies"][0]["role"] = "driver"
+    leg = load_geometry().replace(mechanism=given)
+    assert leg == load_geometry()
+    assert Geometry.from_dict(leg.to_dict()).mechanism.bodies[0].role == "driver"
+
+
+def test_a_name_or_path_of_another_kind_is_refused():
+    leg = load_geometry("klann")
+    with pytest.raises(ParameterError, match=r"point: expected one of B, D, .*, O, P, got 'X'"):
+        leg.pose(0.0).point("X")
+    with pytest.raises(ParameterError, match=r"path: expected the path of a file .*, got 3"):
+        leg.to_mjcf(3)
+
+
 @pytest.mark.parametrize(
     ("changes", "words"),
     [
