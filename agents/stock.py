@@ -3,6 +3,7 @@
     python -m agents.stock                                 all trainings that the table lacks, hours
     python -m agents.stock --env-id hoof_env/HorseLeg-v0 --algo ppo --seeds 3 --steps 100000 --out runs/stock
     python -m agents.stock --draw                          table and picture alone
+    python -m agents.stock --preset klann                  of another leg, to docs/evidence/legs/klann
 
 PPO, SAC and TD3 are Stable-Baselines3's, TQC is sb3-contrib's, made as `PPO("MlpPolicy", env)` makes them. A
 policy is scored without its noise on 100 starts that no training meets. A training is one set of rows in
@@ -16,15 +17,17 @@ from __future__ import annotations
 import multiprocessing
 import time
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from agents import runs, stock_page
 from agents.command import run
-from agents.score import FINAL_SEEDS, make_rows
+from agents.score import FINAL_SEEDS, make_rows, play_rows
 from agents.settings import FOLDER, load_settings
-from agents.stock_plan import COLUMNS, PLAN, TUNED, Curves, read_curves
+from agents.stock_plan import COLUMNS, FIGURES, LEGS, LEGS_PLAN, PLAN, TUNED, Curves, read_curves
 from agents.train import Args as TrainArgs
 from agents.train import make_model
 from hoof_env._output import check_folder
@@ -33,6 +36,9 @@ from hoof_env.saved_policy import ALGORITHMS, algorithm_class
 
 OUT = Path(__file__).parents[1] / "docs" / "evidence" / "stock"
 """Folder of the published curves."""
+
+LEGS_OUT = OUT.with_name("legs")
+"""Folder with one for each other leg."""
 
 
 @dataclass(frozen=True)
@@ -47,10 +53,13 @@ class Args:
     """trainings of each, from seed 0 on; otherwise those of the table"""
     steps: int | None = None
     """of each training; otherwise those of the table. Of ppo_flat rounded up to whole rollouts"""
+    preset: str | None = None
+    """another leg than that of the ids: jansen, klann or fourbar; agents.legs writes its table"""
     workers: int = 1
     """trainings side by side, each on one thread"""
-    out: Path = OUT
-    """folder of curves.csv, README.md and stock.png"""
+    out: Path | None = None
+    """folder of curves.csv, README.md and stock.png; otherwise docs/evidence/stock, of a preset
+    docs/evidence/legs/PRESET"""
     draw: bool = False
     """train nothing; write table and picture from what is there"""
 
@@ -79,19 +88,21 @@ def jobs(args: Args) -> list[Job]:
     for name in ("seeds", "steps", "workers"):
         if getattr(args, name) is not None:
             check_number(name, getattr(args, name), low=1, high=1e9)
+    plan = PLAN
+    if args.preset is not None:
+        check_choice("preset", args.preset, LEGS)
+        plan = tuple(curves for curves in LEGS_PLAN if curves.preset == args.preset)
     chosen = [
-        curves for curves in PLAN if args.env_id in (None, curves.env_id) and args.algo in (None, curves.algo)
+        curves for curves in plan if args.env_id in (None, curves.env_id) and args.algo in (None, curves.algo)
     ]
     if not chosen:
-        known = ", ".join(dict.fromkeys(f"{curves.algo} on {curves.env_id}" for curves in PLAN))
+        known = ", ".join(dict.fromkeys(f"{curves.algo} on {curves.env_id}" for curves in plan))
         raise ParameterError(f"expected one of {known}; got {args.algo} on {args.env_id}")
     trainings = []
     for curves in chosen:
         steps = whole_rollouts(curves, args.steps) if args.steps else curves.steps
         # Steps of the command's choice keep the distance of scores where they can
-        asked = Curves(
-            curves.env_id, curves.algo, args.seeds or curves.seeds, steps, min(curves.every, steps)
-        )
+        asked = replace(curves, seeds=args.seeds or curves.seeds, steps=steps, every=min(curves.every, steps))
         trainings += [Job(asked, seed) for seed in range(asked.seeds)]
     return trainings
 
@@ -114,7 +125,8 @@ def train(job: Job) -> list[dict[str, Any]]:
     # Trainings share the cores; seconds are comparable only on one thread
     torch.set_num_threads(1)
     curves = job.curves
-    envs = make_rows(curves.env_id, len(FINAL_SEEDS))
+    envs = make_rows(curves.env_id, len(FINAL_SEEDS), **leg_of(curves))
+    assert envs is not None
     rows: list[dict[str, Any]] = []
     commit = runs.versions().get("commit", "")
 
@@ -138,8 +150,14 @@ def train(job: Job) -> list[dict[str, Any]]:
 
     def add(model: Any, steps: int, seconds: float) -> None:
         """Score a model and append the row."""
-        figures = (steps, round(stock_page.mean_return(model, envs), 2), round(seconds, 1), commit)
+        episodes = play_rows(envs, model, FINAL_SEEDS)
+        means = {
+            name: float(np.mean([episode[name] for episode in episodes])) for name in ("return", *FIGURES)
+        }
+        figures = (steps, round(means["return"], 2), round(seconds, 1), commit)
         rows.append(dict(zip(COLUMNS, (*job.key, *figures), strict=True)))
+        if curves.preset:
+            rows[-1] |= {name: round(means[name], 4) for name in FIGURES}
 
     model = tuned_model(job) if curves.algo == TUNED else stock_model(job)
     add(model, 0, 0.0)
@@ -148,9 +166,14 @@ def train(job: Job) -> list[dict[str, Any]]:
     return rows
 
 
+def leg_of(curves: Curves) -> dict[str, Any]:
+    """Return the argument of the environment that asks for another leg, if there is one."""
+    return {"preset": curves.preset} if curves.preset else {}
+
+
 def stock_model(job: Job) -> Any:
     """Return the learner as its library makes it."""
-    env = runs.make_env(job.curves.env_id)
+    env = runs.make_env(job.curves.env_id, **leg_of(job.curves))
     return algorithm_class(job.curves.algo)("MlpPolicy", env, seed=job.seed, device="cpu")
 
 
@@ -172,6 +195,11 @@ def trained(pending: Sequence[Job], workers: int) -> Iterator[list[dict[str, Any
         yield from pool.imap_unordered(train, pending)
 
 
+def folder_of(args: Args) -> Path:
+    """Return the folder that is written."""
+    return args.out or (LEGS_OUT / args.preset if args.preset else OUT)
+
+
 def has_run(rows: Sequence[dict[str, Any]], job: Job) -> bool:
     """True if a training's rows are there, up to its last step."""
     steps = [row["steps"] for row in rows if (row["env_id"], row["algo"], row["seed"]) == job.key]
@@ -187,9 +215,10 @@ def stock(args: Args) -> list[dict[str, Any]]:
         OutputError: the folder cannot be written.
     """
     wanted = jobs(args)
-    check_folder(args.out)
-    args.out.mkdir(parents=True, exist_ok=True)
-    rows = read_curves(args.out)
+    out = folder_of(args)
+    check_folder(out)
+    out.mkdir(parents=True, exist_ok=True)
+    rows = read_curves(out)
     pending = [] if args.draw else [job for job in wanted if not has_run(rows, job)]
     for steps in sorted({job.curves.steps for job in pending if args.steps not in (None, job.curves.steps)}):
         print(f"{TUNED}: {steps} steps instead of {args.steps}, which are no whole rollouts", flush=True)
@@ -198,12 +227,12 @@ def stock(args: Args) -> list[dict[str, Any]]:
         # A longer training replaces a shorter one of the same seed
         rows = [row for row in rows if (row["env_id"], row["algo"], row["seed"]) != key] + new
         rows.sort(key=lambda row: (row["env_id"], row["algo"], row["seed"], row["steps"]))
-        runs.write_csv(args.out / "curves.csv", COLUMNS, rows)
+        runs.write_csv(out / "curves.csv", COLUMNS + FIGURES if args.preset else COLUMNS, rows)
         env_id, algo, seed = key
         returns = " ".join(f"{row['return']:.0f}" for row in new)
         print(f"{done} of {len(pending)}: {algo} on {env_id}, seed {seed}: {returns}", flush=True)
-    if rows:
-        stock_page.write(args.out, rows)
+    if rows and args.preset is None:
+        stock_page.write(out, rows)
     return rows
 
 
@@ -213,7 +242,7 @@ def main(argv: list[str] | None = None) -> None:
 
     args = tyro.cli(Args, args=argv, prog="python -m agents.stock", description=__doc__)
     stock(args)
-    print(f"written: {args.out / 'README.md'}")
+    print(f"written: {folder_of(args)}")
 
 
 if __name__ == "__main__":

@@ -19,6 +19,7 @@ class Curves:
     seeds: int
     steps: int
     every: int  # steps between two scores
+    preset: str = ""  # leg, if it is not the id's own
 
 
 TUNED: Final = "ppo_flat"
@@ -41,10 +42,22 @@ PLAN = (
 )
 """Trainings of the published table, in the order of training."""
 
+LEGS = ("jansen", "klann", "fourbar")
+"""Presets of other legs that are trained on `LEG`."""
+
+LEGS_PLAN = (
+    *(Curves(LEG, "ppo", 5, 200_000, 20_480, preset) for preset in LEGS),
+    *(Curves(LEG, "sac", 5, 60_000, 6_000, preset) for preset in LEGS),
+)
+"""Their trainings."""
+
 
 COLUMNS = ("env_id", "algo", "seed", "steps", "return", "train_seconds", "commit")
 """Columns of curves.csv: a line for each score. The seconds are those of the processor for learning alone so
 far; the commit is that of the code that trained, empty if there is no git."""
+
+FIGURES = ("speed_m_s", "stance_peak_n", "cost_of_transport", "weight_share")
+"""Further columns for other legs: means of the episodes of the score."""
 
 
 def read_curves(folder: Path) -> list[dict[str, Any]]:
@@ -67,6 +80,7 @@ def read_curves(folder: Path) -> list[dict[str, Any]]:
                     "return": float(row["return"]),
                     "train_seconds": float(row["train_seconds"]),
                     "commit": row["commit"] or "",
+                    **{name: float(row[name]) for name in FIGURES if name in row},
                 }
                 for row in csv.DictReader(file)
             ]

@@ -34,7 +34,7 @@ def advance(hips: tuple[float, ...], trunk: str, count: int, steps: int, calls: 
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # it warns of steps that are long for the ground
         engine = TrunkEngine(limbs, body, Ground(exponent=1.375), sim_dt=1e-3, substeps=1, num_envs=count)
-    engine.reset(walk, crank_angle=np.add.outer(np.arange(len(hips)) * np.pi, np.linspace(0.3, 6.5, count)))
+    engine.reset(walk, np.add.outer(np.arange(len(hips)) * np.pi, np.linspace(0.3, 6.5, count)))
     state = engine.get_state()
 
     def run() -> None:

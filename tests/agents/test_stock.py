@@ -53,6 +53,21 @@ def test_a_training_scores_a_learner_as_its_library_makes_it(tmp_path, monkeypat
     assert first[0]["train_seconds"] == 0.0 < first[1]["train_seconds"]
 
 
+def test_another_leg_is_trained_by_its_own_plan_with_more_figures(tmp_path, monkeypatch):
+    monkeypatch.setattr(stock, "FINAL_SEEDS", FINAL_SEEDS[:3])
+    plan = stock.jobs(Args(preset="klann"))
+    assert [(job.curves.algo, job.curves.steps) for job in plan] == [("ppo", 200_000)] * 5 + [
+        ("sac", 60_000)
+    ] * 5
+    args = Args(preset="klann", algo="ppo", seeds=1, steps=2048, out=tmp_path / "klann")
+    rows = stock.stock(args)
+    assert stock.stock_model(stock.jobs(args)[0]).env.envs[0].unwrapped.geometry.name == "klann"
+    assert [row["steps"] for row in rows] == [0, 2048]
+    assert read_curves(args.out) == rows
+    assert all(row["stance_peak_n"] > 0 for row in rows)
+    assert not (args.out / "README.md").exists()
+
+
 def test_steps_of_ppo_flat_are_whole_rollouts_so_that_the_last_is_scored(tmp_path, monkeypatch, capsys):
     """Without them a training that has no row of its last step would be made again each time."""
     monkeypatch.setattr(stock_page, "FINAL_SEEDS", FINAL_SEEDS[:3])

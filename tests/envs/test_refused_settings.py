@@ -47,7 +47,10 @@ SETTINGS = {
         ),
         ({"wings": 2}, r"unexpected keyword argument 'wings' \(known: preset, gait, trunk, "),
         ({"task": "fly"}, "task: expected one of fixed, horse, leg, .*got 'fly'"),
-        ({"preset": "no_such_leg"}, "preset: expected one of identified, jansen, klann, got 'no_such_leg'"),
+        (
+            {"preset": "no_such_leg"},
+            "preset: expected one of .*, klann, got 'no_such_leg'",
+        ),
         ({"trunk": "floating"}, "trunk: expected one of fixed, rail, suspended, got 'floating'"),
         ({"trunk": "free"}, "trunk: expected one of fixed, rail, suspended, got 'free'"),
         ({"trunk": 3}, "trunk: expected one of fixed, rail, suspended, got 3"),

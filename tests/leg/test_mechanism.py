@@ -11,7 +11,7 @@ from hoof_env.leg.geometry import Geometry, load_geometry
 from hoof_env.leg.mechanism import Dyad
 from tests.leg.mechanisms import leg_with_everything, random_leg
 
-SHIPPED = ["jansen", "klann"]
+SHIPPED = ["jansen", "klann", "fourbar"]
 
 
 def distances(leg, theta, z):
@@ -148,9 +148,9 @@ def test_scaled_solids_keep_their_shape():
     ("name", "stroke", "lift", "low", "share"),
     [("jansen", 67.9, 22.5, -91.8, 0.58), ("klann", 64.0, 31.0, -45.7, 0.48)],
 )
-def test_feet_of_legs_that_ship_draw_their_published_paths(name, stroke, lift, low, share):
-    """In the units of the published lengths. Jansen's path is that of circles by hand, see `test_jansen`; the
-    stance of Klann's is level for nearly half of a turn, as its patent says."""
+def test_feet_of_legs_with_published_lengths_keep_their_paths(name, stroke, lift, low, share):
+    """In the units of these lengths. Jansen's path is that of circles by hand, see `test_jansen`; of Klann's
+    leg no path is published, and its figures are those of our closed form, kept here."""
     leg = load_geometry(name)
     unit = leg.crank_length / {"jansen": 15.0, "klann": 17.5}[name]
     foot = solve(leg, np.linspace(0, 2 * np.pi, 720, endpoint=False))[0][:, -1] / unit
@@ -159,6 +159,16 @@ def test_feet_of_legs_that_ship_draw_their_published_paths(name, stroke, lift, l
     assert foot.imag.min() == pytest.approx(low, abs=0.1)
     assert np.mean(foot.imag < foot.imag.min() + 3) == pytest.approx(share, abs=0.02)
     assert leg.hip_height == pytest.approx(-low * unit, rel=2e-3)
+
+
+def test_bends_of_klanns_links_are_near_those_of_his_patent():
+    """30 degrees of the leg and 12.8 of the arm, by diywalkers.com/klann-linkage-optimizer.html; ours are the
+    lengths of a leg that was made more level."""
+    leg = load_geometry("klann")
+    at = dict(zip(leg.mechanism.points, solve(leg, [0.0])[0][0], strict=True))
+    for first, middle, last, bend in (("E", "F", "G", 30.0), ("P", "H", "F", 12.8)):
+        turned = np.angle((at[last] - at[middle]) / (at[middle] - at[first]), deg=True)
+        assert abs(turned) == pytest.approx(bend, abs=4.0)
 
 
 @pytest.mark.parametrize("name", SHIPPED)

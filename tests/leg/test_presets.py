@@ -29,10 +29,11 @@ def test_a_preset_by_path_is_the_preset_by_name(tmp_path):
 
 def test_every_preset_says_whether_it_is_identified_or_published():
     assert load_geometry().name == "identified"
-    assert preset_names() == ["identified", "jansen", "klann"]
+    assert preset_names() == ["fourbar", "identified", "jansen", "klann"]
     assert load_geometry("identified").provenance.startswith("Identified, not published")
     for name in ("jansen", "klann"):
         assert load_geometry(name).provenance.startswith("Published: ")
+    assert load_geometry("fourbar").provenance.startswith("Found, not published: ")
 
 
 def test_a_missing_file_and_an_unknown_name(tmp_path):
@@ -40,7 +41,7 @@ def test_a_missing_file_and_an_unknown_name(tmp_path):
         load_geometry(tmp_path / "none.json")
     with pytest.raises(DataFileError, match="cannot read"):
         load_geometry(tmp_path)  # a folder
-    known = "identified, jansen, klann"
+    known = "fourbar, identified, jansen, klann"
     with pytest.raises(ParameterError, match=f"preset: expected one of {known}, got 'first_fit'"):
         load_geometry("first_fit")
 

@@ -15,6 +15,7 @@ from tests.legs import PRESETS
 mujoco = pytest.importorskip("mujoco")
 
 THETA, SWING = 0.3, 0.4
+LEGS = PRESETS | {name: name for name in ("jansen", "klann", "fourbar")}
 LOOSE = Motor(speed_gain=0.0, torque_limit=0.0, rotor_inertia=0.0)
 """Motor that is not there."""
 
@@ -48,7 +49,7 @@ class Model:
         return max(np.linalg.norm(place - expected.point(name)) for name, place in self.sites())
 
 
-@pytest.mark.parametrize("preset", PRESETS.values(), ids=PRESETS)
+@pytest.mark.parametrize("preset", LEGS.values(), ids=LEGS)
 def test_all_points_go_where_they_go_here_through_a_turn(preset):
     leg = load_geometry(preset)
     model = Model(leg.to_mjcf(theta=THETA, swing=SWING, motor=Motor()))
@@ -56,11 +57,11 @@ def test_all_points_go_where_they_go_here_through_a_turn(preset):
     model.data.ctrl[[model.model.actuator("swing").id, model.model.actuator("crank").id]] = SWING, 2 * np.pi
     for _ in range(20):
         model.step(0.06)
-        assert model.miss(leg, leg.hip_height) < 3e-4
+        assert model.miss(leg, leg.hip_height) < 3e-4 * leg.body_lengths.max()
     assert model.at("crank") > THETA + 2 * np.pi
 
 
-@pytest.mark.parametrize("preset", PRESETS.values(), ids=PRESETS)
+@pytest.mark.parametrize("preset", LEGS.values(), ids=LEGS)
 def test_a_crank_that_is_let_go_swings_as_here(preset):
     """The leg falls about its crank with nothing to hold it but the hip."""
     leg = load_geometry(preset)

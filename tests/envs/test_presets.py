@@ -1,0 +1,74 @@
+"""Legs of other mechanisms in the environments: every id of one leg takes them, and their gaits walk."""
+
+import gymnasium as gym
+import numpy as np
+import pytest
+
+import hoof_env  # noqa: F401  (registers the environments)
+from hoof_env.envs.policies import make_policy
+from hoof_env.errors import ParameterError
+from hoof_env.tasks.one_leg import OneLeg
+from hoof_env.tasks.registry import TASKS
+
+PRESETS = ("jansen", "klann", "fourbar")
+IDS = [task.id for task in TASKS.values() if task.body is OneLeg]
+
+
+@pytest.mark.parametrize("preset", PRESETS)
+@pytest.mark.parametrize("env_id", IDS)
+def test_every_id_of_one_leg_steps_with_every_preset(env_id, preset):
+    env = gym.make(env_id, preset=preset)
+    policy = make_policy("walk", env)
+    observation, _ = env.reset(seed=0, options=policy.start)
+    pressed = 0.0
+    for k in range(40):
+        assert env.observation_space.contains(observation)
+        action, _ = policy.predict(observation, episode_start=k == 0)
+        observation, reward, terminated, truncated, _ = env.step(action)
+        assert np.isfinite(reward).all()
+        assert not terminated
+        report = env.unwrapped.engine.report
+        pressed = max(pressed, report["toe_normal"].item())
+        assert report["heel_normal"].item() == 0.0
+        if truncated:
+            break
+    assert pressed > 50
+
+
+@pytest.mark.parametrize("preset", PRESETS)
+def test_gaits_of_presets_carry_the_trunk_and_keep_their_speed(preset):
+    """The walk is that of the Froude number 0.25, the run makes the most of 2.5 m/s."""
+    speeds = {}
+    for name in ("walk", "run"):
+        envs = gym.make_vec("hoof_env/HorseLeg-v0", num_envs=8, preset=preset)
+        with_gait = gym.make("hoof_env/HorseLeg-v0", preset=preset)
+        policy = make_policy(name, with_gait)
+        observations, _ = envs.reset(seed=0, options=policy.start)
+        start = np.ones(8, bool)
+        done = np.zeros(8, bool)
+        while not done.any():
+            actions, _ = policy.predict(observations, episode_start=start)
+            observations, _, terminated, truncated, infos = envs.step(actions)
+            start[:] = False
+            done = terminated | truncated
+        summary = infos["episode_summary"]
+        assert not summary["failed"].any()
+        assert (summary["weight_share"] > 0.6).all()
+        speeds[name] = float(np.mean(summary["speed_m_s"]))
+    assert speeds["walk"] == pytest.approx(2.04, rel=0.1)
+    assert speeds["run"] > 2.0
+
+
+def test_a_horse_refuses_them_with_words():
+    with pytest.raises(ParameterError, match="geometry 'klann': expected the paper's mechanism"):
+        gym.make("hoof_env/Horse-v0", preset="klann")
+
+
+@pytest.mark.parametrize("preset", PRESETS)
+def test_the_paper_is_not_reproduced_by_another_leg(preset):
+    from hoof_env.paper.reproduce import reproduce
+
+    with pytest.raises(
+        ParameterError, match="preset: expected a leg of the paper's mechanism with the gaits"
+    ):
+        reproduce(preset=preset)
