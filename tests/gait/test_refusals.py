@@ -5,7 +5,7 @@ import json
 import numpy as np
 import pytest
 
-from hoof_env.dynamics.constrained import ConstrainedLeg
+from hoof_env.eq8.solver import ConstrainedLeg
 from hoof_env.errors import DataFileError, ParameterError
 from hoof_env.gait import (
     FASTEST_CRANK,
