@@ -82,8 +82,8 @@ TARGETS = {
     "clearance": (0.25, -0.05),
     "longest": (1.0, 0.2),
 }
-"""What is asked of the `figures`, and the miss that costs 1: a higher figure is none where that is negative,
-else a lower one."""
+"""Wanted value of each of the `figures`, and the miss that costs 1: a higher figure is none where that is
+negative, else a lower one."""
 
 LOCKED = 1e3  # cost of a leg that does not turn
 

@@ -37,6 +37,7 @@ def draw(presets: Sequence[str], gaits: Gaits, path: Path) -> None:
             draw_leg(top, load_geometry(preset), gaits[preset]["walk"])
             top.set_title(preset)
             draw_forces(bottom, preset, gaits[preset])
+        above[0].legend(loc="lower right")
         above[0].set_ylabel("height, hip heights")
         below[0].set_ylabel("normal force, weights")
         below[-1].legend(loc="upper right")
@@ -71,7 +72,6 @@ def draw_leg(axes: Any, leg: Geometry, gait: GaitParameters) -> None:
         axes.plot(leg.travel * closed.real, closed.imag, color=colour, label=label)
     axes.set_aspect("equal")
     axes.set_xlabel("hip heights")
-    axes.legend(loc="upper left")
 
 
 def draw_forces(axes: Any, preset: str, gaits: Mapping[str, GaitParameters]) -> None:

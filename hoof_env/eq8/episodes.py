@@ -50,7 +50,7 @@ finite, up to 1e300."""
 
 
 class Scheme(NamedTuple):
-    """How the paper's solver integrates: time step [s], Baumgarte's parameters [1/s], name of the scheme."""
+    """Time step [s], Baumgarte's parameters [1/s] and name of the scheme with which Eq. 8 is integrated."""
 
     sim_dt: float
     alpha: float

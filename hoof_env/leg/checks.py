@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from hoof_env.errors import ParameterError, check_number
 from hoof_env.leg.mechanism import Mechanism
+from hoof_env.leg.mechanism_list import read_mechanism, split_solids
 
 Solids = Mapping[str, Mapping[str, Any]]
 """Bodies that are no uniform rods, see `Geometry`."""
@@ -105,6 +106,16 @@ def checked_pivot(given: Any, pivots: Sequence[str]) -> Any:
         where = "pivot" if len(pivots) == 1 else f"pivot[{name!r}]"
         places[name] = tuple(check_number(f"{where}[{i}]", c) for i, c in enumerate(given[name]))
     return places[pivots[0]] if len(pivots) == 1 else MappingProxyType(places)
+
+
+def read_structure(given: Any, solids: Any) -> tuple[Mechanism, dict[str, Mapping[str, Any]]]:
+    """Return mechanism and bodies that are no uniform rods, whose numbers may stand in the list."""
+    labels: dict[str, str] = {}
+    if not isinstance(given, Mechanism):
+        given, listed, labels = split_solids(given)
+        given = read_mechanism(given)
+        solids = merged_solids(solids, listed, labels)
+    return given, checked_solids(solids, given, labels)
 
 
 def merged_solids(given: Any, listed: Solids, labels: Mapping[str, str]) -> Any:

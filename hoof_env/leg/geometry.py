@@ -26,15 +26,14 @@ from hoof_env.leg.checks import (
     check_texts,
     checked_masses,
     checked_pivot,
-    checked_solids,
-    merged_solids,
     numbers_of,
     plain_solids,
+    read_structure,
     scaled_solids,
     with_solids,
 )
 from hoof_env.leg.mechanism import Mechanism
-from hoof_env.leg.mechanism_list import PAPER, read_mechanism, split_solids
+from hoof_env.leg.mechanism_list import PAPER
 from hoof_env.leg.mobility import check_motion
 
 if TYPE_CHECKING:
@@ -76,8 +75,7 @@ class Geometry:
             `TrunkEngine` alone takes such a leg.
         mechanism: the structure, or the list of it; that of the paper by default.
         solids: bodies that are no uniform rods, by name: "mass" [kg], "centre" along and across from the tail
-            [m], "inertia" about it [kg m^2]; what is left out is that of a rod. They may also stand in the
-            `bodies` of a list.
+            [m], "inertia" about it [kg m^2], else those of a rod; or these stand in the list's `bodies`.
         name, provenance: where the numbers come from.
 
     Raises:
@@ -102,14 +100,9 @@ class Geometry:
     solids: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
-        given: Any = self.mechanism
-        solids: Any = self.solids
-        labels: dict[str, str] = {}
-        if not isinstance(given, Mechanism):
-            given, listed, labels = split_solids(given)
-            object.__setattr__(self, "mechanism", read_mechanism(given))
-            solids = merged_solids(solids, listed, labels)
-        names = self.mechanism.lengths
+        mechanism, solids = read_structure(self.mechanism, self.solids)
+        object.__setattr__(self, "mechanism", mechanism)
+        names = mechanism.lengths
         check_keys("lengths", self.lengths, names)
         lengths = {k: check_number(f"lengths[{k!r}]", self.lengths[k], low=1e-3, high=1e3) for k in names}
         points = [dyad.point for dyad in self.mechanism.dyads]
@@ -124,9 +117,8 @@ class Geometry:
         if self.masses is not None:
             object.__setattr__(self, "masses", checked_masses(self.masses, len(self.mechanism.bodies)))
         object.__setattr__(self, "lengths", MappingProxyType(lengths))
-        object.__setattr__(self, "pivot", checked_pivot(self.pivot, self.mechanism.pivots))
+        object.__setattr__(self, "pivot", checked_pivot(self.pivot, mechanism.pivots))
         object.__setattr__(self, "assembly", MappingProxyType({p: int(self.assembly[p]) for p in points}))
-        solids = checked_solids(solids, self.mechanism, labels)
         object.__setattr__(self, "solids", MappingProxyType(solids))
         flag("full_turn", self.full_turn)
         check_motion(self)
@@ -251,10 +243,10 @@ class Geometry:
         # what is the paper's or the default is left out
         if content.pop("full_turn") is False:
             content["full_turn"] = False
-        # mechanisms that differ in the roles of their bodies are equal
-        del content["mechanism"]
-        if self.mechanism.to_mapping() != PAPER.to_mapping():
-            content["mechanism"] = self.mechanism.to_mapping()
+        listed = content.pop("mechanism").to_mapping()
+        # mechanisms that differ in the roles of their bodies are equal, their lists are not
+        if listed != PAPER.to_mapping():
+            content["mechanism"] = listed
         if content.pop("solids"):
             content["solids"] = plain_solids(self.solids)
         return content
