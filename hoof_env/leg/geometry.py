@@ -102,13 +102,12 @@ class Geometry:
     def __post_init__(self) -> None:
         mechanism, solids = read_structure(self.mechanism, self.solids)
         object.__setattr__(self, "mechanism", mechanism)
-        names = mechanism.lengths
-        check_keys("lengths", self.lengths, names)
-        lengths = {k: check_number(f"lengths[{k!r}]", self.lengths[k], low=1e-3, high=1e3) for k in names}
-        points = [dyad.point for dyad in self.mechanism.dyads]
+        check_keys("lengths", self.lengths, mechanism.lengths)
+        given = ((name, self.lengths[name]) for name in mechanism.lengths)
+        lengths = {name: check_number(f"lengths[{name!r}]", x, low=1e-3, high=1e3) for name, x in given}
+        points = [dyad.point for dyad in mechanism.dyads]
         check_keys("assembly", self.assembly, points)
-        signs = {f"assembly[{point!r}]": self.assembly[point] for point in points}
-        check_signs(signs | {"travel": self.travel})
+        check_signs({f"assembly[{p!r}]": self.assembly[p] for p in points} | {"travel": self.travel})
         check_feet(self.toe, self.heel, self.mechanism.feet)
         check_texts({"name": self.name, "provenance": self.provenance})
         for name in ("hip_height", "linear_density"):
