@@ -87,7 +87,7 @@ def parse_space(items: Sequence[str]) -> dict[str, list[Any]]:
             raise ParameterError(f"--space: expected key=[JSON, ...], got {item!r}; agents.tune searches")
         # The later one would replace the earlier silently
         if key in space:
-            raise ParameterError(f"--space: {key} is given twice")
+            raise ParameterError(f"--space: expected each key once, got {key} twice")
         space[key] = values
     return space
 

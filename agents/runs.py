@@ -86,8 +86,13 @@ def make_env(env_id: str, **kwargs: Any) -> gym.Env[Any, Any]:
     take."""
     try:
         return gym.make(env_id, **kwargs)
+    except ParameterError:
+        raise
     except (gym.error.Error, ModuleNotFoundError, TypeError) as error:
-        raise ParameterError(f"environment {env_id!r} with {kwargs or 'no arguments'}: {error}") from None
+        raise ParameterError(
+            f"environment {env_id!r} with {kwargs or 'no arguments'}: expected a registered id and arguments "
+            f"that it takes: {error}"
+        ) from None
 
 
 def make_vec_env(env_id: str, n_envs: int, num_threads: int = 1, **kwargs: Any) -> Any:

@@ -102,7 +102,10 @@ def make_env(env_id: str, arguments: Mapping[str, Any] | None = None) -> gym.Env
     except ParameterError:
         raise
     except (gym.error.Error, ModuleNotFoundError, TypeError) as error:
-        raise ParameterError(f"environment {env_id!r} with {arguments or 'no arguments'}: {error}") from None
+        raise ParameterError(
+            f"environment {env_id!r} with {arguments or 'no arguments'}: expected a registered id and "
+            f"arguments that it takes: {error}"
+        ) from None
     # Refuses environments of other packages, which have no substeps to read.
     surroundings(env)
     return env

@@ -15,7 +15,7 @@ from hoof_env import __version__, cli, records
 from hoof_env.constants import GRAVITY
 from hoof_env.dynamics.layout import TRUNK_STATE
 from hoof_env.envs.policies import GAITS, make_policy, open_loop_record, start_of
-from hoof_env.errors import ParameterError, parse_pairs
+from hoof_env.errors import parse_pairs
 from hoof_env.gait import PARAMETERS, load_gait
 from hoof_env.lab.opensim import MOT_COLUMNS
 from hoof_env.lab.read import read_record
@@ -112,15 +112,6 @@ def test_csv_in_body_weights_keeps_the_weight(tmp_path):
     _, weight = export_episode(out, "run", LEG, seconds=0.4, units="BW")
     found = read_record(out)
     assert (found.unit, found.weight) == ("BW", weight)
-
-
-@pytest.mark.parametrize("suffix", [".csv", ".c3d", ".parquet"])
-def test_bodies_are_refused_where_there_are_no_external_loads(suffix, tmp_path):
-    pytest.importorskip({".c3d": "ezc3d", ".parquet": "pyarrow"}.get(suffix, "numpy"))
-    with pytest.raises(
-        ParameterError, match=r"bodies: expected a .mot or .sto, which have ExternalLoads, got"
-    ):
-        export_episode(tmp_path / f"x{suffix}", "run", LEG, bodies=["leg=LF"])
 
 
 def test_in_swing_force_and_its_place_are_zero(episode):

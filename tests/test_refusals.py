@@ -28,7 +28,10 @@ REQUESTS = {
         ([*CSV, "--policy", "1,0.2,0.3,nan"], "swing_cos: expected .* got nan"),
         ([*CSV, "--policy", "99,0,0,0"], "expected crank_speed from 0 to 12.5664.* got 99"),
         ([*CSV, "--policy", "no.zip"], "model no.zip"),
-        ([*CSV, "--id", "hoof_env/Nobody-v0"], "environment 'hoof_env/Nobody-v0'"),
+        (
+            [*CSV, "--id", "hoof_env/Nobody-v0"],
+            "environment 'hoof_env/Nobody-v0' with no arguments: expected a registered id",
+        ),
         ([*CSV, "--id", "CartPole-v1"], "expected one leg of this package .* got CartPole"),
         ([*CSV, "--args", "wings=2"], "unexpected keyword argument 'wings'"),
         *(
@@ -44,6 +47,17 @@ REQUESTS = {
         ([*CSV, "--threshold", "-1"], "threshold: expected .* got -1"),
         ([*CSV, "--units", "lb"], "units: expected one of BW, N, got 'lb'"),
         (["--out", "{}/x.mot", "--units", "BW"], "units: expected N in .mot, .* got BW"),
+        *(
+            (
+                ["--out", f"{{}}/x{suffix}", "--bodies", "leg=LF"],
+                f"bodies: expected a .mot or .sto, which have ExternalLoads, got {suffix}",
+            )
+            for suffix in (".csv", ".c3d", ".parquet")
+        ),
+        (
+            ["--out", "{}/x.c3d", "--reactions"],
+            "reactions: expected a .csv, .parquet, .mot or .sto, got .c3d",
+        ),
         (["--out", "{}/x.mot", "--bodies", "tail=x"], "bodies: expected leg=BODY, got tail='x'"),
         (
             [*CSV, "--policy", "idle", "--args", "episode_seconds=1e6"],
@@ -94,6 +108,9 @@ def refused(command, tmp_path, capsys):
 def test_requests(command, options, words, tmp_path, capsys):
     if command == "render":
         pytest.importorskip("imageio_ffmpeg")
+    for suffix, package in ((".c3d", "ezc3d"), (".parquet", "pyarrow")):
+        if options[1].endswith(suffix):
+            pytest.importorskip(package)
     said = refused([command, *(text.format(tmp_path) for text in options)], tmp_path, capsys)
     assert re.search(words, said), said
 

@@ -303,7 +303,9 @@ def _load(path: Path) -> Table:
     # Readers of other packages raise exceptions of any type.
     except Exception as error:
         reason = " ".join(str(error).split()) or type(error).__name__
-        raise DataFileError(f"record {str(path)!r}: cannot read it ({reason:.200})") from None
+        raise DataFileError(
+            f"record {str(path)!r}: expected a {suffix} that can be read, cannot read it ({reason:.200})"
+        ) from None
     if not table.names or any(len(values) < 2 for values in table.columns.values()):
         raise DataFileError(f"record {str(path)!r}: expected two rows of numbers or more, found fewer")
     return table

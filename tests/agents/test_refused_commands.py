@@ -215,7 +215,7 @@ CASES = [
     plans("'seed'", space=("seed=[1]",)),
     plans("wheels", space=("env.wheels=[4]",)),
     plans("flying", space=('env.trunk=["flying"]',)),
-    plans("gamma is given twice", space=("gamma=[0.9]", "gamma=[0.8]")),
+    plans("--space: expected each key once, got gamma twice", space=("gamma=[0.9]", "gamma=[0.8]")),
     plans("seeds: expected .* got 0", seeds=0),
     plans("report_every: expected .* got 0", report_every=0),
     plans("steps: expected .* got 0", steps=0),

@@ -79,7 +79,12 @@ def half_the_weights(folder):
     (folder / WEIGHTS).write_bytes((folder / WEIGHTS).read_bytes()[:100])
 
 
-NORMALS = {"mean": [0.0] * 24, "var": [-1.0] * 24, "epsilon": 1e-8, "clip": 10.0}
+def no_deviation(folder):
+    """Variances below 0, of the right number."""
+    normals = json.loads((folder / ABOUT).read_text())["normalize"]
+    change(folder / ABOUT, normalize={**normals, "var": [-1.0] * len(normals["var"])})
+
+
 RUNS = [
     *(
         (record(**values), r"run\.json: expected")
@@ -110,10 +115,10 @@ RUNS = [
             {"policy_kwargs": {"net_arch": [9]}},
             {"action_space": None},
             {"normalize": {"mean": []}},
-            {"normalize": {**NORMALS, "mean": [0.0], "var": [1.0]}},
-            {"normalize": NORMALS},
+            {"normalize": {"mean": [0.0], "var": [1.0], "epsilon": 1e-8, "clip": 10.0}},
         )
     ),
+    (no_deviation, r"policy\.json"),
     (not_finite, "not finite"),
     (half_the_weights, r"policy\.json"),
     *((cut(part), r"model\.zip: expected a model saved by Stable-Baselines3") for part in (0.0, 0.5, 0.99)),

@@ -85,7 +85,7 @@ FILES = [
     ("row.mot", "x\nendheader\ntime a ground_force_vy\n0 1 2\n1 1\n", {}, DataFileError,
      "got 2 cells under 3 names"),
     ("headless.mot", "time\tground_force_vy\n0\t1\n", {}, DataFileError, "expected a line endheader"),
-    ("bytes.parquet", "not a table", {}, DataFileError, "cannot read it"),
+    ("bytes.parquet", "not a table", {}, DataFileError, "expected a .parquet that can be read, cannot"),
     ("bytes.c3d", "not a c3d", {}, DataFileError, "cannot read it"),
     ("other.xlsx", "", {}, ParameterError, "expected a file that ends in .c3d, .csv"),
     # texts in the layouts of laboratories
