@@ -44,7 +44,7 @@ INTRO = """\
 
 Written by `python -m benchmarks.threads`. {legs} legs, random actions, {steps} control steps of 20 substeps a
 case, {rounds} interleaved rounds of wall time: median (quartiles; extremes). A process has its share of the
-legs and waits for nobody; threads are joined after each control step."""
+legs and waits for no other thread; threads are joined after each control step."""
 
 MODEL = """\
 ## More cores: computed, not measured

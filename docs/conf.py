@@ -3,6 +3,7 @@ other that is rendered and to any file."""
 
 from __future__ import annotations
 
+import html
 import re
 import sys
 from pathlib import Path
@@ -55,6 +56,7 @@ html_math_renderer = "svg"
 autodoc_typehints = "description"
 autodoc_typehints_description_target = "documented"
 autodoc_member_order = "bysource"
+autodoc_type_aliases = {"ArrayLike": "ArrayLike", "NDArray": "NDArray"}
 autodoc_default_options = {"members": True, "show-inheritance": True}
 default_role = "py:obj"  # names in docstrings: a link where the API has the name
 napoleon_google_docstring, napoleon_numpy_docstring = True, False
@@ -75,10 +77,15 @@ html_title = f"hoof-env {version}"
 html_static_path = ["site/static"]
 html_favicon = "site/static/favicon.svg"
 html_css_files = ["style.css"]
-html_js_files = ["scroll.js", ("playback.js", {"defer": "defer"})]
+html_js_files = ["scroll.js", ("animation.js", {"defer": "defer"}), ("playback.js", {"defer": "defer"})]
+html_search_scorer = str(Path(__file__).parent / "site/static/scorer.js")
 html_extra_path = ["site/root"]
 html_show_sourcelink = False
 html_copy_source = False
+
+
+BASES = r'<p>Bases: <code[^>]*><span class="pre">(?:object|NamedTuple|tuple)</span></code></p>'
+"""Bases that say nothing."""
 
 
 def add_children(app: Sphinx, page: str, text: list[str]) -> None:
@@ -101,6 +108,21 @@ def mend_page(app: Sphinx, page: str, template: str, context: dict[str, Any], tr
     context["furo_navigation_tree"] = captions.replace('role="heading"', 'role="heading" aria-level="2"')
     if page.startswith("_modules/"):
         context["body"] = re.sub(r'<a class="viewcode-back".*?</a>', "", context["body"])
+    if page.startswith("docs/api/"):
+        context["body"] = re.sub(BASES, "", context["body"])
+    if isinstance(tree, nodes.document):
+        told = next((text.astext() for text in tree.findall(nodes.paragraph)), "")
+        words = html.escape(" ".join(told.split())[:200])
+        title = html.escape(re.sub(r"<[^>]*>", "", context["title"]))
+        context["metatags"] += (
+            f'<meta name="description" content="{words}"><meta property="og:title" content="{title}">'
+            f'<meta property="og:description" content="{words}"><meta property="og:type" content="article">'
+        )
+
+
+def skip_fields(app: Sphinx, what: str, name: str, member: Any, skip: bool, options: Any) -> bool | None:
+    """Leave out fields of named tuples, which their class describes."""
+    return True if str(getattr(member, "__doc__", "")).startswith("Alias for field number") else None
 
 
 def keep_text(app: Sphinx, what: str, name: str, what_has_it: Any, options: Any, lines: list[str]) -> None:
@@ -115,6 +137,7 @@ def setup(app: Sphinx) -> dict[str, Any]:
     app.connect("source-read", add_children)
     app.connect("builder-inited", playbacks.write)
     app.connect("html-page-context", playbacks.show, priority=900)
+    app.connect("autodoc-skip-member", skip_fields)
     app.connect("autodoc-process-docstring", keep_text, priority=400)  # before napoleon
     app.connect("html-page-context", mend_page, priority=900)  # after furo
     app.connect("doctree-read", unlink_folders)

@@ -25,7 +25,11 @@ HAND_WRITTEN = (
 BLOCK = re.compile(r"^```(\w*)\n(.*?)^```", re.MULTILINE | re.DOTALL)
 EXAMPLES = [
     page
-    for page in (ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md")))
+    for page in (
+        ROOT / "README.md",
+        *sorted((ROOT / "docs").glob("*.md")),
+        *sorted((ROOT / "docs/api").glob("*.md")),
+    )
     if page.stem != "own_task" and "```python" in page.read_text(encoding="utf-8")
 ]
 """Pages whose code this file runs; the tests of tasks and legs of one's own run those of own_task."""
@@ -155,6 +159,27 @@ def test_a_page_has_one_title_and_its_images_have_texts(page):
     text = BLOCK.sub("", page.read_text(encoding="utf-8"))
     assert len(re.findall(r"^# ", text, re.MULTILINE)) == 1
     assert "![](" not in text
+
+
+PREFERRED = {
+    r"hoofs": "hooves",
+    r"the Froude numbers? \d": "Froude number 1",
+    r"and others [12]\d{3}": "et al.",
+    r"slower than life": "slow motion",
+    r"(?:same|has the|have the) bits as": "bitwise identical to",
+    r"[Ww]hoever|[Nn]obody|[Ss]omebody": "anyone, no one, you",
+    r"make again": "reproduce",
+    r"grants": "rewards",
+    r"one's own": "your own",
+}
+"""Words that pages no longer use, and those that they use instead."""
+
+
+@pytest.mark.parametrize("page", [page for page in LIVE if "results" not in page.parts], ids=name)
+def test_pages_use_the_preferred_words(page):
+    text = BLOCK.sub("", page.read_text(encoding="utf-8"))
+    found = {word: PREFERRED[word] for word in PREFERRED if re.search(word, text)}
+    assert not found
 
 
 def test_the_api_has_the_bases_of_its_classes():

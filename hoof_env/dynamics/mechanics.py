@@ -252,7 +252,7 @@ def move_trunk(trunk, kind):  # type: ignore[no-untyped-def]
     drag = -trunk.settings.drag * velocity.real
     total = trunk.settings.total_mass
     lift = (
-        trunk.settings.support
+        trunk.settings.support  # of `trunk_share`
         - total * trunk.settings.gravity
         - trunk.settings.spring * (place.imag - trunk.settings.height)
         - trunk.settings.damper * velocity.imag

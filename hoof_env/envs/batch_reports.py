@@ -16,6 +16,33 @@ from hoof_env.tasks.episode import FAILED, TRUNCATED
 
 Floats = NDArray[np.float64]
 
+SUCCESS_SPEED = 0.9
+"""Least distance of a successful episode over the commanded distance, where a speed is commanded [-]."""
+
+SUMMARY = {
+    "seconds": ("s", "how long it lasted"),
+    "distance_m": ("m", "forward travel"),
+    "speed_m_s": ("m/s", "its mean speed"),
+    "highest_grf_n": ("N", "highest resultant GRF of any substep"),
+    "mean_normal_n": ("N", "mean normal force over the whole time"),
+    "stance_peak_sum_n": ("N", "sum of the peaks of all stances"),
+    "stances": ("-", "how many"),
+    "loading_rate_n_s": (
+        "N/s",
+        "steepest rise of the normal force in a stance while its peak grew, mean of all stances",
+    ),
+    "duty_factor": ("-", "part of the time with load on the hoof, mean of all legs"),
+    "slip_m": ("m", "way that hooves slide in a stance, to and fro, mean of all stances"),
+    "positive_work_j": ("J", "positive work of both drives"),
+    "cost_of_transport": ("-", "work per weight and distance; infinite without forward progress"),
+    "weight_share": ("-", "mean normal force over weight: what the leg bore"),
+    "support_share": ("-", "the rest, which rail or suspension bore"),
+    "failed": ("-", "0 or 1"),
+    "success": ("-", f"1 if it lasted, at {SUCCESS_SPEED} of the commanded speed"),
+}
+"""Figures of an episode by name: unit and meaning, as the manual has them. `summaries_of` computes them. A
+horse's mean force and sum of peaks are sums over its legs, its duty factor is the mean of its legs."""
+
 
 def infos_of(batch: Any, ended: bool = True) -> dict[str, NDArray[Any]]:
     """Return the infos of all environments: start values, measurements, and terms of the last reward.
@@ -55,16 +82,7 @@ def summary_of(batch: Any, env: int) -> dict[str, float]:
 
 
 def summaries_of(batch: Any, envs: Sequence[int] | NDArray[np.int64]) -> dict[str, Floats]:
-    """Return figures of the episodes of some environments, by name, shape (len(envs),) each.
-
-    seconds, distance_m, speed_m_s, highest_grf_n (of the episode), mean_normal_n (normal force over the whole
-    time), stance_peak_sum_n, stances, loading_rate_n_s (mean over stances), duty_factor,
-    positive_work_j (braking is not recovered), cost_of_transport (work per weight and distance; infinite
-    without forward progress), weight_share (mean normal force over weight: the leg's share), support_share
-    (the rest: the share of rail or suspension), slip_m (mean over stances), failed (0 or 1), success (0 or 1,
-    see `SUCCESS_SPEED`). A horse's mean force and sum of peaks are sums over its legs, its duty factor is the
-    mean of its legs.
-    """
+    """Return the figures `SUMMARY` of the episodes of some environments, by name, shape (len(envs),) each."""
     seconds = batch.episode_rows.time[envs]
     distance = batch.episode_rows.distance[envs]
     names = stride_sums(batch.engine.features)
@@ -98,10 +116,6 @@ def summaries_of(batch: Any, envs: Sequence[int] | NDArray[np.int64]) -> dict[st
         "failed": (batch.episode_rows.ended[envs] == FAILED).astype(np.float64),
         "success": is_success(batch, envs).astype(np.float64),
     }
-
-
-SUCCESS_SPEED = 0.9
-"""Least distance of a successful episode over the commanded distance, where a speed is commanded [-]."""
 
 
 def is_success(batch: Any, envs: Sequence[int] | NDArray[np.int64]) -> NDArray[np.bool_]:

@@ -10,7 +10,7 @@ from typing import Any
 
 from hoof_env.dynamics.parts import ONE_LEG
 from hoof_env.dynamics.stepping import SCHEMES
-from hoof_env.envs.batch_reports import SUCCESS_SPEED
+from hoof_env.envs.batch_reports import SUMMARY
 from hoof_env.eq8.integrators import INTEGRATORS
 from hoof_env.gait import WIDEST, FilterSettings
 from hoof_env.ground.laws import FRICTION_LAWS, NORMAL_LAWS
@@ -64,7 +64,6 @@ def tables() -> dict[str, dict[str, Any]]:
         "carried": round(100 * CARRIED),
         "crank_bound": FilterSettings().crank_rate,
         "swing_bound": FilterSettings().swing_rate,
-        "success_speed": SUCCESS_SPEED,
         "bearing": BEARING,
         "full_allowance": BEARING * LONGEST_STRIDE,
     }
@@ -83,6 +82,7 @@ def tables() -> dict[str, dict[str, Any]]:
     filled_tables["horse_settings"] = {
         name: filled(about, about.of_horse) for name, about in ABOUT.items() if about.of_horse
     }
+    filled_tables["summary"] = {name: list(cells) for name, cells in SUMMARY.items()}
     return filled_tables
 
 

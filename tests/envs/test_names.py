@@ -51,7 +51,7 @@ OF_EPISODES = {
 OF_STARTS = {"speed": "vx at the start", "height": "y at the start", "phase": "of a stride"}
 """Values of a start, which are told and set in words that a horse has, too."""
 
-UNIT = re.compile(r"_(n|j|m|m_s|n_s)$")
+UNIT = re.compile(r"_(n|j|m|s|m_s|n_s)$")
 
 
 def places() -> dict[str, set[str]]:
