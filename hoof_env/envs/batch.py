@@ -113,6 +113,7 @@ class EpisodeBatch(BatchKernels, BatchChanges):
         steps_before: control steps of each row in earlier episodes, from which schedules follow, shape
             (num_envs,).
         is_push_unseen: True if a trunk was pushed since the last step, which no observation shows yet.
+        kept_begins: values of the rows that terms keep at the start of an episode.
         schedule: courses of scheduled settings by name; `randomize` has their ranges, too.
         drawn_names: names of the parameters that any row draws, in the order of `start_values`.
         conditions: conditions of the rows.
@@ -200,7 +201,8 @@ class EpisodeBatch(BatchKernels, BatchChanges):
         """Make the arrays of all episodes."""
         self.has_overrides = np.zeros(self.num_envs, bool)
         self.push_plans: list[tuple[Push, ...]] = [()] * self.num_envs
-        self.steps_before = np.zeros(self.num_envs, np.int64)
+        self.steps_before = np.zeros(self.num_envs)
+        self.kept_begins = np.array([row.begin for term in self.task.terms for row in term.keeps])
         self.is_push_unseen = False
         self.drawn_names = [*self.randomize]
         self.start_values = np.full((self.start_row_count + len(self.randomize), self.num_envs), np.nan)

@@ -23,7 +23,7 @@ class BatchChanges:
     has_overrides: NDArray[np.bool_]
     steps_per_episode: int
     episode_rows: Any
-    steps_before: NDArray[np.int64]
+    steps_before: NDArray[np.float64]
     drawn_names: list[str]
     start_values: NDArray[np.float64]
     start_row_count: Any
@@ -94,7 +94,7 @@ class BatchChanges:
             if name in old:
                 self.start_values[first + k] = old_values[first + old.index(name)]
 
-    def restart_schedules(self, rows: NDArray[np.int64]) -> None:
+    def restart_schedules(self, rows: Sequence[int] | NDArray[np.int64]) -> None:
         """Begin the schedules of rows anew with the next start, which counts the steps of the present
         episode."""
-        self.steps_before[rows] = -self.episode_rows.steps[rows].astype(np.int64)
+        self.steps_before[rows] = -self.episode_rows.steps[rows]

@@ -96,7 +96,7 @@ def start(
     seed means."""
     episode = batch.episode_rows
     options = {**batch.task.start, **options}
-    batch.steps_before[which] += episode.steps[which].astype(np.int64)
+    batch.steps_before[which] += episode.steps[which]
     of_options = options.get("parameters", {})
     parameters = batch.randomize | of_options
     scheduled = [name for name in drawn_names(batch.schedule) if name not in of_options]
@@ -122,11 +122,11 @@ def start(
     batch.body.complete_start(start, episode.target[which], options, batch.engine)
     batch.engine.reset(start.commands, start.theta, envs=which, **start.trunk)
     start_values = [*(start.values[name] for name in batch.body.start_names), *start.gaits.T]
-    unknown = np.full(len(which), np.nan)
-    batch.start_values[:, which] = [
-        *start_values,
-        *(drawn[name] if name in batch.randomize else unknown for name in batch.drawn_names),
+    # Other rows may draw parameters that these do not.
+    each = [
+        drawn[name] if name in batch.randomize else np.full(len(which), np.nan) for name in batch.drawn_names
     ]
+    batch.start_values[:, which] = [*start_values, *each]
     episode.x_before[which] = start.trunk["x"]
     batch.body.begin_episodes(episode, which, start)
     if batch.paper:
@@ -153,9 +153,8 @@ def _clear(batch: Any, which: NDArray[np.int64]) -> None:
     episode.allowance[which] = BEARING * LONGEST_STRIDE
     episode.terms[:, which] = 0.0
     episode.sums[:, which] = 0.0
-    begins = [row.begin for term in batch.task.terms for row in term.keeps]
-    if begins:
-        episode.own[:, which] = np.array(begins)[:, None]
+    if batch.kept_begins.size:
+        episode.own[:, which] = batch.kept_begins[:, None]
 
 
 def begin_targets(
@@ -171,10 +170,10 @@ def begin_targets(
     if batch.target_speed:
         (low, high) = speeds_now(batch, which, vars(batch))
         episode.target[which] = low
-    if batch.target_speed and batch.speed_changes:
-        drawn = [generator.uniform(*ends) for *ends, generator in zip(low, high, generators, strict=True)]
-        episode.target[which] = drawn
-        draw_targets(batch, which, generators)
+        if batch.speed_changes:
+            ends = zip(*np.broadcast_arrays(low, high, which)[:2], generators, strict=True)
+            episode.target[which] = [generator.uniform(slow, fast) for slow, fast, generator in ends]
+            draw_targets(batch, which, generators)
     # After the draws, so that the option does not change what follows from the generator.
     if "target_speed" in options:
         episode.target[which] = options["target_speed"]
@@ -188,14 +187,12 @@ def _now(batch: Any, name: str, env: int) -> float | tuple[float, float]:
     return (low, high) if course.is_range else low
 
 
-def speeds_now(batch: Any, which: NDArray[np.int64], conditions: Mapping[str, Any]) -> tuple[Floats, Floats]:
-    """Return the lowest and highest commanded speed of the episodes of some rows [m/s]."""
+def speeds_now(batch: Any, which: NDArray[np.int64], conditions: Mapping[str, Any]) -> tuple[Any, Any]:
+    """Return the lowest and highest commanded speed of the episodes of some rows, each one number or one for
+    each row [m/s]."""
     course = conditions["schedule"].get(SPEED)
-    if course:
-        ends: tuple[Floats, Floats] = course.after(batch.steps_before[which])
-        return ends
-    low, high = (np.full(len(which), speed) for speed in conditions["target_speed"])
-    return low, high
+    ends: tuple[Any, Any] = conditions["target_speed"]
+    return course.after(batch.steps_before[which]) if course else ends
 
 
 def fill_past(batch: Any, which: NDArray[np.int64]) -> None:

@@ -165,13 +165,13 @@ def _observe(batch: Any) -> None:
     batch.observe_kernel(batch.addresses)
 
 
-def _read_steps(batch: Any, given: Any) -> NDArray[np.int64]:
+def _read_steps(batch: Any, given: Any) -> Floats:
     """Return the control steps of earlier episodes in a state, by which schedules go on.
 
     Raises:
         ParameterError: not a whole number for each environment.
     """
-    steps = np.zeros(batch.num_envs, np.int64) if given is None else np.asarray(given)
+    steps = np.zeros(batch.num_envs) if given is None else np.asarray(given)
     if (
         steps.dtype.kind not in "iuf"
         or steps.shape != (batch.num_envs,)
@@ -180,7 +180,7 @@ def _read_steps(batch: Any, given: Any) -> NDArray[np.int64]:
         raise ParameterError(
             f"state['steps_before']: expected a whole number for each environment, got {given!r:.60}"
         )
-    return steps.astype(np.int64)
+    return steps.astype(np.float64)
 
 
 def _read_conditions(batch: Any, given: Any) -> RowConditions:

@@ -126,7 +126,7 @@ class HorseLegEnv(LegBase, gym.Env[NDArray[np.float32], NDArray[np.float32]]):
         self._check_open("reset")
         checked = check_options(self.batch, options)  # first, so that a refused reset changes nothing
         super().reset(seed=None if seed is None else count("seed", seed, low=0))
-        self.batch.restart_schedules(np.arange(int(seed is not None)))
+        self.batch.restart_schedules([] if seed is None else [0])
         before = self.batch.addresses
         parameters = self.batch.reset([0], [self.np_random], checked)
         if self.batch.addresses is not before:  # `change_settings` took effect: other arrays
