@@ -185,6 +185,8 @@ CASES = [
             ({"seeds": 0}, "seeds: expected .* got 0"),
             ({"steps": -1}, "steps: expected .* got -1"),
             ({"workers": 0}, "workers: expected .* got 0"),
+            ({"preset": "identified"}, "preset: expected one of fourbar, jansen, klann, got 'identified'"),
+            ({"preset": "klann", "algo": "td3"}, "expected one of ppo on .*got td3"),
         )
     ),
     case(
