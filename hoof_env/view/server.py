@@ -60,8 +60,9 @@ class Pages:
 
     @property
     def tabs(self) -> int:
-        """Number of tabs that are open."""
-        return sum(session.connection_count > 0 for session in self.server.get_sessions())
+        """Number of tabs that are open; a page that was refused has no figures and does not count."""
+        open_ones = [session for session in self.server.get_sessions() if session.connection_count > 0]
+        return sum(bool(session.document.roots) for session in open_ones)
 
     def open(self, doc: Any) -> None:
         """Fill the document of a new tab."""

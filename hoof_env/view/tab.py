@@ -85,7 +85,8 @@ class Tab:
         """Say that an episode ended."""
         if ended:
             seed = self.player.simulation.seed
-            self._tell(status=f"The episode ended: {ended}. The next one has seed {seed}.")
+            text = f"The episode ended: {ended}. The next one has seed {seed}."
+            self._tell(status=text, kind="end")
             if self.player.recording is not None:
                 self._stop_recording()
 

@@ -450,9 +450,18 @@ def test_a_ninth_tab_is_refused_and_an_old_page_too(tmp_path):
         return doc
 
     pages = Pages(SETUP, tmp_path)
-    session = type("Session", (), {"connection_count": 1})
-    pages.server = type("Server", (), {"get_sessions": lambda self: [session] * MOST_TABS})()
-    assert "tabs are open" in opened(pages, {}).template_variables["reason"]
+    pages.server = SimpleNamespace(get_sessions=list)
+    playing = SimpleNamespace(connection_count=1, document=opened(pages, {}))
+    sessions = [playing] * MOST_TABS
+    pages.server = SimpleNamespace(get_sessions=lambda: sessions)
+    refused = opened(pages, {})
+    assert "tabs are open" in refused.template_variables["reason"]
+    # A refused page takes no place.
+    sessions[0] = SimpleNamespace(connection_count=1, document=refused)
+    assert "simulation" in opened(pages, {}).template_variables
+    sessions[0] = playing
+    playing.connection_count = 0
+    assert "simulation" in opened(pages, {}).template_variables
     pages.server = type("Server", (), {"get_sessions": lambda self: []})()
     assert "too old" in opened(pages, {"setup": [b"guessed"]}).template_variables["reason"]
     kept = pages.keep(SETUP | {"seed": 7}).partition("=")[2]

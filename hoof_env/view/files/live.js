@@ -21,6 +21,7 @@ const masters = {
 }
 let row = new Float64Array(names.row)
 let totals = []
+let is_longer = false
 
 // The order of numbers is that of `News.packed`.
 function take() {
@@ -40,11 +41,16 @@ function take() {
   })
   totals = numbers.subarray(at)
   if (anew || counts[0] > 0) {
+    is_longer = true
     queue_curves()
   }
 }
 
 function show_frame() {
+  if (is_longer) {
+    is_longer = false
+    view.trace(masters.curves.data)
+  }
   view.show(row)
   const scrub = find("[data-ask=back]")
   if (going) {
@@ -78,7 +84,6 @@ function refresh({source, window: range, master}) {
 }
 
 const refreshes = shown.map((figure) => () => refresh(figure))
-refreshes.push(() => view.trace(masters.curves.data))
 refreshes.push(() => bars.setv({data: {...bars.data, total: [...totals]}}, hidden))
 
 function queue_curves() {
@@ -91,16 +96,22 @@ function queue_curves() {
 
 // Messages
 
+const READING = 10_000 // time for which an error stands [ms]
+let said = 0
+
 function hear() {
   const message = JSON.parse(told.data.message[0])
   if (message.go != null) {
     window.location.assign(message.go)
     return
   }
-  if (message.status != null) {
-    const status = find("#status")
+  // The end of an episode, which may last a second, does not wipe away why something was refused.
+  const status = find("#status")
+  const is_read = status.dataset.kind == "note" || performance.now() - said > READING
+  if (message.status != null && (message.kind != "end" || is_read)) {
+    said = performance.now()
     status.textContent = message.status
-    status.dataset.kind = message.kind
+    status.dataset.kind = message.kind == "end" ? "note" : message.kind
   }
   if (message.playing != null) {
     going = message.playing
@@ -180,7 +191,8 @@ for (const button of all("button[data-ask]")) {
     } else if (name == "reset") {
       ask(name, {seed: find("#seed").value, policy: find("#policy").value})
     } else if (name == "push") {
-      ask(name, {value: Number(find("#impulse").value)})
+      const given = find("#impulse").value
+      ask(name, {value: given == "" ? null : Number(given)})
     } else {
       ask(name, button.dataset.value != null ? {value: button.dataset.value} : {})
     }
@@ -217,13 +229,17 @@ if (window.matchMedia("(max-width: 760px)").matches) {
 }
 
 // Frames of the browser; their number is there to be measured.
+let is_turn = false
+
 const count = () => {
   document.body.dataset.frames = String(Number(document.body.dataset.frames ?? 0) + 1)
+  // A figure has its turn in a frame without a new scene, or where each has one, in every other.
+  is_turn = !is_turn || !is_new
   if (is_new) {
     is_new = false
     show_frame()
   }
-  if (turns.length > 0) {
+  if (is_turn && turns.length > 0) {
     turns.shift()()
   }
   requestAnimationFrame(count)

@@ -43,9 +43,13 @@ class SceneView {
   // Paths of toe and heel in the last second of the curves.
   trace(curves) {
     const {paths} = this.parts
+    if (curves.time.length == 0) {
+      return
+    }
     const end = curves.time.at(-1)
     const start = curves.time.findLastIndex((time) => time < end - 1) + 1
-    const last = Object.keys(paths.data).map((name) => [name, curves[name].slice(start)])
+    const near = (_, k) => k % 4 == 0  // a path of eight milliseconds a piece looks the same
+    const last = Object.keys(paths.data).map((name) => [name, curves[name].slice(start).filter(near)])
     paths.setv({data: Object.fromEntries(last)}, {sync: false})
   }
 
