@@ -42,7 +42,7 @@ def main() -> None:
         tell("installed")
         environment = {name: value for name, value in os.environ.items() if name != "PYTHONPATH"}
         environment["NUMBA_CACHE_DIR"] = str(place / "kernels")
-        command = [binaries / "hoof-env", "view", "--no-open", "--port", "0"]
+        command = [str(binaries / "hoof-env"), "view", "--no-open", "--port", "0"]
         with subprocess.Popen(
             command, cwd=place, env=environment, stdout=subprocess.PIPE, text=True
         ) as server:
