@@ -1,25 +1,29 @@
 """Falls of a horse on rough ground under pushes, at several strengths, from the same starts for every policy.
 
     python -m agents.falls reference agents/policies/Horse-v0
-    python -m agents.falls runs/ppo_flat-Horse-v0-s0 --strengths 1 --episodes 200
+    python -m agents.falls runs/rough --strengths 1 --episodes 200
 
-A policy is what agents.score takes. The strengths are factors of those that `hoof_env.tasks.disturbances` has
-in units: slopes, bumps, and pushes on the trunk. Episode i of every policy has the same ground, start,
-commands and, as long as it lasts, pushes.
+A policy is what agents.score takes, or a folder with runs of agents.train, one row for each. The strengths
+are factors of those that `hoof_env.tasks.disturbances` has in units: slopes, bumps, and pushes on the trunk.
+Episode i of every policy has the same ground, start, commands and, as long as it lasts, pushes. Each policy
+plays on its own id, whose disturbances are replaced: the ids of horses differ in nothing else.
 """
 
 from __future__ import annotations
 
 import sys
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 from tyro.conf import Positional
 
+from agents import runs
 from agents.command import run
-from agents.score import score_vector
+from agents.score import read_policy_record, score_vector
 from hoof_env._output import markdown_table
 from hoof_env.errors import check_number, count
+from hoof_env.saved_policy import own_id
 from hoof_env.tasks.disturbances import MOST_STRENGTH, rough_ground
 from hoof_env.tasks.horse import MASS
 
@@ -49,15 +53,23 @@ def falls_of(policy: str, strength: float, episodes: int) -> tuple[float, float]
         episodes: number of episodes.
     """
     seeds = range(FIRST_SEED, FIRST_SEED + episodes)
-    found = score_vector(policy, ENV_ID, seeds, **rough_ground(strength, MASS))
+    env_id = own_id(read_policy_record(policy).get("env_id", ENV_ID))
+    found = score_vector(policy, env_id, seeds, **rough_ground(strength, MASS))
     falls, successes = (float(np.mean([each[name] for each in found])) for name in ("failed", "success"))
     return falls, successes
+
+
+def runs_in(policy: str) -> list[str]:
+    """Return the runs in a folder of some, in order; of anything else, a run among them, just that."""
+    folder = Path(policy)
+    found = sorted(str(path.parent) for path in folder.glob(f"*/{runs.RECORD}"))
+    return found if folder.is_dir() and found else [policy]
 
 
 def table(policies: tuple[str, ...], strengths: tuple[float, ...], episodes: int) -> str:
     """Return the table of falls and successes in Markdown, a row for each policy."""
     rows = []
-    for policy in policies:
+    for policy in (each for given in policies for each in runs_in(given)):
         cells = [policy]
         for strength in strengths:
             falls, successes = falls_of(policy, strength, episodes)

@@ -92,8 +92,9 @@ ROUGH_PUSH = 1.5
 ROUGH_SLOPE = 0.1
 ROUGHNESS = 0.05
 """Strengths of a horse's rough ground: largest push over the mass [m/s], steepest slope [-], largest bumps
-[m]. The push is that of legged_gym, 1 m/s for a robot with hips at 0.55 m, at the same Froude number; the
-bumps are those of its rough ground; the slope is that of a steep road."""
+[m]. legged_gym pushes robots with hips at 0.55 m by 1 m/s (`max_push_vel_xy`), which is this push at the same
+Froude number, and its rough slopes have these bumps (`random_uniform_terrain`). The slope is that of a steep
+road. Chosen before anything was trained on them."""
 
 
 def rough_ground(strength: float, mass: float) -> dict[str, Any]:

@@ -1,0 +1,77 @@
+"""Charges for landings, and ids in which one of them stands for those of HorseLeg-v0; see
+`agents.soft_landing`, which trains on them."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import hoof_env
+from hoof_env.simd import maximum, where
+
+THRESHOLD = 1.5
+"""Running peak from which it is charged [weights of trunk and leg]: between the 1.3 of a soft gait and the 5
+of the run."""
+
+PRICE = 10.0
+"""Charge of the run [1/s], about that of the terms of HorseLeg-v0."""
+
+WEIGHTS: Mapping[str, float] = {"threshold": 16.4, "first_contact": 31.6, "approach": 6.18}
+"""Weights of the charges [1/s, -, s^2/m^2] that `python -m agents.soft_landing weights` finds."""
+
+GROUNDS = {"stiffness": (1e4, 4e4), "restitution": (0.2, 0.8)}
+"""Ranges of the grounds: stiffness from a half to twice the usual one [N/m^1.375], restitution about it."""
+
+
+def threshold(step, weight):  # type: ignore[no-untyped-def]
+    """Return the charge for the time in which the running peak is beyond a threshold, times the excess in
+    weights."""
+    excess = step.leg.strides.running_peak / step.weight - THRESHOLD
+    return -weight * step.seconds * maximum(excess, 0.0)
+
+
+def first_contact(step, weight):  # type: ignore[no-untyped-def]
+    """Return the charge for the normal force at the end of the step in which a stance begins, in weights."""
+    load = step.leg.report.toe.normal + step.leg.report.heel.normal
+    return -weight * where(step.sums.stances > 0.0, load / step.weight, 0.0)
+
+
+def approach(step, weight):  # type: ignore[no-untyped-def]
+    """Return the charge for the squared approach speeds of the points in contact when a stance begins."""
+    toe = step.leg.state.toe.inverse_approach_speed
+    heel = step.leg.state.heel.inverse_approach_speed
+    # The inner choice avoids a division by 0 of points that are not in contact
+    faster = maximum(
+        where(toe > 0.0, 1.0 / where(toe > 0.0, toe, 1.0), 0.0),
+        where(heel > 0.0, 1.0 / where(heel > 0.0, heel, 1.0), 0.0),
+    )
+    return -weight * where(step.sums.stances > 0.0, faster * faster, 0.0)
+
+
+TERMS = {
+    "threshold": hoof_env.Term(
+        "threshold", WEIGHTS["threshold"], "1/s", "minus the running peak beyond a threshold", threshold
+    ),
+    "first_contact": hoof_env.Term(
+        "first_contact", WEIGHTS["first_contact"], "-", "minus the force at a first contact", first_contact
+    ),
+    "approach": hoof_env.Term(
+        "approach", WEIGHTS["approach"], "s^2/m^2", "minus the squared speed of a landing", approach
+    ),
+}
+
+CHARGES = (*TERMS, "own")
+
+
+def id_of(charge: str) -> str:
+    """Return the id in which a charge stands for those of HorseLeg-v0."""
+    return f"soft/{charge.title().replace('_', '')}-v0"
+
+
+for _charge in CHARGES:
+    hoof_env.register(
+        id_of(_charge),
+        base="leg",
+        terms=[TERMS[_charge]] if _charge in TERMS else [],
+        reward_weights={"peak": 0.0, "loading": 0.0} if _charge in TERMS else None,
+        randomize=GROUNDS,
+    )

@@ -1,0 +1,53 @@
+"""Charges for landings: each is paid when it should be, and by as much."""
+
+import gymnasium as gym
+import numpy as np
+import pytest
+
+from agents import soft_landing, soft_terms
+from hoof_env import make_policy
+
+
+@pytest.fixture(scope="module", params=soft_terms.TERMS)
+def steps(request):
+    """Charge, and for each step of a run on the usual ground what was paid and measured."""
+    env = gym.make(soft_terms.id_of(request.param), randomize=None).unwrapped
+    policy = make_policy("run", env)
+    observation, _ = env.reset(seed=3, options={"gait": "run"})
+    rows = []
+    for _ in range(250):
+        observation, _, _, _, info = env.step(policy.predict(observation)[0])
+        measured = {name: float(info["measured"][name]) for name in info["measured"].names}
+        rows.append((info[f"reward_{request.param}"], measured, env.batch.engine.limbs[0].geometry.mass))
+    return request.param, rows, env
+
+
+def test_it_is_the_documented_quantity(steps):
+    charge, rows, env = steps
+    weight = soft_terms.WEIGHTS[charge]
+    body = 9.81 * (env.batch.engine.trunk.mass + rows[0][2])
+    for paid, m, _ in rows:
+        begins = m["stances"] > 0
+        if charge == "threshold":
+            expected = 0.02 * max(m["running_peak"] / body - soft_terms.THRESHOLD, 0.0)
+        elif charge == "first_contact":
+            expected = begins * (m["toe_normal"] + m["heel_normal"]) / body
+        else:
+            speeds = [m[f"{foot}_inverse_approach_speed"] for foot in ("toe", "heel")]
+            expected = begins * max(1 / speed if speed else 0.0 for speed in speeds) ** 2
+        assert paid == pytest.approx(-weight * expected, rel=2e-3, abs=1e-6)
+    assert min(paid for paid, _, _ in rows) < 0.0
+
+
+def test_the_run_pays_the_same_for_each():
+    for charge in soft_terms.TERMS:
+        found = soft_landing.play("run", soft_terms.id_of(charge), 100, randomize=None)
+        assert -found[f"charge_{charge}"] / found["seconds"] == pytest.approx(soft_terms.PRICE, rel=0.02)
+        assert 0.5 < found["seen"] < 1.0
+
+
+def test_control_steps_hide_peaks():
+    """The highest force at the ends of control steps is below that of all substeps, in every episode."""
+    found = soft_landing.play("run", soft_terms.id_of("own"), 8)
+    assert found["seen"] < 0.99
+    assert np.isfinite(list(found.values())).all()
