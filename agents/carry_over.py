@@ -25,7 +25,7 @@ from tyro.conf import Positional
 from agents import runs
 from agents.command import run
 from agents.score import read_policy_record, score_vector
-from agents.ship import POLICIES
+from agents.ship import POLICIES, UNTRAINED
 from hoof_env._output import check_folder, markdown_table
 from hoof_env.envs.policies import STANDS_FOR
 from hoof_env.errors import DataFileError, ParameterError, check_number, count
@@ -132,6 +132,10 @@ DISTURBANCES: Mapping[str, Disturbance] = {
 """Disturbances by name, each with its size at strength 1."""
 
 
+CALM: Mapping[str, dict[str, Any]] = {"hoof_env/HorseRough-v0": {"push_impulse": None, "terrain": None}}
+"""Settings that take an id's own disturbances away."""
+
+
 @dataclass(frozen=True)
 class Args:
     """Arguments of the command."""
@@ -182,7 +186,8 @@ def place_of(env_id: str) -> Place:
 
 def settings_of(env_id: str, name: str, strength: float) -> dict[str, Any]:
     """Return the arguments with which an id has one disturbance alone."""
-    return DISTURBANCES[name].settings(strength, place_of(env_id)) if strength else {}
+    disturbed = DISTURBANCES[name].settings(strength, place_of(env_id)) if strength else {}
+    return {**CALM.get(env_id, {}), **disturbed}
 
 
 def is_refused(env_id: str, settings: Mapping[str, Any]) -> bool:
@@ -210,9 +215,10 @@ def play(policy: str, name: str, strength: float, episodes: int) -> Found | None
 
 
 def shipped() -> tuple[str, ...]:
-    """Return the paths of the policies that ship, but those that stand for another id's."""
+    """Return the paths of the policies that ship, but those that are another id's."""
     folders = sorted(path.parent for path in POLICIES.glob(f"*/{runs.RECORD}"))
-    return tuple(str(folder) for folder in folders if f"hoof_env/{folder.name}" not in STANDS_FOR)
+    others = {**STANDS_FOR, **UNTRAINED}
+    return tuple(str(folder) for folder in folders if f"hoof_env/{folder.name}" not in others)
 
 
 def read_found(path: Path) -> list[Found]:

@@ -77,6 +77,11 @@ class Args:
     """folder for the policies' folders"""
 
 
+UNTRAINED = {"hoof_env/HorseRough-v0": "hoof_env/Horse-v0"}
+"""Ids whose policy was trained on another id, by their own, until there is a training on them; the spaces are
+the same, and the policy plays and is scored on its own id."""
+
+
 @dataclass(frozen=True)
 class Choice:
     """Run that is shipped, and the number of runs of which it is the best."""
@@ -127,8 +132,8 @@ def choose(saved: Sequence[runs.SavedModel], env_id: str) -> Choice:
 
 
 def ship(choice: Choice, env_id: str, out: Path) -> dict[str, Any]:
-    """Write the folder of one policy beneath `out`, for its own id or one that `STANDS_FOR` it; return its
-    score.json.
+    """Write the folder of one policy beneath `out`, for its own id, or for one of `STANDS_FOR` or `UNTRAINED`
+    that takes its policy; return its score.json.
 
     Raises:
         DataFileError: the model does not fit.
@@ -136,6 +141,8 @@ def ship(choice: Choice, env_id: str, out: Path) -> dict[str, Any]:
     """
     saved = choice.saved
     trained_on = own_id(choice.saved.record["env_id"])
+    # A vector reward has no score: the episodes are those of the id whose policy it shares
+    played_on = trained_on if env_id in STANDS_FOR else env_id
     if not len(runs.read_episodes(saved.path.parent)):
         raise DataFileError(f"run {saved.path.parent}: expected a training in which episodes end, got none")
     record = saved.record | {"command": shown_command(saved.record.get("command", "")), "env_id": env_id}
@@ -148,8 +155,8 @@ def ship(choice: Choice, env_id: str, out: Path) -> dict[str, Any]:
     with staged(folder) as stage:
         write_policy(trained, stage / FILE, metadata)
         policy = OnnxPolicy(stage / FILE)  # the shipped file is scored, not the model
-        scores = [Score("policy", score_vector(policy, trained_on, SCORE_SEEDS)), *gaits(trained_on)]
-        score = score_record(policy, scores, env_id, trained_on)
+        scores = [Score("policy", score_vector(policy, played_on, SCORE_SEEDS)), *gaits(played_on)]
+        score = score_record(policy, scores, env_id, played_on)
         if env_id != trained_on:
             record["trained_on"] = trained_on
         for name in COPIED:
@@ -160,7 +167,7 @@ def ship(choice: Choice, env_id: str, out: Path) -> dict[str, Any]:
         (stage / "score.json").write_text(text + "\n", encoding="utf-8")
         no_name = {"Software": None}  # the drawing program's name would change the file
         draw_learning_curve(saved.path.parent, scores, stage / "curve.png", dpi=90, metadata=no_name)
-        shown = shared_film(stage, out / trained_on.rpartition("/")[2]) if env_id != trained_on else ""
+        shown = shared_film(stage, out / trained_on.rpartition("/")[2]) if env_id != played_on else ""
         if not shown:
             film(stage, env_id)
         write_card(stage, env_id, record, score, scores, choice, shown or FILM)
@@ -329,7 +336,7 @@ def main(argv: list[str] | None = None) -> None:
     # An id without a training of its own may be played by another's policy
     sources |= {
         env_id: trained_on
-        for env_id, trained_on in STANDS_FOR.items()
+        for env_id, trained_on in {**STANDS_FOR, **UNTRAINED}.items()
         if env_id not in models and trained_on in models
     }
     ids = [check_choice("ids", env_id, sources) for env_id in args.ids] or list(sources)

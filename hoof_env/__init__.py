@@ -83,6 +83,7 @@ _TASKS = {
     "HorseLegTerrain": "terrain",
     "HorseLegFixed": "fixed",
     "Horse": "horse",
+    "HorseRough": "rough",
 }
 
 

@@ -21,7 +21,7 @@ from hoof_env.dynamics.memory import LIFT_OFF
 from hoof_env.envs.horse_leg import HorseLegMOEnv
 from hoof_env.envs.infos import measured_names
 from hoof_env.envs.manual_bodies import page_of_body
-from hoof_env.envs.manual_common import own_sections, shared_sections, without_common
+from hoof_env.envs.manual_common import own_sections, sections_left, shared_sections, without_common
 from hoof_env.envs.manual_words import HERE, TABLES, WORDS, rows_of
 from hoof_env.envs.policies import STANDS_FOR
 from hoof_env.envs.shown import Markdown
@@ -48,6 +48,9 @@ PAGES = tuple(_NAMES)  # names of the tasks, and "mo" for the id with three rewa
 
 COMMON = _NAMES["leg"]
 """Name of the page that the others refer to."""
+
+NEAREST = {_NAMES["rough"]: _NAMES["horse"]}
+"""Pages that refer to another page first, by their names."""
 
 SCORED = {
     "policy": "the shipped agent",
@@ -227,6 +230,10 @@ def write_pages(out: Path, films: Path | None = None) -> list[Path]:
         others = {key: other.replace(f"/{COMMON}-v0", f"/{name}-v0") for key, other in others.items()}
         if name == COMMON:
             del others[COMMON]
+        near = NEAREST.get(name)
+        if near:
+            there = sections_left(whole[near], texts[f"{near}.md"]).replace(f"/{near}-v0", f"/{name}-v0")
+            others = {near: there, **others}
         texts[f"{name}.md"] = without_common(text, others)
     texts["README.md"] = index(returns)
     try:

@@ -41,6 +41,12 @@ def own_sections(page: str) -> str:
     return "".join(section for section in _sections(page) if _title(section).strip("# ") not in SHARED)
 
 
+def sections_left(page: str, short: str) -> str:
+    """Return the sections of a page that its short form still has."""
+    titles = {_title(section) for section in _sections(short)}
+    return "".join(section for section in _sections(page) if _title(section) in titles)
+
+
 def without_common(page: str, others: Mapping[str, str]) -> str:
     """Leave out the parts that a page shares with other pages, and say where they are.
 

@@ -21,8 +21,9 @@ import numpy as np
 from hoof_env.errors import ParameterError, UnknownArgumentError, check_choice, one_of
 from hoof_env.simd.user_functions import check_function, function_name
 from hoof_env.tasks.body import Body
+from hoof_env.tasks.disturbances import rough_ground
 from hoof_env.tasks.effects import check_effect
-from hoof_env.tasks.horse import HOOF_STIFFNESS, Horse
+from hoof_env.tasks.horse import HOOF_STIFFNESS, MASS, Horse
 from hoof_env.tasks.horse_gaits import checked_size
 from hoof_env.tasks.horse_terms import HORSE_ENTRIES, HORSE_TERMS
 from hoof_env.tasks.observation import ENTRIES, Entry, check_groups, groups_of
@@ -159,6 +160,32 @@ _SUSPENDED = (
     " constant force carries the rest, a vertical spring and damper stands for the animal's other legs."
 )
 
+_FOUR_LEGS = (
+    "Four legs carry a trunk that moves along x and y and pitches, in the plane. Every 3 to 5 s a new"
+    " speed is commanded, between Froude numbers 0.1 and 1 (v^2 over g times the height of the"
+    " hips) and at most 0.5 m/s from the last, and with it the gait"
+    " from which actions make offsets: its reference gait."
+)
+
+_HORSE: Mapping[str, Any] = MappingProxyType(
+    {
+        "trunk": "free",
+        "trunk_mass": 365.84,
+        "trunk_drag": 0.0,
+        "stiffness": 2e6,
+        "exponent": 1.5,
+        "friction": 0.6,
+        "hoof_stiffness": HOOF_STIFFNESS,
+        "integrator": "semi_implicit_euler",
+        "motor_gain": 2000.0,
+        "motor_torque": 4000.0,
+        "target_speed": None,
+        "target_seconds": (3.0, 5.0),
+        "observation": ("trunk", "target", "crank", "gait", "hoof", "offset"),
+    }
+)
+"""Settings of a horse."""
+
 TASKS: Mapping[str, Task] = MappingProxyType(
     {
         "leg": Task("HorseLeg", "A horse's leg that must carry and move its trunk.", _SUSPENDED, {}),
@@ -220,25 +247,23 @@ TASKS: Mapping[str, Task] = MappingProxyType(
         "horse": Task(
             "Horse",
             "A horse on four legs that keeps a commanded speed.",
-            "Four legs carry a trunk that moves along x and y and pitches, in the plane. Every 3 to 5 s a new"
-            " speed is commanded, between Froude numbers 0.1 and 1 (v^2 over g times the height of the"
-            " hips) and at most 0.5 m/s from the last, and with it the gait"
-            " from which actions make offsets: its reference gait.",
-            {
-                "trunk": "free",
-                "trunk_mass": 365.84,
-                "trunk_drag": 0.0,
-                "stiffness": 2e6,
-                "exponent": 1.5,
-                "friction": 0.6,
-                "hoof_stiffness": HOOF_STIFFNESS,
-                "integrator": "semi_implicit_euler",
-                "motor_gain": 2000.0,
-                "motor_torque": 4000.0,
-                "target_speed": None,
-                "target_seconds": (3.0, 5.0),
-                "observation": ("trunk", "target", "crank", "gait", "hoof", "offset"),
-            },
+            _FOUR_LEGS,
+            _HORSE,
+            reference="reference",
+            terms=HORSE_TERMS,
+            entries=HORSE_ENTRIES,
+            body=Horse,
+            speeds=(1.172, 3.706),
+        ),
+        "rough": Task(
+            "HorseRough",
+            "A horse on four legs that stays on its feet: slopes, bumps and pushes.",
+            _FOUR_LEGS
+            + " The ground has slopes of up to 10 % and bumps of up to 5 cm, and every 2 to 4 s the trunk is"
+            " pushed forward or back, by up to 1.5 m/s times the horse's mass. Neither the ground ahead nor a"
+            " push is observed. The reference gait falls in a fifth of the episodes. The arguments `terrain`,"
+            " `push_impulse` and `strength` replace these disturbances, which do not go with `size`.",
+            {**_HORSE, **rough_ground(1.0, MASS)},
             reference="reference",
             terms=HORSE_TERMS,
             entries=HORSE_ENTRIES,

@@ -15,15 +15,17 @@ from hoof_env.tasks.registry import TASKS
 from hoof_env.tasks.settings import Settings
 
 HORSE = "hoof_env/Horse-v0"
+ROUGH = "hoof_env/HorseRough-v0"
+HORSES = (HORSE, ROUGH)
 
 LEGS = sorted(
     name
     for name, spec in gym.registry.items()
-    if str(spec.entry_point).endswith("horse_leg:HorseLegEnv") and name != HORSE
+    if str(spec.entry_point).endswith("horse_leg:HorseLegEnv") and name not in HORSES
 )
 """The ids of one leg."""
 
-IDS = [*LEGS, HORSE]
+IDS = [*LEGS, *HORSES]
 """All ids of one environment class."""
 
 OTHER = {
@@ -56,7 +58,7 @@ def effective(given, env_id: str = "hoof_env/HorseLeg-v0", **settings):
 
 def actions(seed: int, *shape: int, env_id: str = LEGS[0]) -> np.ndarray:
     """Random actions."""
-    width = 16 if env_id == HORSE else 4
+    width = 16 if env_id in HORSES else 4
     return np.random.default_rng(seed).uniform(-1, 1, (*shape, width)).astype(np.float32)
 
 

@@ -18,7 +18,7 @@ from typing import Any
 import gymnasium as gym
 import numpy as np
 import pytest
-from family import FALLS, HORSE, IDS, LEGS, MODES, actions, same, same_rows
+from family import FALLS, HORSE, HORSES, IDS, LEGS, MODES, actions, same, same_rows
 from gymnasium.vector import AutoresetMode, SyncVectorEnv
 
 from hoof_env.simd import threads
@@ -174,7 +174,7 @@ class Run:
     def answers(self) -> dict[str, tuple[Any, ...]]:
         """Answers of each row, and the record of the first one."""
         asked: list[tuple[str, ...]] = [("weight",), ("episode_summary",), ("raw_observation",)]
-        if self.case.env_id != HORSE:
+        if self.case.env_id not in HORSES:
             asked.append(("action_for", "run"))
         found = {question[0]: self.envs.call(*question) for question in asked}
         if not self.way.half:

@@ -31,6 +31,8 @@ from hoof_env.tasks.registry import TASKS
 from hoof_env.tasks.reward import BEARING, LONGEST_STRIDE
 from hoof_env.tasks.settings import PER_EPISODE, Settings
 
+HORSES = "horse", "rough"  # pages of a horse
+
 ROOT = Path(__file__).parents[2]
 DOCS, POLICIES = ROOT / "docs" / "environments", ROOT / "agents" / "policies"
 OF_LEGS = [name for name, task in TASKS.items() if task.body is OneLeg]
@@ -72,7 +74,7 @@ def test_every_page_shows_its_film(page):
     (told, film) = re.search(r"!\[(.+?)\]\((.+?)\)", (DOCS / f"{name}.md").read_text("utf-8")).groups()
     # HorseLegMO has the agent of HorseLeg, and its film.
     assert told.startswith(f"{'HorseLeg' if page == 'mo' else name}, the shipped agent")
-    assert ("footfall" in told) == (page == "horse") == ("gait parameters" not in told)
+    assert ("footfall" in told) == (page in HORSES) == ("gait parameters" not in told)
     policy = "HorseLeg-v0" if page == "mo" else f"{name}-v0"
     assert film == f"../../agents/policies/{policy}/film.gif"
     assert (DOCS / film).stat().st_size < 650e3  # a page loads quickly
@@ -231,7 +233,7 @@ def test_every_setting_is_documented_with_its_default(page):
     *settings, render_mode, width, height = [(row[0].strip("`"), row[1].strip("*")) for row in table]
     assert [render_mode, width, height] == [("render_mode", "None"), ("width", "960"), ("height", "540")]
     names = [name for name, _ in settings]
-    assert names == [item.name for item in fields(Settings) if page != "horse" or item.name in names]
+    assert names == [item.name for item in fields(Settings) if page not in HORSES or item.name in names]
     for name, value in settings:
         assert eval(value) == to_json(made)[name], name
     bold = {row[0].strip("`") for row in table if row[1].startswith("**")}
@@ -317,7 +319,7 @@ def test_the_tables_have_what_there_is_and_nothing_else():
 def test_rewards_options_and_figures_are_those_of_the_environment(page):
     text, env = manual.page(page), gym.make(IDS[page], episode_seconds=0.02)
     weights = env.unwrapped.batch.weights
-    options = HORSE_OPTIONS if page == "horse" else OPTIONS
+    options = HORSE_OPTIONS if page in HORSES else OPTIONS
     _, started = env.reset(seed=0, options={"parameters": {"friction": 0.3}})
     info = env.step(np.zeros(env.action_space.shape, np.float32))[4]
     table = rows(section(text, "Rewards"))
@@ -331,7 +333,7 @@ def test_rewards_options_and_figures_are_those_of_the_environment(page):
     start = section(text, "Starting State")
     assert {row[0].strip("`") for row in rows(start)} == {*options, "gait", "parameters", "pushes"}
     suspended = {"trunk_share", "trunk_stiffness", "trunk_damping", "trunk_drag"}
-    refused = suspended | {"friction_slow", "friction_fast"} if page == "horse" else set()
+    refused = suspended | {"friction_slow", "friction_fast"} if page in HORSES else set()
     for name in PER_EPISODE:
         assert (f"`{name}`" in start) != (name in refused)
 
@@ -352,7 +354,7 @@ def test_every_key_of_infos_and_every_quantity_is_there(page):
     told = [cells[0].strip("`") for cells in rows(infos)]
     assert [key for key in told if key != "parameters"] == [key for key in info if "reward" not in key]
     found = {"both": [], "record": [], "measured": []}
-    legs = LEGS if page == "horse" else []
+    legs = LEGS if page in HORSES else []
     shown = {re.sub(f"^({'|'.join(LEGS)})_", "", name) for name in info["measured"].names}
     for names, within, unit, _ in rows(measured):
         found[within] += re.findall(r"`(\w+)`", names)
