@@ -31,15 +31,16 @@ from hoof_env.envs.policies import STANDS_FOR
 from hoof_env.errors import DataFileError, ParameterError, check_number, count
 from hoof_env.saved_policy import own_id
 from hoof_env.tasks.disturbances import MOST_STRENGTH, ROUGH_PUSH, ROUGH_SLOPE, ROUGHNESS, rough_ground
-from hoof_env.tasks.horse import Horse
 
 FIRST_SEED = 3_000_000  # on which nothing else is played
 TABLE = "figures.csv"
 COLUMNS = ("policy", "disturbance", "strength", "episodes", "return", "falls")
 
 HILL_RISE = 0.05
-"""Hills for one leg, whose trunk does not follow them: heights are within +- this [m], as those of
-HorseLegTerrain."""
+"""Rise of hills under a trunk that does not follow them, that of HorseLegTerrain [m]."""
+
+FREE_RISE = 10 * ROUGH_SLOPE
+"""Rise of hills under a free trunk, that of `rough_ground` [m]."""
 
 
 @dataclass(frozen=True)
@@ -47,12 +48,12 @@ class Place:
     """Environment that is disturbed.
 
     Attributes:
-        is_horse: True of a horse.
+        rise: heights of its hills are within +- this at strength 1 [m].
         mass: mass of trunk and legs [kg].
         groups: groups that are observed.
     """
 
-    is_horse: bool
+    rise: float
     mass: float
     groups: tuple[str, ...]
 
@@ -99,7 +100,7 @@ def late_actions(strength: float, place: Place) -> dict[str, Any]:
 def ground(strength: float, place: Place) -> dict[str, Any]:
     """Return slopes and bumps."""
     hills = rough_ground(strength, place.mass)["terrain"]
-    return {"terrain": hills if place.is_horse else {**hills, "rise": HILL_RISE * strength}}
+    return {"terrain": {**hills, "rise": place.rise * strength}}
 
 
 def stiffness(strength: float, place: Place) -> dict[str, Any]:
@@ -181,7 +182,8 @@ def place_of(env_id: str) -> Place:
     batch: Any = env.unwrapped.batch  # type: ignore[attr-defined]
     mass = batch.engine.trunk.mass + sum(limb.geometry.mass for limb in batch.engine.limbs)
     env.close()
-    return Place(isinstance(batch.body, Horse), float(mass), tuple(batch.settings.observation))
+    rise = FREE_RISE if batch.settings.trunk == "free" else HILL_RISE
+    return Place(rise, float(mass), tuple(batch.settings.observation))
 
 
 def settings_of(env_id: str, name: str, strength: float) -> dict[str, Any]:
@@ -264,7 +266,8 @@ def table(found: Sequence[Found], strength: float) -> str:
     for policy in policies:
         cells = [policy]
         for name in DISTURBANCES:
-            calm, disturbed = at.get((policy, name, 0.0)), at.get((policy, name, strength))
+            calm = at.get((policy, name, 0.0))
+            disturbed = at.get((policy, name, strength))
             if calm is None or disturbed is None:
                 cells.append("")
             else:

@@ -1,4 +1,4 @@
-"""What makes a leg land softly: an ablation of four charges for landings, over grounds that are drawn.
+"""Train with four charges for landings, one at a time, over grounds that are drawn: an ablation.
 
     python -m agents.soft_landing weights               what each charge costs the run, for equal weights
     python -m agents.soft_landing train --seeds 10      all trainings; the same command goes on

@@ -63,6 +63,8 @@ SERVO = Motor(speed_gain=5e3, torque_limit=1e5, rotor_inertia=0.01)
 
 FEET = ("toe", "heel")
 
+FILMED = 200  # control steps of the film
+
 
 @dataclass
 class Foot:
@@ -176,7 +178,8 @@ class MujocoEpisode:
 
     def observe(self) -> NDArray[np.float32]:
         """Return the observation, in the order and with the scales of the manual page."""
-        c, s = np.cos(self.theta), np.sin(self.theta)
+        c = np.cos(self.theta)
+        s = np.sin(self.theta)
         speeds = np.tanh([self.data.qvel[self.x] / 5.0, self.data.qvel[self.z] / 2.0])
         height = np.tanh((self.data.qpos[self.z] - self.trunk.height) / 0.3)
         loads = np.array([foot.normal for foot in self.feet])
@@ -220,7 +223,8 @@ class MujocoEpisode:
         acceleration = np.clip(INNER * gain * (wanted - self.gait_rate), -fastest, fastest)
         self.gait = self.gait + self.h * self.gait_rate + 0.5 * self.h**2 * acceleration
         self.gait_rate = self.gait_rate + self.h * acceleration
-        s, c = np.sin(self.theta), np.cos(self.theta)
+        s = np.sin(self.theta)
+        c = np.cos(self.theta)
         angle = self.gait[1] + self.gait[2] * s + self.gait[3] * c
         rate = self.gait_rate[1] + self.gait_rate[2] * s + self.gait_rate[3] * c
         rate += self.theta_rate * (self.gait[2] * c - self.gait[3] * s)
@@ -408,7 +412,9 @@ def film(here: Sequence[Floats], there: Sequence[Floats], path: Path) -> None:
     """Write a film of both: the environment's leg above, MuJoCo's below."""
     from PIL import Image, ImageDraw
 
-    width, height, scale = 480, 200, 85.0
+    width = 480
+    height = 200
+    scale = 85.0  # pixels per metre
     pictures = []
     for lines in zip(here, there, strict=False):
         picture = Image.new("RGB", (width, 2 * height), "white")
@@ -424,7 +430,7 @@ def film(here: Sequence[Floats], there: Sequence[Floats], path: Path) -> None:
                 ends = ((x1 - left) * scale, ground - y1 * scale, (x2 - left) * scale, ground - y2 * scale)
                 pen.line(ends, fill="#0072B2" if row == 0 else "#D55E00", width=3)
             pen.text((6, row * height + 4), title, fill="black")
-        pictures.append(picture)
+        pictures.append(picture.quantize(16))
     pictures[0].save(path, save_all=True, append_images=pictures[1:], duration=40, loop=0, optimize=True)
 
 
@@ -490,11 +496,7 @@ def main(argv: list[str] | None = None) -> None:
         play_there(env, policies[args.policy], SEEDS[0], contact, frames)
         env.reset(seed=SEEDS[0])
         shown = MujocoEpisode(env, contact)
-        film(
-            bars_here(env, policies[args.policy], SEEDS[0], shown)[::2],
-            frames[::2],
-            args.out / "transfer.gif",
-        )
+        film(here_frames[:FILMED:2], frames[:FILMED:2], args.out / "transfer.gif")
     env.close()
 
 
