@@ -496,6 +496,7 @@ def main(argv: list[str] | None = None) -> None:
         play_there(env, policies[args.policy], SEEDS[0], contact, frames)
         env.reset(seed=SEEDS[0])
         shown = MujocoEpisode(env, contact)
+        here_frames = bars_here(env, policies[args.policy], SEEDS[0], shown)
         film(here_frames[:FILMED:2], frames[:FILMED:2], args.out / "transfer.gif")
     env.close()
 
