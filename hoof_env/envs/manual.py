@@ -49,8 +49,8 @@ PAGES = tuple(_NAMES)  # names of the tasks, and "mo" for the id with three rewa
 COMMON = _NAMES["leg"]
 """Name of the page that the others refer to."""
 
-NEAREST = {_NAMES["rough"]: _NAMES["horse"]}
-"""Pages that refer to another page first, by their names."""
+NEAREST = {_NAMES["rough"]: (_NAMES["horse"], _NAMES["terrain"])}
+"""Pages that refer to other pages first, by their names."""
 
 SCORED = {
     "policy": "the shipped agent",
@@ -230,10 +230,11 @@ def write_pages(out: Path, films: Path | None = None) -> list[Path]:
         others = {key: other.replace(f"/{COMMON}-v0", f"/{name}-v0") for key, other in others.items()}
         if name == COMMON:
             del others[COMMON]
-        near = NEAREST.get(name)
-        if near:
-            there = sections_left(whole[near], texts[f"{near}.md"]).replace(f"/{near}-v0", f"/{name}-v0")
-            others = {near: there, **others}
+        near = {
+            key: sections_left(whole[key], texts[f"{key}.md"]).replace(f"/{key}-v0", f"/{name}-v0")
+            for key in NEAREST.get(name, ())
+        }
+        others = {**near, **others}
         texts[f"{name}.md"] = without_common(text, others)
     texts["README.md"] = index(returns)
     try:
