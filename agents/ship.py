@@ -55,7 +55,7 @@ CHECKED = 20
 GAITS = ("run", "walk", "carrying_walk", "reference", "open-loop")  # scored as well, if an id has them
 
 LIMIT = 1_000_000
-FILM_LIMIT = 750_000
+FILM_LIMIT = 650_000
 """Largest size of a folder and of the film in it [bytes]; a film that is larger is made shorter."""
 
 FILM_SECONDS = 4.0

@@ -260,9 +260,9 @@ TASKS: Mapping[str, Task] = MappingProxyType(
             "A horse on four legs that stays on its feet: slopes, bumps and pushes.",
             _FOUR_LEGS
             + "\n\nThe ground has slopes of up to 10 % and bumps of up to 5 cm, and every 2 to 4 s the trunk"
-            " is pushed forward or back, by up to 1.5 m/s times the horse's mass. Neither the ground ahead nor"
-            " a push is observed. The reference gait falls in a fifth of the episodes. The arguments `terrain`,"
-            " `push_impulse` and `strength` replace these disturbances, which do not go with `size`.",
+            " is pushed forward or back, by up to 1.5 m/s times the horse's mass. The ground ahead and the"
+            " pushes are not observed. The reference gait falls in a fifth of the episodes. The arguments"
+            " `terrain`, `push_impulse` and `strength` replace all this, which does not go with `size`.",
             {**_HORSE, **rough_ground(1.0, MASS)},
             reference="reference",
             terms=HORSE_TERMS,
