@@ -62,7 +62,7 @@ def test_committed_pages_are_what_the_command_writes(tmp_path, capsys, monkeypat
     monkeypatch.chdir(tmp_path)
     out = Path("docs/environments")
     assert cli.main(["manual", "--out", str(out), "--films", "agents/policies"]) == 0
-    assert f"9 files written; read {out / 'README.md'} first" in capsys.readouterr().out
+    assert f"{len(manual.PAGES) + 2} files written; read {out / 'README.md'} first" in capsys.readouterr().out
     written = {file.name: file.read_text("utf-8") for file in out.iterdir()}
     committed = {file.name: file.read_text("utf-8") for file in DOCS.glob("*.md")}
     assert written == committed, "run `hoof-env manual --out docs/environments --films agents/policies`"
