@@ -38,7 +38,7 @@ CHILDREN = {
     "docs/agents": ("/agents/policies/README",),
     "docs/environments/README": ("HorseLeg", "HorseLeg*", "*"),
     "docs/api/README": ("environments", "engine", "leg", "task", "lab", "errors"),
-    "docs/evidence/README": ("*", "stock/README", "/benchmarks/results/**"),
+    "docs/evidence/README": ("*", "*/README", "/benchmarks/results/**"),
     "agents/policies/README": ("*/card",),
 }
 """Pages below a page, in the side bar. The pages themselves lack them: only Sphinx can read a toctree."""
