@@ -47,7 +47,8 @@ def test_the_run_pays_the_same_for_each():
 
 
 def test_control_steps_hide_peaks():
-    """The highest force at the ends of control steps is below that of all substeps, in every episode."""
+    """The highest force at the ends of control steps is below that of all substeps, of a whole episode by
+    little."""
     found = soft_landing.play("run", soft_terms.id_of("own"), 8)
-    assert found["seen"] < 0.99
+    assert 0.9 < found["seen"] < 1.0
     assert np.isfinite(list(found.values())).all()
