@@ -231,7 +231,8 @@ one mass ({mass} kg). `jansen` and `klann` have published lengths; `python -m ag
 
 With the frame at rest, and with the swing of the walk below; lengths in heights of the hip over the lowest
 point of the foot. The stance is the half turn of the crank in which the foot is lowest. The margin is the
-least sine of the angle between the links of a dyad, 0 at a dead point. A rigid triangle counts as three links.
+least sine of the angle between the links of a dyad, 0 at a dead point. A rigid triangle counts as three
+links.
 
 {paths}
 
@@ -239,7 +240,8 @@ least sine of the angle between the links of a dyad, 0 at a dead point. A rigid 
 
 Constant gaits that `python -m agents.legs --search` found ([gaits.json](gaits.json)): the walk keeps the
 Froude number {froude}, the run has the highest return. Means of {starts} episodes of `HorseLeg-v0`, which
-start in the gait; the cost of transport is work over weight and distance, and torques are those from {settled:g} s on.
+start in the gait; the cost of transport is work over weight and distance, and torques are those from
+{settled:g} s on.
 
 {measured}
 """

@@ -38,7 +38,7 @@ SUMMARY = {
     "weight_share": ("-", "mean normal force over weight: what the leg bore"),
     "support_share": ("-", "the rest, which rail or suspension bore"),
     "failed": ("-", "0 or 1"),
-    "success": ("-", f"1 if it lasted, at {SUCCESS_SPEED} of the commanded speed"),
+    "success": ("-", f"1 if it lasted, at {SUCCESS_SPEED} of the commanded speed or more, if there is one"),
 }
 """Figures of an episode by name: unit and meaning, as the manual has them. `summaries_of` computes them. A
 horse's mean force and sum of peaks are sums over its legs, its duty factor is the mean of its legs."""

@@ -261,9 +261,9 @@ TASKS: Mapping[str, Task] = MappingProxyType(
             _FOUR_LEGS
             + "\n\nThe ground has slopes of up to 10 % and bumps of up to 5 cm, and every 2 to 4 s the trunk"
             " is pushed forward or back, by up to 1.5 m/s times the horse's mass. The ground ahead and the"
-            " pushes are not observed. The reference gait falls in a fifth of the episodes, and so does the policy"
-            " that ships: it is that of `Horse-v0`, and none was trained here yet. The arguments `terrain`,"
-            " `push_impulse` and `strength` replace all this, which does not change with `size`.",
+            " pushes are not observed. The reference gait falls in a fifth of the episodes, and so does the"
+            " policy that ships: it is that of `Horse-v0`, and none was trained here yet. The arguments"
+            " `terrain`, `push_impulse` and `strength` replace all this, which does not change with `size`.",
             {**_HORSE, **rough_ground(1.0, MASS)},
             reference="reference",
             terms=HORSE_TERMS,
