@@ -11,7 +11,7 @@ from hoof_env.simd import columns, full_like, read, rows, write
 from hoof_env.simd.compile import inline_llvm, inline_source
 from hoof_env.simd.math import clip
 from hoof_env.simd.memory import singles_at
-from hoof_env.simd.user_functions import number_of
+from hoof_env.simd.user_functions import number_of, numbers_of
 from hoof_env.tasks.body import BodyKernels
 from hoof_env.tasks.episode import ACTIONS, Memories
 from hoof_env.tasks.own_parts import ActionMap
@@ -44,7 +44,9 @@ def converter(action_map: ActionMap | None, layouts: Memories, body: BodyKernels
         return nothing
     compute = inline_llvm(action_map.compute)
     given = len(action_map.names)
-    write_all = _writer(0, body.legs * ACTIONS, number_of(action_map.title))
+    of_body = body.legs * ACTIONS
+    all_of = numbers_of(action_map.title, of_body)
+    write_all = _writer(0, of_body, number_of(action_map.title))
     inputs_of = inputs_reader(layouts)
 
     @inline_source
@@ -54,7 +56,7 @@ def converter(action_map: ActionMap | None, layouts: Memories, body: BodyKernels
         for k in range(given):
             actions[k] = clip(read(actions, acted, n * given + k, given), 1.0)
         scene = inputs_of(addresses, lanes, task, n)
-        write_all(actions, compute(actions, scene), singles_at(addresses[AT.mapped]), n)
+        write_all(actions, all_of(compute(actions, scene)), singles_at(addresses[AT.mapped]), n)
 
     @inline_source
     def convert_one_by_one(addresses, lanes, task, n, scratch):  # type: ignore[no-untyped-def]
@@ -66,6 +68,6 @@ def converter(action_map: ActionMap | None, layouts: Memories, body: BodyKernels
             for k in range(given):
                 actions[k] = clip(float(acted[row * given + k]), 1.0)
             scene = inputs_of(addresses, 0, task, row)
-            write_all(like, compute(actions, scene), singles_at(addresses[AT.mapped]), row)
+            write_all(like, all_of(compute(actions, scene)), singles_at(addresses[AT.mapped]), row)
 
     return convert_one_by_one if action_map.scalar else convert

@@ -36,6 +36,19 @@ def number_of(what: str) -> Any:
     return instruction(typed)(lambda code, x: x)
 
 
+def numbers_of(what: str, count: int) -> Any:
+    """Return a function for kernels that passes on the result of `what`, and refuses it unless it is a tuple
+    of `count` values."""
+
+    def typed(x: Any) -> Any:
+        if not isinstance(x, types.BaseTuple) or len(x) != count:
+            given = f"a tuple of {len(x)}" if isinstance(x, types.BaseTuple) else str(x)
+            raise TypingError(f"{{{what} returns {given}; expected a tuple of {count} numbers}}")
+        return x(x)
+
+    return instruction(typed)(lambda code, x: x)
+
+
 def check_function(name: str, function: Any, arguments: int) -> None:
     """Raise ParameterError unless something is a plain function of `arguments` arguments."""
     if not isinstance(function, FunctionType) or function.__code__.co_flags & 0x0C:  # *args, **kwargs
@@ -56,8 +69,8 @@ def what_cannot_be_compiled(error: Exception, moved: Mapping[str, str] = Mapping
         moved: present names of attributes that had other ones, or were elsewhere.
     """
     text = str(error)
-    # the message of `number_of`, which numba has put among its own
-    if refused := re.search(r"\{([^{}]* returns [^{}]*; expected a number)\}", text):
+    # the message of `number_of` or `numbers_of`, which numba has put among its own
+    if refused := re.search(r"\{([^{}]* returns [^{}]*; expected a (?:number|tuple of \d+ numbers))\}", text):
         return refused[1]
     where = next((place for place in map(_place, re.findall(r'File "(.*?)", line (\d+)', text)) if place), "")
     return (

@@ -10,7 +10,7 @@ import gymnasium as gym
 import pytest
 
 import hoof_env
-from hoof_env import Entry, Scale, Term, register
+from hoof_env import ActionMap, Entry, Scale, Term, register
 from hoof_env.envs.manual import page_of
 from hoof_env.errors import ParameterError
 from hoof_env.tasks import registry as tasks
@@ -130,6 +130,17 @@ FUNCTIONS = [
         f"{BAD}: term 'mine' returns nothing in some cases; expected a",
     ),
     ({"entries": [entry(lambda s: s.leg.command)]}, f"{BAD}: entry 'mine' returns .*; expected a number"),
+    *(
+        (
+            {"action_map": ActionMap("mine", {"a": "-"}, function)},
+            f"'mine' returns {given}; expected a tuple of 4",
+        )
+        for function, given in (
+            (lambda action, scene: (action[0], 0.0, 0.0), "a tuple of 3"),
+            (lambda action, scene: (action[0], 0.0, 0.0, 0.0, 0.0), "a tuple of 5"),
+            (lambda action, scene: action[0], "Lanes.*"),
+        )
+    ),
     ({"contact_law": powers}, rf"{BAD}: cannot compile pow\(\) in powers {HERE} \d+\); expected"),
     ({"terms": [term(outdated)]}, r"\.highest, which Outcome has not \(it is \.sums\.highest_grf now\)"),
 ]
