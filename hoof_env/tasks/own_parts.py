@@ -23,6 +23,12 @@ def _check_name(kind: str, name: Any) -> None:
         raise ParameterError(f"{kind}: expected the name of a variable, got {name!r}")
 
 
+def _is_text_by_name(pair: Any) -> bool:
+    """True if something is a name and a text."""
+    is_pair = isinstance(pair, tuple) and len(pair) == 2
+    return is_pair and all(isinstance(text, str) for text in pair) and bool(pair[0])
+
+
 @dataclass(frozen=True)
 class Constant:
     """Constant of a term or an entry, an argument of its function and of `gymnasium.make`.
@@ -99,11 +105,11 @@ class ActionMap:
     def __post_init__(self) -> None:
         if not isinstance(self.form, str) or not self.form or self.form in ("rates", "offsets"):
             raise ParameterError(f"action_map: form: expected a text of its own, got {self.form!r}")
-        pairs = dict(self.actions) if isinstance(self.actions, (Mapping, tuple)) else {}
-        if not pairs or not all(isinstance(name, str) and name for name in pairs):
+        # Kernels are found by what they contain, and a mapping has no hash; a copy is given the pairs.
+        pairs = tuple(self.actions.items()) if isinstance(self.actions, Mapping) else self.actions
+        if not isinstance(pairs, tuple) or not pairs or not all(map(_is_text_by_name, pairs)):
             raise ParameterError(f"{self.title}: actions: expected meanings by name, got {self.actions!r}")
-        # Kernels are found by what they contain, and a mapping has no hash.
-        object.__setattr__(self, "actions", tuple(pairs.items()))
+        object.__setattr__(self, "actions", pairs)
         check_function(f"{self.title}: compute", self.compute, 2)
 
     @property

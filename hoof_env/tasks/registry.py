@@ -96,7 +96,8 @@ class Task:
         return self
 
     def settings(self, changes: Mapping[str, Any]) -> Settings:
-        """Return the task's settings with changes. Reward weights that are not named keep the task's values.
+        """Return the task's settings with changes. Reward weights and constants that are not named keep the
+        task's values.
 
         Raises:
             UnknownArgumentError: an unknown setting.
@@ -115,10 +116,11 @@ class Task:
                 near = difflib.get_close_matches(name, SETTINGS, 1)
                 hint = f"; did you mean {near[0]}?" if near else f" (known: {', '.join(SETTINGS)})"
                 raise UnknownArgumentError(f"{self.id}: unexpected keyword argument {name!r}{hint}")
-        weights = changes.get("reward_weights")
-        default_weights = self.defaults.get("reward_weights", {})
-        if default_weights and (weights is None or isinstance(weights, Mapping)):
-            changes = {**changes, "reward_weights": {**default_weights, **(weights or {})}}
+        for name in ("reward_weights", "constants"):
+            given = changes.get(name)
+            usual = self.defaults.get(name)
+            if usual and (given is None or isinstance(given, Mapping)):
+                changes = {**changes, name: {**usual, **(given or {})}}
         # Also a copy: callers may change their lists and mappings later.
         changes = {name: as_plain(name, value) for name, value in changes.items()}
         if unknown := sorted(set(self.defaults) - set(SETTINGS)):

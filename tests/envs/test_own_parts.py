@@ -131,6 +131,13 @@ def test_change_of_constants_acts_from_the_next_episode_on(example):
         same(env.step(action)[:2], made.step(action)[:2])
 
 
+def test_constants_that_are_not_named_keep_those_of_the_registration(example):
+    hoof_env.register("my_lab/Free-v0", base=ID, constants={"free": 700.0})
+    for given in (None, {}, {"free": 700.0}):
+        assert gym.make("my_lab/Free-v0", constants=given).unwrapped.batch.constants == [700.0]
+    assert gym.make("my_lab/Free-v0", constants={"free": 5.0}).unwrapped.batch.constants == [5.0]
+
+
 def with_constant(step, weight, free):
     return weight * free
 
@@ -172,6 +179,10 @@ LIMIT = Constant("free", 1.0, "-", "a test's", low=0.0, high=2.0)
          lambda: ActionMap("rates", {"a": "-"}, lambda action, scene: (0.0,) * 4)),
         (r"actions: expected meanings by name, got \{\}",
          lambda: ActionMap("mine", {}, lambda action, scene: (0.0,) * 4)),
+        (r"actions: expected meanings by name, got \('abc',\)",
+         lambda: ActionMap("mine", ("abc",), lambda action, scene: (0.0,) * 4)),
+        (r"actions: expected meanings by name, got \{'a': None\}",
+         lambda: ActionMap("mine", {"a": None}, lambda action, scene: (0.0,) * 4)),
         (r"compute: expected a plain function of 2|compute: expected a function of 2",
          lambda: ActionMap("mine", {"a": "-"}, lambda action: (0.0,) * 4)),
         (r"action_map: expected ActionMap, got 'steps'",
