@@ -80,9 +80,11 @@ def split_solids(given: Any) -> tuple[Any, dict[str, dict[str, Any]], dict[str, 
     labels: dict[str, str] = {}
     for k, entry in enumerate(bodies):
         numbers = {key: entry[key] for key in SOLID if key in entry} if isinstance(entry, Mapping) else {}
-        if numbers and isinstance(entry.get("name"), str):
-            solids[entry["name"]] = numbers
-            labels[entry["name"]] = f"mechanism.bodies[{k}]"
+        if numbers:
+            # `read_mechanism` refuses a name that is no text
+            name = str(entry.get("name"))
+            solids[name] = numbers
+            labels[name] = f"mechanism.bodies[{k}]"
             entry = {key: value for key, value in entry.items() if key not in SOLID}
         plain.append(entry)
     return {**given, "bodies": plain}, solids, labels
