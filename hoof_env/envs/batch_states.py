@@ -97,14 +97,15 @@ def set_state(batch: Any, state: Mapping[str, Any]) -> None:
     """
     conditions = _read_conditions(batch, state.get("rows"))
     before = batch.conditions
-    kept = conditions_of(batch), batch.start_values
+    kept = conditions_of(batch), batch.drawn_names, batch.start_values
     batch.put_under(conditions)
     try:
         _set_state(batch, state)
     except BaseException:
         batch.conditions = before
         enter(batch, kept[0])
-        batch.start_values = kept[1]
+        batch.drawn_names = kept[1]
+        batch.start_values = kept[2]
         raise
 
 
@@ -175,6 +176,7 @@ def _read_steps(batch: Any, given: Any) -> Floats:
     if (
         steps.dtype.kind not in "iuf"
         or steps.shape != (batch.num_envs,)
+        or not np.isfinite(steps).all()
         or not (steps == np.rint(steps)).all()
     ):
         raise ParameterError(

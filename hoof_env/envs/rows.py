@@ -150,7 +150,7 @@ class RowAttributes:
             raise fixed_setting(name)
         self._attributes.setdefault(name, {}).update(values)
 
-    def call_on(self, name: str, envs: Iterable[int], *args: Any, **kwargs: Any) -> list[Any]:
+    def call_on(self, name: str, envs: Iterable[int], /, *args: Any, **kwargs: Any) -> list[Any]:
         """Return the results of a method or attribute of some environments, see `call`."""
         chosen = list(envs)
         # Methods of Gymnasium's wrappers, which take the name as their first argument.
@@ -166,8 +166,10 @@ class RowAttributes:
             raise ParameterError(f"call: {name!r} is of all together; expected envs.{name}(...)")
         # Of these environments alone, as by `indices` of Stable-Baselines3.
         if name == "change_settings":
+            if "envs" in kwargs and len(set(chosen)) < self.num_envs:
+                raise ParameterError(f"envs: expected none beside indices {chosen}, got {kwargs['envs']!r}")
             some = None if len(set(chosen)) == self.num_envs else chosen
-            return [self.change_settings(*args, envs=some, **kwargs)] * len(chosen)
+            return [self.change_settings(*args, **{"envs": some, **kwargs})] * len(chosen)
         if name == "settings":
             return [self.batch.coming_settings(env) for env in chosen]
         # Only environments that are asked for keep their substeps.

@@ -47,6 +47,8 @@ class SettingsChanges:
                 )
         new = {name: as_plain(name, value) for name, value in changes.items()}
         rows = which_of(envs, self.batch.num_envs)
+        if not rows.size:
+            self.batch.conditions_under(self.task.settings({**self._given[0], **new}))
         # Rows that were given the same settings share the mapping, and go on to share it.
         groups: dict[int, list[int]] = {}
         for row in rows.tolist():

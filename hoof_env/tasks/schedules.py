@@ -48,12 +48,12 @@ class Course(NamedTuple):
 
     def after(self, steps: Any) -> tuple[Floats, Floats]:
         """Return the lowest and highest value after a number of control steps, or each of several."""
-        part = np.minimum(np.asarray(steps) / self.steps, 1.0)
+        part = np.clip(np.asarray(steps) / self.steps, 0.0, 1.0)
         low, high = (
             (1.0 - part) * first + part * last for first, last in zip(self.first, self.last, strict=True)
         )
         # No rounding leaves the range that was checked.
-        return np.maximum(low, self.hull[0]), np.minimum(high, self.hull[1])
+        return np.clip(low, *self.hull), np.clip(high, *self.hull)
 
 
 def check_schedule(given: Any, settings: Settings, body: Body) -> dict[str, Course]:

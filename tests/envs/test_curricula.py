@@ -10,7 +10,7 @@ import pytest
 from family import HORSE, actions, same
 
 from hoof_env import Sb3VecEnv
-from hoof_env.errors import FixedSettingError, ParameterError
+from hoof_env.errors import FixedSettingError, ParameterError, UnknownArgumentError
 from hoof_env.tasks.plain import to_json
 from hoof_env.tasks.schedules import Course
 
@@ -120,6 +120,10 @@ def test_a_callback_of_stable_baselines_promotes_rows():
     fast = [info["target_speed"] >= 3.0 for info in envs.reset_infos]
     assert all(fast[1::2])
     assert [one.target_speed for one in envs.get_attr("settings", [0, 1])] == [(1.0, 3.5), [3.0, 3.25]]
+    envs.env_method("change_settings", envs=[2], strength=0.5)
+    assert [one.strength for one in envs.get_attr("settings")] == [1.0, 1.0, 0.5, 1.0]
+    with pytest.raises(ParameterError, match=r"envs: expected none beside indices \[1\], got \[2\]"):
+        envs.env_method("change_settings", indices=[1], envs=[2], strength=0.5)
 
 
 @pytest.mark.parametrize(
@@ -130,6 +134,7 @@ def test_a_callback_of_stable_baselines_promotes_rows():
         ("friction: expected", ParameterError, {"friction": -1.0}),
         ("strength: expected", ParameterError, {"strength": 11.0}),
         (r"envs: expected indices below 3", ParameterError, {"envs": [3], "strength": 1.0}),
+        ("unexpected keyword argument 'strenght'", UnknownArgumentError, {"envs": [], "strenght": 1.0}),
         (r"noise: expected a mapping with some of the groups that are observed", ParameterError,
          {"noise": {"target": 1.0}}),
     ],
@@ -158,6 +163,10 @@ def test_a_course_stays_within_its_ends_and_reaches_them():
         assert min(low) >= course.hull[0]
         assert max(high) <= course.hull[1]
         assert (np.sign(np.diff(low)) * np.sign(last[0] - first[0]) >= 0).all()
+        # A number goes from itself to itself, whatever is rounded; nothing is before the first step.
+        number = first[0], first[0]
+        assert {*np.ravel(Course(number, number, 997, False).after(np.arange(1000)))} == {first[0]}
+        assert (*course.after(-7),) == first
 
 
 SCHEDULE = {
@@ -192,6 +201,19 @@ def test_a_schedule_follows_the_steps_of_each_row(env_id):
     assert ((friction >= 0.2) & (friction <= 0.4)).all()
     infos = fresh.reset(seed=4)[1]
     assert (infos["parameters"]["friction"] == 0.8).all()
+
+
+def test_a_refused_state_leaves_the_names_of_what_is_drawn():
+    """Rows of the state draw a parameter that those of the environment do not."""
+    envs, other = (gym.make_vec(LEG, 2, **SHORT).unwrapped for _ in range(2))
+    for each in (envs, other):
+        each.reset(seed=0)
+    other.change_settings(envs=[1], randomize={"friction": (0.3, 0.5)})
+    other.reset()
+    for steps in ([0.5, 0.0], [np.inf, 0.0], [np.nan, 0.0], [0.0]):
+        with pytest.raises(ParameterError, match=r"state\['steps_before'\]: expected a whole number"):
+            envs.set_state({**other.get_state(), "steps_before": steps})
+        assert "parameters" not in envs.reset()[1]
 
 
 def test_options_go_before_a_schedule():
