@@ -197,7 +197,7 @@ def column_of(table, name):
 
 @pytest.mark.parametrize(
     ("env_id", "given", "name"),
-    [(LEG, {}, "run"), (LEG, {"preset": "klann"}, "walk"), ("hoof_env/Horse-v0", {}, "reference")],
+    [(LEG, {}, "run"), (LEG, {"preset": "klann"}, "run"), ("hoof_env/Horse-v0", {}, "reference")],
 )
 def test_the_policy_that_plays_if_none_is_named(env_id, given, name):
     with make_env(env_id, given) as env:

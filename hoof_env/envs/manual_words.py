@@ -14,8 +14,7 @@ from hoof_env.envs.batch_reports import SUMMARY
 from hoof_env.eq8.integrators import INTEGRATORS
 from hoof_env.gait import WIDEST, FilterSettings
 from hoof_env.ground.laws import FRICTION_LAWS, NORMAL_LAWS
-from hoof_env.leg.geometry import load_geometry, preset_names
-from hoof_env.leg.mechanism_list import PAPER
+from hoof_env.leg.geometry import preset_names, presets_of_paper
 from hoof_env.tasks import horse, leg_starts
 from hoof_env.tasks.body_settings import About
 from hoof_env.tasks.horse_gaits import FASTEST, FOLLOWED, SIZES, horse_gaits
@@ -32,7 +31,7 @@ def tables() -> dict[str, dict[str, Any]]:
     the words of a page. Words that begin with $ are replaced by numbers and choices."""
     names = {
         "presets": preset_names(),
-        "horse_presets": [name for name in preset_names() if load_geometry(name).mechanism == PAPER],
+        "horse_presets": presets_of_paper(),
         "trunks": ONE_LEG,
         "schemes": SCHEMES,
         "paper_schemes": INTEGRATORS,

@@ -373,6 +373,11 @@ def preset_names() -> list[str]:
     return sorted(f.name.removesuffix(".json") for f in files if f.name.endswith(".json"))
 
 
+def presets_of_paper() -> list[str]:
+    """Return the names of the presets with the paper's mechanism, read without solving their legs."""
+    return [name for name in preset_names() if "mechanism" not in read_preset(name)["geometry"]]
+
+
 def preset_label(preset: Preset) -> str:
     """Return the name of a preset in an error."""
     return "preset" if isinstance(preset, Mapping) else f"preset {preset}"

@@ -1,15 +1,28 @@
 """Charges for landings: each is paid when it should be, and by as much."""
 
+import importlib
+
 import gymnasium as gym
 import numpy as np
 import pytest
 
-from agents import soft_landing, soft_terms
 from hoof_env import make_policy
 
 
-@pytest.fixture(scope="module", params=soft_terms.TERMS)
-def steps(request):
+@pytest.fixture(scope="module")
+def soft_terms():
+    """The module, imported when a test runs: others have tests for every id that is registered before."""
+    return importlib.import_module("agents.soft_terms")
+
+
+@pytest.fixture(scope="module")
+def soft_landing(soft_terms):
+    """The command, which imports the module."""
+    return importlib.import_module("agents.soft_landing")
+
+
+@pytest.fixture(scope="module", params=("threshold", "first_contact", "approach"))
+def steps(request, soft_terms):
     """Charge, and for each step of a run on the usual ground what was paid and measured."""
     env = gym.make(soft_terms.id_of(request.param), randomize=None).unwrapped
     policy = make_policy("run", env)
@@ -22,7 +35,7 @@ def steps(request):
     return request.param, rows, env
 
 
-def test_it_is_the_documented_quantity(steps):
+def test_it_is_the_documented_quantity(steps, soft_terms):
     charge, rows, env = steps
     weight = soft_terms.WEIGHTS[charge]
     body = 9.81 * (env.batch.engine.trunk.mass + rows[0][2])
@@ -39,14 +52,14 @@ def test_it_is_the_documented_quantity(steps):
     assert min(paid for paid, _, _ in rows) < 0.0
 
 
-def test_the_run_pays_the_same_for_each():
+def test_the_run_pays_the_same_for_each(soft_terms, soft_landing):
     for charge in soft_terms.TERMS:
         found = soft_landing.play("run", soft_terms.id_of(charge), 100, randomize=None)
         assert -found[f"charge_{charge}"] / found["seconds"] == pytest.approx(soft_terms.PRICE, rel=0.02)
         assert 0.5 < found["seen"] < 1.0
 
 
-def test_control_steps_hide_peaks():
+def test_control_steps_hide_peaks(soft_terms, soft_landing):
     """The highest force at the ends of control steps is below that of all substeps, of a whole episode by
     little."""
     found = soft_landing.play("run", soft_terms.id_of("own"), 8)

@@ -30,9 +30,12 @@ GAIT = GaitParameters(6.0, 0.02, -0.05, 0.04)
 
 
 def in_stance(leg):
-    """A crank angle at which a foot is lowest."""
+    """A crank angle at which the toe is lowest in `GAIT`, and where it is then."""
     theta = np.linspace(0, 2 * np.pi, 60)
-    return float(theta[np.argmin([leg.pose(t).point(leg.toe)[1] for t in theta])])
+    swing = GAIT.swing_offset + GAIT.swing_sin * np.sin(theta) + GAIT.swing_cos * np.cos(theta)
+    places = np.array([leg.pose(*each).point(leg.toe) for each in zip(theta, swing, strict=True)])
+    lowest = np.argmin(places[:, 1])
+    return float(theta[lowest]), places[lowest]
 
 
 def a_motion(theta, theta_rate=0.0, theta_acc=0.0, phi=0.0, phi_rate=0.0, phi_acc=0.0):
@@ -106,9 +109,8 @@ def test_joint_reactions_are_those_of_eq_8(leg, theta):
 def test_every_body_obeys_newton_and_euler(leg, slope):
     """And the powers of the drives are the rate of all energy less the power of the ground (virtual work)."""
     terrain = Terrain.slope(slope) if slope else None
-    start = in_stance(leg)
-    rise = np.tan(slope) * leg.pose(start).point(leg.toe)[0]
-    trunk = Trunk("fixed", height=leg.hip_height - 0.03 + rise)
+    start, (x, y) = in_stance(leg)
+    trunk = Trunk("fixed", height=-y - 0.08 + np.tan(slope) * x)
     engine = TrunkEngine(Limb(leg, drive=Prescribed()), trunk, NATURAL, terrain, reactions=True)
     engine.reset(GAIT, start - 1.0)
     turned = np.array([[np.cos(slope), -np.sin(slope)], [np.sin(slope), np.cos(slope)]])
@@ -142,15 +144,16 @@ def test_every_body_obeys_newton_and_euler(leg, slope):
 
 @pytest.mark.parametrize("leg", LEGS.values(), ids=LEGS)
 def test_energy_is_what_drives_give_and_ground_and_dampers_take(leg):
-    trunk = Trunk("suspended", mass=80.0, height=leg.hip_height, damping=50.0)
+    start, (_, y) = in_stance(leg)
+    trunk = Trunk("suspended", mass=80.0, height=-y, damping=50.0)
     engine = TrunkEngine(Limb(leg, drive=Motor()), trunk, NATURAL, sim_dt=2.5e-4)
-    engine.reset(GAIT, in_stance(leg) - 1.0)
-    start = energy(engine)[0]
+    engine.reset(GAIT, start - 1.0)
+    before = energy(engine)[0]
     pressed = 0.0
     for _ in range(20):
         assert not engine.advance(steps=100).any()
         pressed = max(pressed, engine.report["toe_normal"].max())
-    change = energy(engine)[0] - start
+    change = energy(engine)[0] - before
     assert pressed > 300
     assert abs(change) > 1
     assert change == pytest.approx(drives_less_losses(engine)[0], abs=2e-3 * abs(change) + 0.05)
@@ -159,10 +162,11 @@ def test_energy_is_what_drives_give_and_ground_and_dampers_take(leg):
 @pytest.mark.parametrize("name", ONE_FOOT)
 def test_a_hoof_of_one_point_has_a_heel_that_is_nothing(name):
     leg = LEGS[name]
+    start, (_, y) = in_stance(leg)
     made = [
         TrunkEngine(
             Limb(leg, drive=Motor()),
-            Trunk("suspended", mass=80.0, height=leg.hip_height),
+            Trunk("suspended", mass=80.0, height=-y),
             NATURAL,
             num_envs=n,
             strides=True,
@@ -170,7 +174,7 @@ def test_a_hoof_of_one_point_has_a_heel_that_is_nothing(name):
         for n in (1, 20)
     ]
     for engine in made:
-        engine.reset(GAIT, in_stance(leg) - 0.5)
+        engine.reset(GAIT, start - 0.5)
         engine.advance(steps=100)
     engine, batch = made
     for values, many in ((engine.report, batch.report), (engine.state, batch.state)):

@@ -260,7 +260,7 @@ def test_kernels_are_others_where_the_number_of_stored_gaits_is(monkeypatch):
     def name_of_kernel():
         task, features = TASKS["horse"], Features(2, springs=True, has_limits=True)
         body = HORSE_KERNELS._replace(task_fields=tuple(reference.reference_type()))
-        found = step._made([], task.terms, task.entries, None, features, body)
+        found = step._made([], task.terms, task.entries, None, features, body, None)
         return found.step_batch.py_func.__qualname__
 
     before, stored = name_of_kernel(), reference._reference()

@@ -35,8 +35,12 @@ def read(name):
 
 def others(name):
     """The pages to which a page refers, with its id in their examples."""
-    pages = {other: read(other).replace("/HorseLeg-v0", f"/{name}-v0") for other in ("HorseLeg", "common")}
-    return {other: page for other, page in pages.items() if other != name}
+    tasks = {task.name: key for key, task in TASKS.items()}
+    near = {other: manual.page(tasks[other]) for other in manual.NEAREST.get(name, ())}
+    pages = near | {other: read(other) for other in ("HorseLeg", "common") if other != name}
+    return {other: page.replace(f"/{other}-v0", f"/{name}-v0") for other, page in pages.items()} | {
+        "common": read("common").replace("/HorseLeg-v0", f"/{name}-v0")
+    }
 
 
 def anchor(heading):

@@ -48,7 +48,9 @@ def test_what_was_set_for_one_episode_is_not_for_the_next(env_id, seed):
     env, fresh = make(env_id), make(env_id)
     for one in (env, fresh):
         one.reset(seed=3)
-    env.reset(seed=3, options={"parameters": effective(PARAMETERS, env_id, drive="motor")})
+    # Pushes would turn the cranks of motors; HorseRough has them.
+    settings = {} if env_id == "hoof_env/HorseRough-v0" else {"drive": "motor"}
+    env.reset(seed=3, options={"parameters": effective(PARAMETERS, env_id, **settings)})
     roll(env, 20)
     weight = fresh.weight
     heavier = PARAMETERS["trunk_mass"] - fresh.settings.trunk_mass
