@@ -392,7 +392,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         tyro.extras.subcommand_cli_from_dict(
             COMMANDS,
             prog="hoof-env",
-            description="A horse's leg on the ground. --version prints the version.",
+            description="A horse's leg, or a horse, on the ground. --version prints the version.",
             args=options,
         )
         sys.stdout.flush()
