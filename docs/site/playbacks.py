@@ -64,7 +64,8 @@ def made() -> Iterator[tuple[str, list[str], Playback]]:
     """Yield the name of each page that plays, the documents that show it, and the page."""
     for env_id in ids():
         name = name_of(env_id)
-        documents = [f"docs/environments/{name}", *(["docs/horse"] if name == "Horse" else [])]
+        card = f"agents/policies/{name}-v0/card"
+        documents = [f"docs/environments/{name}", card, *(["docs/horse"] if name == "Horse" else [])]
         yield name, documents, playback_of(env_id)
     yield "paper", ["docs/paper"], of_paper()
 
