@@ -95,7 +95,7 @@ class Playback:
             title: title of the page, by default the name of the id.
 
         Raises:
-            HoofEnvError: as of `Simulation`.
+            HoofEnvError: as of `Simulation`, or an episode ends within `skip`.
         """
         check_number("seconds", seconds, low=0, exclusive_low=True)
         check_number("skip", skip, low=0)
@@ -111,6 +111,8 @@ class Playback:
                     chunks.append(chunk)
                 if chunk.columns["time"][-1] >= skip + seconds - 1e-9:
                     break
+            if not chunks:
+                raise ParameterError(f"skip: expected less than the episode takes, got {skip:g} s")
             (record,) = cls.of_chunks(simulation, chunks).records
             made.append(record._replace(label=label or record.label))
         return cls(title or " and ".join(dict.fromkeys(record.label for record in made)), made)

@@ -67,9 +67,6 @@ class Tab:
         now = time.monotonic()
         passed = min(now - self._last, LONGEST_TICK)
         self._last = now
-        if self._warned:
-            self._tell(status=" ".join(self._warned), kind="warning")
-            self._warned = []
         if not self.playing:
             return
         try:
@@ -145,8 +142,12 @@ class Tab:
         self.look.told.data = {"message": [json.dumps({"kind": "note"} | message | {"at": time.monotonic()})]}
 
     def show(self) -> None:
-        """Send all that is shown, as a page asks that has just opened."""
+        """Send all that is shown, and warnings, as a page asks that has just opened."""
         self._send_anew()
+        # Not earlier: a page does not hear what is told before it is there.
+        if self._warned and self.playing:
+            self._tell(status=" ".join(self._warned), kind="warning")
+        self._warned = []
 
     def play(self, value: bool | None = None) -> None:
         """Play or pause; None for the other of both."""

@@ -6,6 +6,7 @@ import os
 import shutil
 import subprocess
 import sys
+from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
@@ -20,9 +21,14 @@ ROOT = Path(__file__).parents[2]
 CHROMIUM = os.environ.get("CHROMIUM") or shutil.which("chromium") or shutil.which("chromium-browser")
 LEG = "hoof_env/HorseLeg-v0"
 SERVE = f"""
+import sys
 from pathlib import Path
 from hoof_env.view.server import start
-setup = dict(env_id={LEG!r}, arguments=dict(drive="motor"), policy=None, seed=0)
+class Broken:
+    def predict(self, observation, **_):
+        return [float("nan")] * 4, None
+policy = Broken() if "broken" in sys.argv else None
+setup = dict(env_id={LEG!r}, arguments=dict(drive="motor"), policy=policy, seed=0)
 server, url = start(setup, port=0, out=Path("."))
 print(url, flush=True)
 server.io_loop.start()
@@ -33,15 +39,24 @@ NAMES = """[...document.querySelectorAll('button, input, select, summary')].filt
 TOO_WIDE = "document.documentElement.scrollWidth - document.documentElement.clientWidth"
 
 
-@pytest.fixture(scope="module")
-def url(tmp_path_factory):
-    """Address of a page that another process serves, as the browser's driver has a loop of its own."""
-    folder = tmp_path_factory.mktemp("recordings")
-    command = [sys.executable, "-c", SERVE]
+@contextmanager
+def served(folder, *options):
+    """Serve a page from another process, as the browser's driver has a loop of its own; give its address."""
+    command = [sys.executable, "-c", SERVE, *options]
     environment = os.environ | {"PYTHONPATH": str(ROOT)}
     with subprocess.Popen(command, cwd=folder, env=environment, stdout=subprocess.PIPE, text=True) as process:
-        yield process.stdout.readline().strip(), folder
-        process.kill()
+        try:
+            yield process.stdout.readline().strip()
+        finally:
+            process.kill()
+
+
+@pytest.fixture(scope="module")
+def url(tmp_path_factory):
+    """Address of a page, and its folder of recordings."""
+    folder = tmp_path_factory.mktemp("recordings")
+    with served(folder) as address:
+        yield address, folder
 
 
 @pytest.fixture(scope="module")
@@ -198,6 +213,15 @@ def test_a_refusal_is_told_and_another_set_up_is_a_new_page(tab):
     page.wait_for_selector("body[data-ready]")
     tab.wait("() => Number(document.querySelector('[data-number=\"peak 0\"]').textContent) > 7000")
     assert page.locator("h1").text_content() == "HorseLegFixed-v0"
+
+
+def test_a_policy_that_fails_before_the_page_is_there_is_told(browser, tmp_path):
+    with served(tmp_path, "broken") as address:
+        tab = Tab(browser, address)
+        tab.status("expected finite actions")
+        tab.page.get_by_role("button", name="Play").wait_for()
+        tab.page.close()
+    assert not tab.faults
 
 
 def test_a_push_changes_the_speed_of_the_trunk(tab):

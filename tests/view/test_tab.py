@@ -24,11 +24,13 @@ from bokeh.models import Div
 from bokeh.resources import INLINE
 
 from hoof_env.view import server
+from hoof_env.view import tab as tab_module
 from hoof_env.view.controls import CONDITIONS, PAPER_ID, paper_values, setting_sliders
 from hoof_env.view.layout import template
 from hoof_env.view.playback import Playback
 from hoof_env.view.recording import FORMATS
 from hoof_env.view.server import MOST_TABS, Pages, start
+from hoof_env.view.simulation import Simulation
 from hoof_env.view.tab import HANDLERS, Tab
 
 LEG, HORSE = "hoof_env/HorseLeg-v0", "hoof_env/Horse-v0"
@@ -198,6 +200,17 @@ def test_no_state_is_lost_or_doubled_whatever_is_asked_meanwhile(page, seed):
         whole = found(time[0], time[-1])
         for name, values in whole.items():
             np.testing.assert_array_equal(has[group, name], values, err_msg=name)
+
+
+def test_a_warning_waits_until_the_page_has_opened(tmp_path, monkeypatch):
+    monkeypatch.setattr(tab_module, "checked_simulation", lambda setup: (Simulation(**setup), ["A zip."]))
+    page = Page(tmp_path)
+    page.tick(0.2)
+    assert page.tab.look.told.data["message"] == ["{}"]
+    told = page.ask("show")
+    assert (told["status"], told["kind"]) == ("A zip.", "warning")
+    assert page.ask("show") == {}
+    page.tab.close()
 
 
 def test_a_push_adds_its_impulse_over_the_mass(page):
@@ -499,6 +512,9 @@ def test_four_conditions_play_side_by_side():
     assert made.html("bokeh.min.js").count('<div data-record="') == 4
     with pytest.raises(HoofEnvError, match="records"):
         Playback("nothing", [])
+    short = {"env_id": LEG, "arguments": {"episode_seconds": 0.1}}
+    with pytest.raises(ParameterError, match="skip: expected less than the episode takes, got 2 s"):
+        Playback.play(short, skip=2.0)
 
 
 def test_view_needs_no_browser_to_import():

@@ -247,6 +247,8 @@ const count = () => {
 take()
 requestAnimationFrame(count)
 show_frame()
+// A policy may have failed before the page was there.
+hear()
 // Numbers that came while the page was made are not there yet.
 ask("show")
 document.body.dataset.ready = "true"
