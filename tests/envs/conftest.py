@@ -12,6 +12,16 @@ from hoof_env.tasks import registry as tasks
 sys.path.append(str(Path(__file__).parent))
 
 
+@pytest.fixture
+def registered():
+    """Remove what a test registers after it."""
+    known, own = dict(gym.registry), dict(tasks._OWN)
+    yield
+    for registry, before in ((gym.registry, known), (tasks._OWN, own)):
+        registry.clear()
+        registry.update(before)
+
+
 @pytest.fixture(scope="module")
 def own():
     """The module with an id of its own, imported, for the tests of one file."""

@@ -38,14 +38,7 @@ NAMES = ("rising", "load angle", "episode seconds")
 PLAIN = Scale("none")
 
 
-@pytest.fixture(autouse=True)
-def registered():
-    """What a test registers is gone after it."""
-    known, own = dict(gym.registry), dict(tasks._OWN)
-    yield
-    for registry, before in ((gym.registry, known), (tasks._OWN, own)):
-        registry.clear()
-        registry.update(before)
+pytestmark = pytest.mark.usefixtures("registered")
 
 
 @pytest.mark.parametrize("settings", [{}, {"terrain": HILLS}, {"exponent": 1.25}], ids=str)

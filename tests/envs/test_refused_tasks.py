@@ -18,14 +18,7 @@ from hoof_env.tasks import registry as tasks
 BAD = "own/Bad-v0"
 
 
-@pytest.fixture(autouse=True)
-def registered():
-    """What a test registers is gone after it."""
-    known, own = dict(gym.registry), dict(tasks._OWN)
-    yield
-    for registry, before in ((gym.registry, known), (tasks._OWN, own)):
-        registry.clear()
-        registry.update(before)
+pytestmark = pytest.mark.usefixtures("registered")
 
 
 def term(compute, name="mine", **kwargs):
