@@ -110,7 +110,7 @@ def test_every_equation_that_the_code_quotes_is_on_the_page_of_the_engine():
     tags = re.findall(r"\\tag\{(E\d)\}", (ROOT / "docs" / "engine.md").read_text())
     code = "".join(path.read_text() for path in (ROOT / "hoof_env" / "dynamics").glob("*.py"))
     assert tags == [f"E{n}" for n in range(1, 10)]
-    assert set(re.findall(r"\((E\d)\)", code)) == set(tags)
+    assert set(re.findall(r"\((E\d+)\)", code)) == set(tags)
 
 
 def test_the_rooms_of_contributing_are_those_of_the_house():
