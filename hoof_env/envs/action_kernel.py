@@ -7,7 +7,7 @@ from typing import Any
 
 from hoof_env.envs.addresses import AT
 from hoof_env.envs.observation_kernel import inputs_reader
-from hoof_env.simd import columns, full_like, read, rows, write
+from hoof_env.simd import full_like, read, rows, write
 from hoof_env.simd.compile import inline_llvm, inline_source
 from hoof_env.simd.math import clip
 from hoof_env.simd.memory import singles_at
@@ -32,6 +32,24 @@ def _writer(k: int, size: int, number: Any) -> Callable[..., Any]:
     return write_from
 
 
+def _reader(k: int, size: int, scalar: bool) -> Callable[..., Any]:
+    """Return a function that reads the actions from the k-th on as a tuple, of which the compiler knows the
+    length: reading beyond it is refused."""
+    if k == size:
+        return inline_llvm(lambda like, acted, n: ())
+    rest = _reader(k + 1, size, scalar)
+
+    @inline_llvm
+    def read_lanes(like, acted, n):  # type: ignore[no-untyped-def]
+        return (clip(read(like, acted, n * size + k, size), 1.0), *rest(like, acted, n))
+
+    @inline_llvm
+    def read_number(like, acted, n):  # type: ignore[no-untyped-def]
+        return (clip(float(acted[n * size + k]), 1.0), *rest(like, acted, n))
+
+    return read_number if scalar else read_lanes
+
+
 def converter(action_map: ActionMap | None, layouts: Memories, body: BodyKernels) -> Callable[..., Any]:
     """Return a part of kernels that writes the body's actions of row n and, with lanes, of its neighbours;
     `scratch` is room for as many numbers as the map has actions, for each lane."""
@@ -47,16 +65,16 @@ def converter(action_map: ActionMap | None, layouts: Memories, body: BodyKernels
     of_body = body.legs * ACTIONS
     all_of = numbers_of(action_map.title, of_body)
     write_all = _writer(0, of_body, number_of(action_map.title))
+    read_all = _reader(0, given, action_map.scalar)
     inputs_of = inputs_reader(layouts)
 
     @inline_source
     def convert(addresses, lanes, task, n, scratch):  # type: ignore[no-untyped-def]
         acted = singles_at(addresses[AT.acted])
-        actions = rows(scratch, lanes, None)
-        for k in range(given):
-            actions[k] = clip(read(actions, acted, n * given + k, given), 1.0)
+        like = rows(scratch, lanes, None)
+        actions = read_all(like, acted, n)
         scene = inputs_of(addresses, lanes, task, n)
-        write_all(actions, all_of(compute(actions, scene)), singles_at(addresses[AT.mapped]), n)
+        write_all(like, all_of(compute(actions, scene)), singles_at(addresses[AT.mapped]), n)
 
     @inline_source
     def convert_one_by_one(addresses, lanes, task, n, scratch):  # type: ignore[no-untyped-def]
@@ -64,9 +82,7 @@ def converter(action_map: ActionMap | None, layouts: Memories, body: BodyKernels
         for lane in range(lanes):
             row = n + lane
             like = rows(scratch, 1, None)
-            actions = columns(scratch, 0, None, 0, 1, 1)
-            for k in range(given):
-                actions[k] = clip(float(acted[row * given + k]), 1.0)
+            actions = read_all(like, acted, row)
             scene = inputs_of(addresses, 0, task, row)
             write_all(like, all_of(compute(actions, scene)), singles_at(addresses[AT.mapped]), row)
 

@@ -287,6 +287,7 @@ class EpisodeBatch(BatchKernels, BatchChanges):
         """Finish a `step` after its kernel, which returned the code `happened`."""
         if happened == NOT_A_NUMBER:
             raise ParameterError("action: expected finite numbers, got some that are not")
+        self.check_mapped()
         # The engine put failed environments back to their last good state; the kernel observed what failed.
         if happened & SOME_ENDED and not self.paper:
             put_back = np.flatnonzero(broken(self.engine.results))

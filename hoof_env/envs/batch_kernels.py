@@ -122,6 +122,20 @@ class BatchKernels:
         blocks = [range(self.engine.columns)] if self.paper else self.engine.blocks
         self._blocks = [(ADDRESSES.of(*arrays, columns=block),) for block in blocks]
 
+    def check_mapped(self) -> None:
+        """Check that a map of actions from outside gave numbers.
+
+        Raises:
+            ParameterError: it gave NaN.
+        """
+        if not self.task.action_map or not np.isnan(self.mapped[: self.num_envs]).any():
+            return
+        env, k = np.argwhere(np.isnan(self.mapped[: self.num_envs]))[0].tolist()
+        raise ParameterError(
+            f"{self.task.action_map.title}: expected numbers, got NaN for action {k} of the body in"
+            f" environment {env}"
+        )
+
     def check_observed(self) -> None:
         """Check that entries from outside gave numbers; those of this package do.
 

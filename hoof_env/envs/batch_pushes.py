@@ -23,6 +23,9 @@ from hoof_env.tasks.schedules import STRENGTH
 Generators = Sequence[np.random.Generator]
 Rows = NDArray[np.int64]
 
+UNPUSHED: tuple[Push, ...] = ((0, 0.0, 0.0),)
+"""Plan of an episode without pushes where they are drawn otherwise: its one push, of nothing, is past."""
+
 
 def check_disturbances(batch: Any) -> None:
     """Check the settings of the disturbances of an `EpisodeBatch`, and set the attributes that follow from
@@ -84,6 +87,8 @@ def begin_disturbances(batch: Any, which: Rows, generators: Generators, options:
         whole = [generator.integers(delay.least, delay.most + 1) for generator in generators if is_drawn]
         getattr(episode, name)[which] = whole if is_drawn else delay.most
     given: tuple[Push, ...] = options.get("pushes", batch.given_pushes)
+    if "pushes" in options and batch.push_impulse:
+        given = given or UNPUSHED
     for env in which.tolist():
         batch.push_plans[env] = given
     episode.push_at[which] = np.inf

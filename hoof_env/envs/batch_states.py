@@ -28,8 +28,8 @@ def state_of(batch: Any) -> dict[str, Any]:
         state["pushes"] = [*batch.push_plans]
     if batch.conditions.are_mixed or batch.conditions.are_due(np.arange(batch.num_envs)):
         state["rows"] = batch.conditions.to_plain()
-    if batch.schedule or batch.conditions.all:
-        state["steps_before"] = batch.steps_before.copy()
+    # Without a schedule, too: one that `change_settings` adds counts all steps of a row.
+    state["steps_before"] = batch.steps_before.copy()
     return state | ({"paper": batch.paper.get_state()} if batch.paper else {})
 
 

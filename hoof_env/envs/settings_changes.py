@@ -12,6 +12,7 @@ from hoof_env.envs.conditions import CHANGEABLE
 from hoof_env.errors import FixedSettingError
 from hoof_env.tasks.plain import as_plain
 from hoof_env.tasks.registry import Task
+from hoof_env.tasks.schedules import SPEED, check_unscheduled
 from hoof_env.tasks.settings import SETTINGS
 
 
@@ -54,7 +55,11 @@ class SettingsChanges:
         for row in rows.tolist():
             groups.setdefault(id(self._given[row]), []).append(row)
         given = [{**self._given[group[0]], **new} for group in groups.values()]
-        self.batch.change([self.task.settings(each) for each in given], [*groups.values()])
+        asked = [self.task.settings(each) for each in given]
+        if SPEED in new and "schedule" not in new:
+            for settings in asked:
+                check_unscheduled(SPEED, settings)
+        self.batch.change(asked, [*groups.values()])
         for each, group in zip(given, groups.values(), strict=True):
             for row in group:
                 self._given[row] = each

@@ -31,7 +31,11 @@ from hoof_env.tasks.one_leg import OneLeg
 from hoof_env.tasks.own_parts import ActionMap, check_constants, constants_of
 from hoof_env.tasks.plain import as_plain, json_value
 from hoof_env.tasks.reward import TERMS, Term, check_weights
+from hoof_env.tasks.schedules import SPEED, check_unscheduled
 from hoof_env.tasks.settings import SETTINGS, Settings
+
+ANY_SPEED = (0.0, 1.0)
+"""Range that stands for a scheduled one where it matters only that speeds are drawn."""
 
 
 @dataclass(frozen=True)
@@ -130,11 +134,17 @@ class Task:
         # `target_seconds` has an effect with the range that None stands for.
         is_ranged = self.speeds is not None and settings.target_speed is None
         in_effect = replace(settings, target_speed=self.speeds) if is_ranged else settings
+        if isinstance(settings.schedule, Mapping) and SPEED in settings.schedule:
+            # Speeds of a schedule may be ranges at any time.
+            in_effect = replace(settings, target_speed=ANY_SPEED)
         for name, value in changes.items():
             usual = json_value(getattr(plain, name))
             # A default that is passed explicitly asks for nothing, with or without an effect.
             if not np.array_equal(json_value(value), usual):
                 check_effect(name, in_effect)
+                # A scheduled speed needs a target_speed, which gives the environment a command at all.
+                if name != SPEED:
+                    check_unscheduled(name, settings)
         if self.contact_law and settings.solver == "paper":
             raise ParameterError(
                 f'{self.id}: solver: expected "exact" beside a contact law of one\'s own, got "paper"'

@@ -56,6 +56,23 @@ class Course(NamedTuple):
         return np.clip(low, *self.hull), np.clip(high, *self.hull)
 
 
+def check_unscheduled(name: str, settings: Settings) -> None:
+    """Check that a setting is not one that a schedule sets.
+
+    Args:
+        name: name of the setting.
+        settings: all settings, this one included.
+
+    Raises:
+        ParameterError: the schedule contains it.
+    """
+    if isinstance(settings.schedule, Mapping) and name in settings.schedule:
+        raise ParameterError(
+            f"{name}: expected none beside schedule[{name!r}], which sets it, got"
+            f" {getattr(settings, name)!r}; change the schedule, or give it up with schedule=None"
+        )
+
+
 def check_schedule(given: Any, settings: Settings, body: Body) -> dict[str, Course]:
     """Return the courses of scheduled settings, by name.
 

@@ -20,10 +20,10 @@ SHORT = {"episode_seconds": 0.2}
 
 LEVELS = [
     {"friction": 0.2},
-    {"randomize": {"trunk_mass": (40.0, 60.0)}, "strength": 2.0},
+    {"randomize": {"trunk_mass": (40.0, 60.0)}, "strength": 2.0, "schedule": None},
     {"target_speed": [0.5, 1.5], "target_seconds": [0.1, 0.2]},
     {"reward_weights": {"peak": 3.0}, "noise": {"trunk": 0.1}},
-    {"schedule": {"strength": [0.0, 1.0, 15]}, "pushes": None},
+    {"schedule": {"strength": [0.0, 1.0, 15]}, "strength": 1.0, "pushes": None},
     {"terrain": {"kind": "hills", "seed": 5, "stiffness": [0.5, 2.0]}},
 ]
 
@@ -248,3 +248,46 @@ def test_what_is_drawn_and_scheduled_is_refused():
         gym.make(LEG, schedule={"friction": [0.1, 0.2, 5]}, randomize={"friction": (0.2, 0.3)})
     with pytest.raises(ParameterError, match=r"schedule.*expected a target_speed beside it, got None"):
         gym.make("hoof_env/HorseLegRail-v0", schedule={"target_speed": [1.0, 2.0, 5]})
+
+
+@pytest.mark.parametrize(
+    ("name", "value", "course"),
+    [
+        ("friction", 0.3, [0.8, 0.2, 30]),
+        ("strength", 2.0, [0.0, 1.0, 9]),
+        ("target_speed", 1.5, [1.0, 2.0, 9]),
+    ],
+)
+def test_a_setting_that_a_schedule_sets_is_refused(name, value, course):
+    env = gym.make(SPEED, schedule={name: course}).unwrapped
+    words = rf"{name}: expected none beside schedule\['{name}'\], which sets it, got .*schedule=None"
+    with pytest.raises(ParameterError, match=words):
+        env.change_settings(**{name: value})
+    if name != "target_speed":  # without which there is no commanded speed
+        with pytest.raises(ParameterError, match=words):
+            gym.make(SPEED, schedule={name: course}, **{name: value})
+    env.change_settings(**{name: value}, schedule=None)
+    env.reset(seed=0)
+    assert env.get_wrapper_attr("settings").schedule is None
+
+
+def test_scheduled_speeds_have_a_time_for_which_they_hold():
+    settings = {"schedule": {"target_speed": [[0.5, 1.0], [2.0, 3.0], 5]}, "target_seconds": (0.04, 0.04)}
+    env = gym.make(LEG, **settings)
+    env.reset(seed=0)
+    speeds = {env.step(np.zeros(4, np.float32))[-1]["target_speed"] for _ in range(8)}
+    assert len(speeds) == 5  # the first one, and a new one after each second step
+
+
+def test_a_schedule_that_is_added_after_a_state_counts_all_steps():
+    env, other = (gym.make(LEG, **SHORT).unwrapped for _ in range(2))
+    env.reset(seed=0)
+    for _ in range(7):
+        env.step(np.zeros(4, np.float32))
+    env.reset()
+    other.reset(seed=1)
+    other.set_state(env.get_state())
+    for each in (env, other):
+        each.change_settings(schedule={"strength": [0.0, 2.0, 40]})
+        each.reset()
+        assert each.batch.episode_rows.strength[0] == 2.0 * 7 / 40

@@ -380,3 +380,24 @@ def test_pushes_of_one_step_add_up():
     given = [[0.06, 5.0, 0.0], [0.061, 1.0, 3.0], [0.02, 2.0, 0.0]]
     assert check_pushes("pushes", given, 0.02, 10) == ((1, 2.0, 0.0), (3, 6.0, 3.0))
     assert check_pushes("pushes", np.array(given), 0.02, 10) == ((1, 2.0, 0.0), (3, 6.0, 3.0))
+
+
+def test_an_option_without_pushes_leaves_drawn_ones_out():
+    """Also over a state, and for that episode only."""
+    settings = {"push_impulse": [20.0, 30.0], "push_seconds": [0.04, 0.06]}
+    env, plain = make(LEG, **settings), make(LEG)
+    for given in ([], None):
+        # The draws of the pushes are left out, too: the generator goes on as that of an environment without.
+        same(env.reset(seed=3, options={"pushes": given})[0], plain.reset(seed=3)[0])
+        taken = actions(0, 20)
+        for action in taken[:10]:
+            same(env.step(action)[0], plain.step(action)[0])
+        state = env.get_state()
+        env.reset(seed=8)
+        env.set_state(state)
+        for action in taken[10:]:
+            same(env.step(action)[0], plain.step(action)[0])
+    same(env.reset(seed=3)[0], plain.reset(seed=3)[0])
+    assert not np.array_equal(env.step(taken[0])[0], env.step(taken[0])[0])
+    ends = [(env.step(action)[0], plain.step(action)[0]) for action in taken]
+    assert any(not np.array_equal(pushed, unpushed) for pushed, unpushed in ends)

@@ -171,6 +171,9 @@ LIMIT = Constant("free", 1.0, "-", "a test's", low=0.0, high=2.0)
          lambda: Term("my own", 1.0, "-", "-", plain, keeps=[Kept("a", 0.0, "-", "-")])),
         (r"constant: expected the name of a variable, got 'my own'",
          lambda: Constant("my own", 1.0, "-", "-")),
+        (r"constant: expected the name of a variable, got 'lambda'",
+         lambda: Constant("lambda", 1.0, "-", "-")),
+        (r"kept: expected the name of a variable, got 'class'", lambda: Kept("class", 0.0, "-", "-")),
         (r"constant 'free': expected .*2.*, got 3", lambda: Constant("free", 3.0, "-", "-", high=2.0)),
         (r"constant 'free': expected that of another term or entry",
          lambda: hoof_env.register("my_lab/Other-v0", base=ID, terms=[
@@ -237,3 +240,27 @@ def test_nan_of_an_entry_is_told(example):
     ):
         env.reset(seed=0)
     assert env.step(np.zeros(4, np.float32))[0][-1] == 1.0
+
+
+def beyond(action, scene):
+    return action[0], action[1], 0.0, 0.0
+
+
+def undefined(action, scene):
+    return action[0] / (action[0] - action[0]), 0.0, 0.0, 0.0
+
+
+@pytest.mark.parametrize("scalar", [False, True])
+def test_a_map_that_reads_beyond_its_actions_is_refused(scalar):
+    hoof_env.register(f"my_lab/Beyond{scalar}-v0", action_map=ActionMap("one", {"a": "-"}, beyond, scalar))
+    with pytest.raises(ParameterError, match=r"(?s)cannot compile .*beyond"):
+        gym.make(f"my_lab/Beyond{scalar}-v0")
+
+
+@pytest.mark.parametrize("scalar", [False, True])
+def test_nan_of_a_map_is_told(scalar):
+    hoof_env.register(f"my_lab/NaN{scalar}-v0", action_map=ActionMap("one", {"a": "-"}, undefined, scalar))
+    env = gym.make(f"my_lab/NaN{scalar}-v0")
+    env.reset(seed=0)
+    with pytest.raises(ParameterError, match="action_map 'one': expected numbers, got NaN for action 0"):
+        env.step(np.zeros(1, np.float32))
