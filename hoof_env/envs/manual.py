@@ -11,6 +11,7 @@ import json
 import os
 import re
 from collections.abc import Mapping
+from itertools import groupby
 from pathlib import Path
 from string import Template
 from typing import Any
@@ -52,13 +53,24 @@ COMMON = _NAMES["leg"]
 NEAREST = {_NAMES["rough"]: (_NAMES["horse"], _NAMES["terrain"])}
 """Pages that refer to other pages first, by their names."""
 
+HORSES = (_NAMES["horse"], _NAMES["rough"])
+"""Pages that share `horses.md`, of which the first has its sections."""
+
 SCORED = {
-    "policy": "the shipped agent",
-    "open-loop": "the best gait without feedback",
-    "run": "the scripted run",
-    "reference": "the reference gait",
+    "random": "random actions",
+    "run": "scripted run",
+    "reference": "reference gait",
+    "open-loop": "best gait without feedback",
+    "stock": "stock PPO",
+    "policy": "shipped agent",
 }
-"""Policies whose returns a page shows."""
+"""Policies whose returns a page shows, from what is bad to what is good."""
+
+RETURNS = "returns.json"
+"""File of returns in a folder of policies, as agents.gallery writes it."""
+
+STILL = "still.webp"
+"""File of a policy's picture, as agents.gallery writes it."""
 
 
 def page(task: str, film: str = "", score: str = "") -> str:
@@ -130,8 +142,8 @@ def _hills() -> dict[str, str]:
 
 def _rewards(task: Task, weights: Mapping[str, float]) -> str:
     """Write the table of the reward's terms."""
-    rows = [(f"`{t.key}`", f"`{t.name}`", f"{weights[t.name]:g}", t.unit, t.meaning) for t in task.terms]
-    return markdown_table(("Term", "Weight", "Default", "Unit", "Meaning"), rows)
+    rows = [(f"`{t.name}`", f"{weights[t.name]:g}", t.unit, t.meaning) for t in task.terms]
+    return markdown_table(("Term", "Weight", "Unit", "Meaning"), rows)
 
 
 def _actions(task: Task, body: Body) -> tuple[str, ...]:
@@ -171,37 +183,37 @@ def page_of(id: str) -> str:
     return Markdown(page(ids[check_choice("id", id, ids)]))
 
 
-def index(scores: Mapping[str, Mapping[str, float]] | None = None) -> str:
+def index(
+    scores: Mapping[str, Mapping[str, float]] | None = None, stills: Mapping[str, str] | None = None
+) -> str:
     """Write the page that says which id is for what, in Markdown.
 
     Args:
         scores: mean returns of policies by name of the page, with the names of `SCORED`; None for no returns.
+        stills: paths of pictures by name of the page, relative to the index; None for no pictures.
     """
     rows = []
     for task, name in _NAMES.items():
         definition = TASKS.get(task, TASKS["leg"])
         summary = definition.summary if task in TASKS else str(HorseLegMOEnv.__doc__).splitlines()[0]
-        link = f"[`hoof_env/{name}-v0`]({name}.md)"
+        link = f"[`{name}-v0`]({name}.md)"
+        if stills:
+            link = f"[![{name} at work]({stills[name]})]({name}.md)<br>{link}"
+        use = f"{summary} For {TABLES['uses'][task]}."
         actions = _actions(definition, definition.body(definition.settings({})))
-        sizes = f"{len(actions)}, {len(_observed(definition))}"
         found = (scores or {}).get(name, {})
-        returns = ", ".join(f"{found[policy]:.3g}" for policy in reversed(SCORED) if policy in found)
-        rows.append((link, summary, TABLES["uses"].get(task, ""), sizes, returns))
-    head = (
-        "id",
-        "what it is",
-        "use it for",
-        "actions, observations",
-        "returns: scripted, open loop, shipped",
-    )
-    return Template(WORDS["index"]).substitute(table=markdown_table(head, rows))
+        gaits = [key for key in SCORED if key in found]
+        returns = "<br>".join(f"{SCORED[key]} {found[key]:.3g}" for key in gaits)
+        rows.append((link, use, f"{len(actions)}, {len(_observed(definition))}", returns))
+    head = ("id", "what it asks, and what it is for", "actions, observations", "returns")
+    return Template(WORDS["index"].lstrip()).substitute(table=markdown_table(head, rows))
 
 
 def write_pages(out: Path, films: Path | None = None) -> list[Path]:
     """Write all pages and the index into a folder, which is made if it does not exist; return the files.
 
-    Sections that hold for all ids are in common.md. What else a page shares with the page of `HorseLeg` is
-    there alone (`without_common`).
+    Sections that hold for all ids are in common.md, and what differs for horses is in horses.md.
+    What else a page shares with the page of `HorseLeg` is there alone (`without_common`).
 
     Args:
         out: folder of the pages.
@@ -214,29 +226,19 @@ def write_pages(out: Path, films: Path | None = None) -> list[Path]:
     """
     whole = {}
     returns = {}
+    stills = {}
     for task, name in _NAMES.items():
         if films is None:
             whole[name] = page(task)
             continue
         policy = _find_policy(films, name)
-        returns[name] = _returns(policy)
+        returns[name] = _returns(policy, films, name)
         film = Path(os.path.relpath(policy / "film.gif", out)).as_posix()
+        if (policy / STILL).is_file():
+            stills[name] = Path(os.path.relpath(policy / STILL, out)).as_posix()
         whole[name] = page(task, film, _score(returns[name]))
-    usual = whole[COMMON]
-    texts = {"common.md": WORDS["common"].lstrip() + shared_sections(usual)}
-    for name, text in whole.items():
-        # With the page's own id in the examples, so that these count as equal.
-        others = {COMMON: own_sections(usual), "common": shared_sections(usual)}
-        others = {key: other.replace(f"/{COMMON}-v0", f"/{name}-v0") for key, other in others.items()}
-        if name == COMMON:
-            del others[COMMON]
-        near = {
-            key: sections_left(whole[key], texts[f"{key}.md"]).replace(f"/{key}-v0", f"/{name}-v0")
-            for key in NEAREST.get(name, ())
-        }
-        others = {**near, **others}
-        texts[f"{name}.md"] = without_common(text, others)
-    texts["README.md"] = index(returns)
+    texts = _shortened(whole)
+    texts["README.md"] = index(returns, stills if len(stills) == len(whole) else None)
     try:
         out.mkdir(parents=True, exist_ok=True)
         for name, text in texts.items():
@@ -244,6 +246,33 @@ def write_pages(out: Path, films: Path | None = None) -> list[Path]:
     except OSError as error:
         raise OutputError(f"cannot write to {out}: {error.strerror or error}") from None
     return [out / name for name in texts]
+
+
+def _shortened(whole: Mapping[str, str]) -> dict[str, str]:
+    """Return the files of all pages by name: what they share, and what is left of each."""
+    usual, horse = shared_sections(whole[COMMON]), shared_sections(whole[HORSES[0]])
+    of_horse = without_common(horse, {"common": _with_id(usual, COMMON, HORSES[0])})
+    texts = {
+        "common.md": WORDS["common"].lstrip() + usual,
+        "horses.md": WORDS["horses"].lstrip() + of_horse,
+    }
+    for name, text in whole.items():
+        # With the page's own id in the examples, so that these count as equal
+        others = {}
+        if name in HORSES:
+            others["horses"] = _with_id(sections_left(horse, of_horse), HORSES[0], name)
+        for key in NEAREST.get(name, ()):
+            others[key] = _with_id(sections_left(whole[key], texts[f"{key}.md"]), key, name)
+        if name != COMMON:
+            others[COMMON] = _with_id(own_sections(whole[COMMON]), COMMON, name)
+        others["common"] = _with_id(usual, COMMON, name)
+        texts[f"{name}.md"] = without_common(text, others)
+    return texts
+
+
+def _with_id(text: str, name: str, other: str) -> str:
+    """Return a text with the id of another page in its examples."""
+    return text.replace(f"/{name}-v0", f"/{other}-v0")
 
 
 # Parts of a page
@@ -278,24 +307,32 @@ def _find_policy(films: Path, name: str) -> Path:
     raise DataFileError(f"films {films}: expected {name}-v0/film.gif, as agents.ship writes it, found none")
 
 
-def _returns(policy: Path) -> dict[str, float]:
-    """Read the mean returns of a policy that ships and of gaits in the same episodes.
+def _returns(policy: Path, films: Path, name: str) -> dict[str, float]:
+    """Read the mean returns of a policy that ships and of others in the same episodes.
 
     Raises:
-        DataFileError: the policy has no scores.
+        DataFileError: the policy has no scores, or the file of returns cannot be read.
     """
     path = policy / "score.json"
     try:
         policies = json.loads(path.read_text(encoding="utf-8"))["policies"]
-        return {name: policies[name]["mean"]["return"] for name in SCORED if name in policies}
+        found = {key: policies[key]["mean"]["return"] for key in SCORED if key in policies}
+        path = films / RETURNS
+        others = json.loads(path.read_text(encoding="utf-8")) if path.is_file() else {}
+        return found | others.get(f"hoof_env/{name}-v0", {})
     except (OSError, ValueError, KeyError, TypeError) as error:
         raise DataFileError(f"scores {path}: expected those that agents.ship writes: {error!r}") from None
 
 
 def _score(returns: Mapping[str, float]) -> str:
-    """Write the sentence that says which returns are good."""
-    shown = ", ".join(f"{SCORED[name]} {value:.3g}" for name, value in returns.items())
-    return Template(WORDS["score"].strip()).substitute(returns=shown)
+    """Write the table that says which returns are good."""
+    titles = dict(SCORED)
+    if "stock_steps" in returns:
+        titles["stock"] = f"[stock PPO](../evidence/stock/README.md), {returns['stock_steps']:,.0f} steps"
+    shown = [key for key in SCORED if key in returns]
+    table = markdown_table([titles[key] for key in shown], [[f"{returns[key]:.3g}" for key in shown]])
+    stock = "" if "stock" in returns else WORDS["no_stock"]
+    return Template(WORDS["score"].strip()).substitute(returns=table, stock=stock)
 
 
 def _film(name: str, kind: str, film: str) -> str:
@@ -326,13 +363,18 @@ def _objectives(weights: Mapping[str, float]) -> str:
 
 
 def _observations(task: Task, body: Body) -> str:
-    """Write the table of the observation; numbers that each leg has share a row."""
+    """Write the table of the observation; neighbours with the same scaling, unit and group share a row, and
+    so do the numbers of all legs."""
     parts = page_of_body(body)
-    numbers: dict[tuple[str, ...], list[str]] = {}
+    numbers: dict[tuple[str, ...], list[int]] = {}
     for k, entry in enumerate(_observed(task)):
         cells = (parts.name_of_any_leg(entry.name), parts.scaling(entry.scale, body), entry.unit, entry.group)
-        numbers.setdefault(cells, []).append(str(k))
-    rows = [(", ".join(places), *cells) for cells, places in numbers.items()]
+        numbers.setdefault(cells, []).append(k)
+    rows = []
+    for rest, alike in groupby(numbers, key=lambda cells: cells[1:]):
+        names = list(alike)
+        places = [parts.places(numbers[cells]) for cells in names]
+        rows.append((", ".join(places), ", ".join(cells[0] for cells in names), *rest))
     return markdown_table(("Num", "Observation", "Scaling", "Unit before scaling", "Group"), rows)
 
 

@@ -55,6 +55,13 @@ class BodyPage(ABC):
         """Return the name of an observation without that of its leg."""
         return name
 
+    def places(self, numbers: list[int]) -> str:
+        """Write the numbers of an observation; of one for each leg i as a formula, as in "50+4i"."""
+        if len(numbers) < COUNT:
+            return ", ".join(map(str, numbers))
+        step = numbers[1] - numbers[0]
+        return f"{numbers[0]}+{step if step > 1 else ''}i"
+
     def settings(self, s: Settings, defaults: Mapping[str, str]) -> list[tuple[str, ...]]:
         """Return the rows of the settings that the body takes, with those defaults."""
         return rows_of("settings", defaults)
@@ -97,8 +104,9 @@ class LegPage(BodyPage):
     option_ranges = leg_starts.OPTIONS
     words = MappingProxyType(
         {
-            "still": " " + WORDS["leg_still"].strip(),
-            "target_reward": WORDS["target_reward"],
+            "still": WORDS["leg_still"].strip(),
+            "reasons": WORDS["leg_reasons"].strip(),
+            "size": "",
             "share": "",
             "of_legs": "leg's",
             "prefixes": "",
@@ -136,7 +144,8 @@ class HorsePage(BodyPage):
     words = MappingProxyType(
         {
             "still": "",
-            "target_reward": "",
+            "reasons": WORDS["horse_reasons"].strip(),
+            "size": WORDS["horse_size"].strip(),
             "share": "a fourth of ",
             "of_legs": "legs'",
             "prefixes": WORDS["prefixes"],
@@ -152,7 +161,7 @@ class HorsePage(BodyPage):
             # The first action of a leg scales the crank's speed, see `horse_gaits.command_gait`.
             operation, unit = ("times 1 + action", "-") if k == 0 else ("plus", "rad")
             fastest = f"{bounds[k]:g} {GAIT[len(LIMITS) + k].unit}"
-            numbers = ", ".join(str(ACTED * leg + k) for leg in range(COUNT))
+            numbers = self.places([ACTED * leg + k for leg in range(COUNT)])
             rows.append((numbers, GAIT[k].name, operation, f"{-span:g}", f"{span:g}", unit, fastest))
         head = ("Num", "Offset of the reference's", "Is", "At -1", "At +1", "Unit", "Fastest change")
         return markdown_table(head, rows)

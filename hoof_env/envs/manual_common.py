@@ -9,10 +9,20 @@ from typing import NamedTuple
 
 from hoof_env._output import markdown_table
 
-SHARED = ("Episode Summary", "Infos", "What is Measured", "Vector Environment", "State", "Arguments")
+SHARED = (
+    "Reset Options",
+    "Episode Summary",
+    "Infos",
+    "What is Measured",
+    "Vector Environment",
+    "State",
+    "Arguments",
+    "Limits of Commands",
+    "Size",
+)
 """Sections that hold for all ids; they have a page of their own."""
 
-REST = "The Rest"
+REST = "Shared Sections"
 """Heading of the section that says where the sections are that a short page lacks."""
 
 ROWS = "Rows that differ:"
@@ -79,8 +89,8 @@ def without_common(page: str, others: Mapping[str, str]) -> str:
             equal.setdefault(name, []).append(f"[{title.strip('# ')}]({name}.md#{_anchor(title)})")
     if equal:
         sentences = [f"As in {name}: {', '.join(links)}." for name, links in equal.items()]
-        sections.append(f"## {REST}\n\n" + "\n\n".join(sentences) + "\n\n")
-    return "".join(sections).rstrip() + "\n"
+        sections.append(f"\n\n## {REST}\n\n" + "\n\n".join(sentences))
+    return re.sub(r"\n{3,}", "\n\n", "".join(sections)).strip() + "\n"
 
 
 def _counterpart(title: str, others: Mapping[str, str]) -> tuple[str, str | None]:
@@ -99,7 +109,7 @@ def _anchor(title: str) -> str:
 
 def _sections(page: str) -> list[str]:
     """Divide a page before each heading of the second or third level."""
-    return re.split(r"(?m)^(?=###? )", page)
+    return [section for section in re.split(r"(?m)^(?=###? )", page) if section]
 
 
 def _title(section: str) -> str:
@@ -151,9 +161,13 @@ def _column_of_names(head: Sequence[str]) -> int:
 
 
 def _is_in_order(own: Table, other: Table) -> bool:
-    """True if tables share at least half of their rows, which come first and in the same order."""
+    """True if tables share at least half of their rows, in the same order; where rows are numbered, these
+    come first."""
     both = [name for name in other.rows if name in own.rows]
-    return 2 * len(both) >= len(own.rows) and list(own.rows)[: len(both)] == both
+    names = list(own.rows)
+    if own.head[0] == "Num":
+        names = names[: len(both)]
+    return 2 * len(both) >= len(own.rows) and [name for name in names if name in both] == both
 
 
 def _difference(own: Table, other: Table) -> str:

@@ -62,8 +62,8 @@ class BodySettings:
             "",
             "gait of the preset that episodes start in; None for one between walk and run",
             of_horse=(
-                "gait from which actions make offsets whatever speed is commanded: $horse_gaits; None for "
-                "the reference gait of the commanded speed"
+                "gait from which actions are offsets at any commanded speed: $horse_gaits; None for the "
+                "reference gait of that speed"
             ),
         ),
     ] = None
@@ -82,8 +82,8 @@ class BodySettings:
         float,
         About(
             "kg",
-            "of the trunk that goes with this leg",
-            of_horse="of the trunk without the limbs; at `size` 1",
+            "of the trunk on this leg",
+            of_horse="of the trunk without the limbs",
             per_episode=True,
             span=(10.0, 200.0),
         ),
@@ -149,7 +149,6 @@ class BodySettings:
         About(
             "m/s",
             "smallest approach speed in the damping term",
-            of_horse="smallest approach speed in the damping term; at `size` 1",
             per_episode=True,
         ),
     ] = 0.1
@@ -157,8 +156,7 @@ class BodySettings:
         str,
         About(
             "",
-            "$friction_laws",
-            of_horse="$friction_laws; of a rigid hoof",
+            "$friction_laws; of a rigid hoof",
         ),
     ] = "ambrosio"
     friction: Annotated[float, About("-", "mu_k", per_episode=True, span=(0.0, 1.2))] = 0.4
@@ -166,8 +164,7 @@ class BodySettings:
         float,
         About(
             "m/s",
-            "lower threshold of the friction law",
-            of_horse="lower threshold of the friction law; of a rigid hoof, at `size` 1",
+            "lower threshold of the friction law, of a rigid hoof",
             per_episode=True,
             needs=("friction_law", ("ambrosio",)),
         ),
@@ -176,8 +173,7 @@ class BodySettings:
         float,
         About(
             "m/s",
-            "upper threshold of the friction law",
-            of_horse="upper threshold of the friction law; of a rigid hoof, at `size` 1",
+            "upper threshold of the friction law, of a rigid hoof",
             per_episode=True,
         ),
     ] = 5e-2
@@ -186,12 +182,8 @@ class BodySettings:
         About(
             "N/m",
             (
-                "of a spring at each hoof point, along the ground's normal and tangent; with one friction is "
+                "of a spring at each hoof point, along the ground's normal and tangent, which makes friction "
                 "Coulomb's, without thresholds; None for a rigid hoof"
-            ),
-            of_horse=(
-                "of a spring at each hoof point, along the ground's normal and tangent, at `size` 1; with "
-                "one friction is Coulomb's, without thresholds; None for a rigid hoof"
             ),
         ),
     ] = None
@@ -201,8 +193,8 @@ class BodySettings:
             "N s/m",
             "of its damper; None for a tenth of the critical one under the trunk; needs `hoof_stiffness`",
             of_horse=(
-                "of its damper, at `size` 1; None for a tenth of the critical one under a fourth of "
-                "$horse_mass kg; needs `hoof_stiffness`"
+                "of its damper; None for a tenth of the critical one under a fourth of $horse_mass kg; "
+                "needs `hoof_stiffness`"
             ),
         ),
     ] = None
@@ -212,8 +204,8 @@ class BodySettings:
             "",
             (
                 'None for level ground, {"kind": "slope", "angle": rad}, {"kind": "hills", ...} as in '
-                "[HorseLegTerrain](HorseLegTerrain.md#terrain), or what `Terrain.to_dict` gives; ground that "
-                "drifts from y = 0 is refused under a suspended trunk and a rail, which keep their height"
+                "[HorseLegTerrain](HorseLegTerrain.md#terrain), or what `Terrain.to_dict` returns; a "
+                "suspended trunk and a rail keep their height, so ground that drifts from y = 0 is refused"
             ),
         ),
     ] = None

@@ -180,38 +180,38 @@ def fall(step, weight):  # type: ignore[no-untyped-def]
 
 
 HORSE_TERMS = (
-    Term("alive", 45.0, "1/s", "for every second", alive),
+    Term("alive", 45.0, "1/s", "per second", alive),
     Term(
         "tracking",
         16.0,
         "1/s",
-        "for every second, 1 less twice the speed's relative error, at least -1",
+        "per second, 1 less twice the relative error of the speed, at least -1",
         tracking,
     ),
     Term(
         "peak",
         0.25,
         "-",
-        "minus the increase of the legs' running peak GRF over the weight; each is the highest force of all"
-        " substeps but at most twice the present one, so that it adds up to every stance's peak",
+        "minus the increase of each leg's running peak GRF over the weight: the highest so far, at most twice"
+        " the present one",
         peak,
     ),
     Term(
         "slip",
         35.0,
         "1/s",
-        "minus the way that all hooves slide in stance, to and fro, over the commanded distance; 1 at most",
+        "minus the distance that all hooves slide in stance over the commanded distance; 1 at most",
         slip,
     ),
-    Term("landing", 0.25, "-", "minus the stances that begin: who taps the ground pays twice", landing),
+    Term("landing", 0.25, "-", "minus the number of stances that begin", landing),
     Term(
         "work",
         0.4,
         "1/s",
-        "minus the positive work of all drives over the weight times the commanded distance",
+        "minus the positive work of all drives over weight and commanded distance",
         work,
     ),
     Term("pitch", 3.0, "1/(s rad^2)", "minus the square of the trunk's pitch", pitch),
-    Term("fall", 15.0, "-", "once, minus this, when the episode fails", fall),
+    Term("fall", 15.0, "-", "once, when the episode fails", fall),
 )
 """Terms of the reward of `Horse-v0`, in the order in which they are added."""

@@ -168,15 +168,14 @@ RACING: Mapping[str, Any] = MappingProxyType(
 """Settings of a task that rewards every metre at any speed, and no bearing of weight."""
 
 _SUSPENDED = (
-    "The trunk moves along x and y. The leg must bear `trunk_share` of the weight of trunk and leg; a"
-    " constant force carries the rest, a vertical spring and damper stands for the animal's other legs."
+    "The trunk moves along x and y. The leg must bear `trunk_share` of the weight of trunk and leg. A"
+    " constant force carries the rest, and a vertical spring and damper stand for the animal's other legs."
 )
 
 _FOUR_LEGS = (
-    "Four legs carry a trunk that moves along x and y and pitches, in the plane. Every 3 to 5 s a new"
-    " speed is commanded, between Froude numbers 0.1 and 1 (v^2 over g times the height of the"
-    " hips) and at most 0.5 m/s from the last, and with it the gait"
-    " from which actions make offsets: its reference gait."
+    "Every 3 to 5 s a new speed is commanded, between Froude numbers 0.1 and 1 (v^2 over g times the height"
+    " of the hips) and at most 0.5 m/s from the last. With the speed comes its reference gait, from which"
+    " actions are offsets."
 )
 
 _HORSE: Mapping[str, Any] = MappingProxyType(
@@ -204,15 +203,15 @@ TASKS: Mapping[str, Task] = MappingProxyType(
         "rail": Task(
             "HorseLegRail",
             "A horse's leg that pulls its trunk along a rail.",
-            "The trunk slides along x at fixed height: nothing has to be carried, only moved.",
+            "The trunk slides along x at a fixed height: the leg need not carry it, only move it.",
             {"trunk": "rail", **RACING},
         ),
         "speed": Task(
             "HorseLegSpeed",
             "A horse's leg that keeps a commanded speed, which changes.",
             _SUSPENDED
-            + " Every 3 to 5 s a new speed is commanded. Progress is paid up to it, what goes beyond costs as"
-            " much, and both weigh more than elsewhere, for here the speed is asked for.",
+            + " Every 3 to 5 s a new speed is commanded. Travel beyond it is penalised as strongly as travel"
+            " up to it is rewarded, and both weigh more than on the other ids.",
             {
                 "target_speed": (1.0, 3.5),
                 "target_seconds": (3.0, 5.0),
@@ -225,8 +224,8 @@ TASKS: Mapping[str, Task] = MappingProxyType(
             "A horse's leg on slopes and on patches of stiff, soft and slippery ground.",
             _SUSPENDED
             + " The ground rises and falls, and is harder, softer or more slippery in places; an episode"
-            " begins anywhere on it. The heights ahead are observed, its material is not: a hoof"
-            " cannot know a hard patch before it lands, so that loading costs less here than elsewhere.",
+            " begins anywhere on it. The heights ahead are observed, but not the material: a policy cannot"
+            " know a hard patch before the hoof lands, so loading costs less here than elsewhere.",
             {
                 "terrain": {"kind": "hills", "seed": 0, "rise": 0.05, "stiffness": [0.25, 2.0]},
                 "observation": ("crank", "gait", "trunk", "hoof", "ground"),
@@ -236,9 +235,9 @@ TASKS: Mapping[str, Task] = MappingProxyType(
         "fixed": Task(
             "HorseLegFixed",
             "The paper's set-up: one gait on a fixed trunk, one crank revolution.",
-            "The trunk stays where it is. Episodes start in the paper's walk, or in its run (`gait`),"
-            " and the zero action keeps that gait, which reproduces the paper: `hoof-env reproduce` runs this"
-            ' environment. `solver="exact"` follows the closed form at 0.1 ms, `solver="paper"` integrates'
+            'The trunk stays where it is. Episodes start in the paper\'s walk, or in its run (`gait="run"`),'
+            " and a zero action keeps that gait: this is how `hoof-env reproduce` reproduces the paper."
+            ' `solver="exact"` follows the closed form at 0.1 ms; `solver="paper"` integrates'
             " Eq. 8 (42 coordinates, 42 multipliers, Baumgarte) with explicit Euler at 1 ms and samples the"
             " approach speed at the first step inside the ground. Restitution 1 is the paper's elastic"
             " condition, 0 its inelastic one.",
@@ -271,11 +270,11 @@ TASKS: Mapping[str, Task] = MappingProxyType(
             "HorseRough",
             "A horse on four legs that stays on its feet: slopes, bumps and pushes.",
             _FOUR_LEGS
-            + "\n\nThe ground has slopes of up to 10 % and bumps of up to 5 cm, and every 2 to 4 s the trunk"
-            " is pushed forward or back, by up to 1.5 m/s times the horse's mass. The ground ahead and the"
-            " pushes are not observed. The reference gait falls in a fifth of the episodes, and so does the"
-            " policy that ships: it is that of `Horse-v0`, and none was trained here yet. The arguments"
-            " `terrain`, `push_impulse` and `strength` replace all this, which does not change with `size`.",
+            + "\n\nThe ground has slopes of up to 10 % and bumps of up to 5 cm. Every 2 to 4 s the trunk is"
+            " pushed forward or back, by up to 1.5 m/s times the horse's mass. Neither the ground ahead nor"
+            " the pushes are observed. The reference gait falls in a fifth of the episodes, and so does the"
+            " shipped policy, which was trained on `Horse-v0`: none has been trained here yet. The arguments"
+            " `terrain`, `push_impulse` and `strength` change these disturbances, and `size` does not.",
             {**_HORSE, **rough_ground(1.0, MASS)},
             reference="reference",
             terms=HORSE_TERMS,

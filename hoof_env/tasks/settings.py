@@ -56,7 +56,6 @@ class TaskSettings(BodySettings):
         About(
             "N m s/rad",
             "torque of the motor per difference of crank speed",
-            of_horse="torque of the motor per difference of crank speed; at `size` 1",
             per_episode=True,
             needs=("drive", ("motor",)),
             span=(10.0, 500.0),
@@ -67,7 +66,6 @@ class TaskSettings(BodySettings):
         About(
             "N m",
             "largest torque of the motor, at the crank",
-            of_horse="largest torque of the motor, at the crank; at `size` 1",
             per_episode=True,
             needs=("drive", ("motor",)),
             span=(50.0, 2000.0),
@@ -78,7 +76,6 @@ class TaskSettings(BodySettings):
         About(
             "kg m^2",
             "of its rotor, at the crank",
-            of_horse="of its rotor, at the crank; at `size` 1",
             needs=("drive", ("motor",)),
             span=(0.05, 5.0),
         ),
@@ -123,10 +120,9 @@ class TaskSettings(BodySettings):
         About(
             "s",
             (
-                "substep; it is divided where ground, suspension or motor need shorter ones; None for the "
-                "solver's own, 1e-4 or the paper's 1e-3"
+                "substep, divided where ground, suspension or motor need shorter ones; None for the solver's "
+                "own, 1e-4 or the paper's 1e-3"
             ),
-            of_horse="substep; it is divided where ground or motor need shorter ones; None for 1e-4",
         ),
     ] = 1e-3
     dt: Annotated[float, About("s", "control step, a whole multiple of `sim_dt`")] = 0.02
@@ -137,12 +133,12 @@ class TaskSettings(BodySettings):
         About(
             "m/s",
             (
-                "lowest and highest commanded speed, up to which progress is paid; one that never changes "
+                "lowest and highest commanded speed, up to which progress is rewarded; it never changes "
                 "where both are the same; None for no command"
             ),
             of_horse=(
-                "lowest and highest commanded speed; one that never changes where both are the same; None "
-                "for the default times the root of `size`"
+                "lowest and highest commanded speed; it never changes where both are the same; None for the "
+                "default times the root of `size`"
             ),
             span=(0.5, 5.0),
         ),
@@ -161,11 +157,8 @@ class TaskSettings(BodySettings):
         About(
             "-",
             (
-                "of a horse over one of 475 kg, by geometric similarity: lengths go with it, masses with its "
-                "cube, hoof stiffness with its square; None for 1"
-            ),
-            of_horse=(
-                "length over that of a horse of $horse_mass kg, $smallest_size to $largest_size; None for 1"
+                "of a horse: length over that of one of $horse_mass kg, $smallest_size to $largest_size; "
+                "None for 1"
             ),
             needs=("trunk", ("free",)),
         ),
@@ -175,7 +168,6 @@ class TaskSettings(BodySettings):
         About(
             "-",
             "of a horse's swing, 1 or 2; None for 2",
-            of_horse="of the swing, 1 or 2; None for 2",
             needs=("trunk", ("free",)),
         ),
     ] = None
@@ -184,12 +176,8 @@ class TaskSettings(BodySettings):
         About(
             "",
             (
-                'of a horse\'s commands: "quick", with which its cranks follow a stance, or "slow", as of '
+                'of a horse\'s commands: "quick", with which its cranks follow a stance, or "slow", those of '
                 "one leg; None for quick"
-            ),
-            of_horse=(
-                'of the commands: "quick", with which cranks follow a stance, or "slow", as of one leg; '
-                "None for quick"
             ),
             needs=("trunk", ("free",)),
         ),
@@ -202,7 +190,7 @@ class TaskSettings(BodySettings):
         "hoof",
     )
     reward_weights: Annotated[
-        Mapping[str, float] | None, About("", "mapping of the weights that are to differ from those above")
+        Mapping[str, float] | None, About("", "mapping of weights that differ from the defaults")
     ] = None
     constants: Annotated[
         Mapping[str, float] | None,
@@ -210,9 +198,7 @@ class TaskSettings(BodySettings):
     ] = None
     randomize: Annotated[
         Mapping[str, Range] | None,
-        About(
-            "", "physical parameters to draw at each reset, as the reset option `parameters`; None for none"
-        ),
+        About("", "physical parameters to draw at each reset, in the form of the reset option `parameters`"),
     ] = None
 
 
@@ -229,7 +215,7 @@ class Settings(TaskSettings):
         Mapping[str, Sequence[Any]] | None,
         About(
             "control steps",
-            "[first, last, steps between] by setting, see [curricula](../own_task.md#curricula)",
+            "[first, last, steps between] by setting ([curricula](../own_task.md#curricula))",
         ),
     ] = None
 

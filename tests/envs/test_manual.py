@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import inspect
+import json
 import math
 import re
 import shutil
@@ -53,6 +54,24 @@ def rows(text):
     return [[cell.strip() for cell in line.strip("|").split("|")] for line in table[:stop]]
 
 
+def numbers(cell):
+    """Numbers of a cell of the column Num: one, several, or those of four legs, as in "50+4i"."""
+    found = []
+    for part in cell.split(", "):
+        first, _, step = part.partition("+")
+        found.append([int(first) + i * int(step.strip("i") or 1) for i in range(4)] if step else [int(first)])
+    return found
+
+
+def observed(page):
+    """Cells of a page's observation: those of each number, in their order, without the column Num."""
+    cells = {}
+    for row in rows(section(page, "Observation Space")):
+        for name, places in zip(row[1].split(", "), numbers(row[0]), strict=True):
+            cells |= {place: [name, *row[2:]] for place in places}
+    return [cells[k] for k in sorted(cells)]
+
+
 def test_every_id_has_a_page():
     assert sorted(IDS.values()) == sorted(name for name in gym.registry if name.startswith("hoof_env/"))
 
@@ -62,7 +81,7 @@ def test_committed_pages_are_what_the_command_writes(tmp_path, capsys, monkeypat
     monkeypatch.chdir(tmp_path)
     out = Path("docs/environments")
     assert cli.main(["manual", "--out", str(out), "--films", "agents/policies"]) == 0
-    assert f"{len(manual.PAGES) + 2} files written; read {out / 'README.md'} first" in capsys.readouterr().out
+    assert f"{len(manual.PAGES) + 3} files written; read {out / 'README.md'} first" in capsys.readouterr().out
     written = {file.name: file.read_text("utf-8") for file in out.iterdir()}
     committed = {file.name: file.read_text("utf-8") for file in DOCS.glob("*.md")}
     assert written == committed, "run `hoof-env manual --out docs/environments --films agents/policies`"
@@ -85,10 +104,16 @@ def test_every_page_shows_its_film(page):
 def test_every_page_says_which_returns_are_good(page):
     """Those of the table of the policies that ship."""
     name = "HorseLeg" if page == "mo" else IDS[page].removeprefix("hoof_env/").removesuffix("-v0")
-    told = re.search(r"over the same 100 episodes: (.+?)\. \[", (DOCS / f"{name}.md").read_text("utf-8"))[1]
+    text = (DOCS / f"{name}.md").read_text("utf-8").partition("over the same 100 episodes:")[2]
+    head = next(line for line in text.splitlines() if line.startswith("|")).strip("|").split("|")
+    told = dict(zip(map(str.strip, head), *rows(text)[:1], strict=True))
     table = rows((POLICIES / "README.md").read_text("utf-8").partition("mean returns")[0])
     shipped = next(row for row in table if f"/{name}-v0`" in row[0])[2]
-    assert f"the shipped agent {float(shipped.split()[0]):.3g}" in told
+    assert told["shipped agent"] == f"{float(shipped.split()[0]):.3g}"
+    others = json.loads((POLICIES / "returns.json").read_text("utf-8"))[f"hoof_env/{name}-v0"]
+    assert told["random actions"] == f"{others['random']:.3g}"
+    stock = next((value for title, value in told.items() if "stock PPO" in title), None)
+    assert stock == (f"{others['stock']:.3g}" if "stock" in others else None)
 
 
 def test_a_policy_without_scores_is_named(tmp_path, capsys):
@@ -122,21 +147,18 @@ def test_unknown_pages_and_folders_are_one_line(tmp_path, capsys):
 @pytest.mark.parametrize("page", manual.PAGES)
 def test_tables_match_the_spaces(page):
     text, env = manual.page(page), gym.make(IDS[page])
-    seen = section(text, "Observation Space")
-    if page != "mo":  # whose spaces are the leg's
-        assert f"`Box(-1, 1, {env.action_space.shape}, float32)`" in section(text, "Action Space")
-        assert f"`Box(-1, 1, {env.observation_space.shape}, float32)`" in seen
     for space in (env.action_space, env.observation_space):
         assert space.dtype == np.float32
         assert (space.low == -1).all()
         assert (space.high == 1).all()
-    if page == "mo":
+    if page == "mo":  # whose spaces are the leg's
         return
-    told = {int(number): row[1] for row in rows(seen) for number in row[0].split(", ")}
-    assert sorted(told) == list(range(env.observation_space.shape[0]))
+    assert f"`Box(-1, 1, {env.action_space.shape}, float32)`" in section(text, "Action Space")
+    assert f"`Box(-1, 1, {env.observation_space.shape}, float32)`" in section(text, "Observation Space")
     legs = "|".join(leg.replace("_", " ") for leg in LEGS)
-    for number, name in enumerate(env.unwrapped.observation_names):
-        assert told[number] == re.sub(rf"({legs})[:,] ", "", name)
+    names = [re.sub(rf"({legs})[:,] ", "", name) for name in env.unwrapped.observation_names]
+    assert [cells[0] for cells in observed(text)] == names
+    assert len(names) == env.observation_space.shape[0]
 
 
 @pytest.mark.parametrize("page", OF_LEGS)
@@ -167,7 +189,7 @@ def test_offsets_of_a_horse_are_those_of_the_table():
     text = section(manual.page("horse"), "Action Space")
     table = rows(text)
     env.reset(seed=0, options={"target_speed": 2.0})
-    state, commands, followed = leg.get_state(), {}, float(re.search(r"goes ([\d.]+)\nof the way", text)[1])
+    state, commands, followed = leg.get_state(), {}, float(re.search(r"moves ([\d.]+) of the way", text)[1])
     for action in (0.0, -1.0, 1.0):
         leg.set_state(state)
         info = env.step(np.full(16, action, np.float32))[4]
@@ -187,7 +209,7 @@ def test_observations_are_scaled_as_the_table_says(page):
     leg = env.unwrapped
     env.reset(seed=5, options={"speed": 1.0} if leg.settings.trunk != "fixed" else {})
     leg.record()
-    table = {row[1]: row[2] for row in rows(section(manual.page(page), "Observation Space"))}
+    table = {cells[0]: cells[1] for cells in observed(manual.page(page))}
     checked, landed, allowance = set(), False, BEARING * LONGEST_STRIDE
     for _ in range(60):
         observation, *_, info = env.step(leg.action_for(load_gait("run", leg.settings.preset)))
@@ -286,17 +308,17 @@ def test_the_page_of_the_horse_has_the_numbers_of_the_code(monkeypatch):
     start, end = section(page, "Starting State"), section(page, "Episode End")
     assert "within 0.0123 strides of it, pitch within 0.0234 rad" in start
     assert "34.5 % up or down" in start
-    assert "more than 0.456 rad, leaves 0.567 to 1.678 m over" in end
+    assert "more than 0.456 rad or leaves 0.567 to 1.678 m over" in end
     assert "than 7.89 cm" in end
     assert "under a fourth of 489 kg" in section(page, "Arguments")
 
 
 def test_the_page_of_the_horse_says_where_commands_are_clipped():
-    actions = section(manual.page("horse"), "Action Space").replace("\n", " ")
-    assert f"the crank's speed to 0 to {FASTEST:g} rad/s at `size` 1" in actions
+    limits = manual.page("horse").partition("### Limits of Commands")[2].replace("\n", " ")
+    assert f"the crank's speed to 0 to {FASTEST:g} rad/s at `size` 1" in limits
     for name in ("swing_offset", "swing_sin", "higher"):
         low, high = WIDEST[name]
-        assert f"{low:g} to {high:g} rad" in actions
+        assert f"{low:g} to {high:g} rad" in limits
     assert WIDEST["swing_sin"] == WIDEST["swing_cos"]  # the page says one range of both
 
 
@@ -323,14 +345,15 @@ def test_rewards_options_and_figures_are_those_of_the_environment(page):
     _, started = env.reset(seed=0, options={"parameters": {"friction": 0.3}})
     info = env.step(np.zeros(env.action_space.shape, np.float32))[4]
     table = rows(section(text, "Rewards"))
-    assert [row[0].strip("`") for row in table] == [name for name in info if name.startswith("reward_")]
-    assert [float(row[2]) for row in table] == [weights[row[1].strip("`")] for row in table]
+    terms = [row[0].strip("`") for row in table]
+    assert [f"reward_{name}" for name in terms] == [name for name in info if name.startswith("reward_")]
+    assert [float(row[1]) for row in table] == [weights[name] for name in terms]
     figures = [row[0].strip("`") for row in rows(section(text, "Episode Summary"))]
     assert figures == list(info["episode_summary"])
-    told = {row[0].strip("`") for row in [*table, *rows(section(text, "Infos"))]}
+    told = {f"reward_{name}" for name in terms} | {row[0].strip("`") for row in rows(section(text, "Infos"))}
     assert set(started) == told
     assert set(info) == told - {"parameters"} | {"episode_summary", "end", "is_success"}
-    start = section(text, "Starting State")
+    start = section(text, "Reset Options")
     assert {row[0].strip("`") for row in rows(start)} == {*options, "gait", "parameters", "pushes"}
     suspended = {"trunk_share", "trunk_stiffness", "trunk_damping", "trunk_drag"}
     refused = suspended | {"friction_slow", "friction_fast"} if page in HORSES else set()

@@ -7,7 +7,7 @@ import gymnasium as gym
 import pytest
 
 from hoof_env.envs import manual
-from hoof_env.envs.manual_common import REST, ROWS, without_common
+from hoof_env.envs.manual_common import REST, ROWS, shared_sections, without_common
 from hoof_env.tasks.one_leg import OneLeg
 from hoof_env.tasks.plain import to_json
 from hoof_env.tasks.registry import TASKS
@@ -37,9 +37,13 @@ def others(name):
     """The pages to which a page refers, with its id in their examples."""
     tasks = {task.name: key for key, task in TASKS.items()}
     near = {other: manual.page(tasks[other]) for other in manual.NEAREST.get(name, ())}
+    if name in manual.HORSES:
+        near["horses"] = manual.page("horse")
     pages = near | {other: read(other) for other in ("HorseLeg", "common") if other != name}
-    return {other: page.replace(f"/{other}-v0", f"/{name}-v0") for other, page in pages.items()} | {
-        "common": read("common").replace("/HorseLeg-v0", f"/{name}-v0")
+    written = {"common": "HorseLeg", "horses": "Horse"}  # the ids in the examples of shared pages
+    return {
+        other: page.replace(f"/{written.get(other, other)}-v0", f"/{name}-v0")
+        for other, page in pages.items()
     }
 
 
@@ -50,8 +54,22 @@ def anchor(heading):
 @pytest.mark.parametrize("task", TASKS)
 def test_what_a_page_lacks_stands_in_the_section_that_it_refers_to(task):
     name = TASKS[task].name
-    whole, short = lines_by_heading(manual.page(task)), lines_by_heading(read(name))
     elsewhere = {other: lines_by_heading(page) for other, page in others(name).items()}
+    check_nothing_is_lost(lines_by_heading(manual.page(task)), lines_by_heading(read(name)), elsewhere)
+
+
+def test_what_horses_share_lacks_nothing():
+    page = shared_sections(manual.page("horse"))
+    common = read("common").replace("/HorseLeg-v0", "/Horse-v0")
+    check_nothing_is_lost(
+        {"# What Both Horses Share": [], **lines_by_heading(page)},
+        lines_by_heading(read("horses")),
+        {"common": lines_by_heading(common)},
+    )
+
+
+def check_nothing_is_lost(whole, short, elsewhere):
+    """Raise unless a short page, with the sections that it refers to, has all lines of the whole one."""
     rest = "".join(short.pop(f"## {REST}", []))
     for heading, lines in whole.items():
         own = short.pop(heading, None)
@@ -129,7 +147,7 @@ def test_equal_sections_paragraphs_and_rows_go():
     assert page == (
         "# Own\n\nfilm\n\n## B\n\nAs in [Other](Other.md#b), except:\n\nRows that differ:\n\n"
         + TABLE
-        + "| y | 2 |\n| z | 3 |\n\n## The Rest\n\nAs in Other: [A](Other.md#a).\n"
+        + "| y | 2 |\n| z | 3 |\n\n## Shared Sections\n\nAs in Other: [A](Other.md#a).\n"
     )
 
 

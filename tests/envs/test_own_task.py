@@ -121,12 +121,12 @@ def test_a_spec_makes_it_again(own):
 def test_its_manual_page_has_its_rows(own, capsys):
     page = page_of(own.ID)
     assert page == page_of(own.MODULE_ID)
-    assert "| `reward_friction` | `friction` | 0.5 | 1/kJ | power of friction |" in page
+    assert "| `friction` | 0.5 | 1/kJ | power of friction |" in page
     assert re.search(r"\| \d+ \| load angle \| / pi \| rad \| feel \|", page)
     assert "`own_functions.equation_14`" in page
     assert f'gym.make("{own.ID}"' in page
     assert main(["manual", "--id", own.MODULE_ID]) == 0
-    assert "reward_comfort" in capsys.readouterr().out
+    assert "| `comfort` |" in capsys.readouterr().out
 
 
 NO_FUNCTION = "No implementation of function Function"
