@@ -30,6 +30,18 @@ FOUR_BAR = {
 }
 """Mechanism of three bodies whose coupler goes on beyond its pin, to the only foot."""
 
+FOUR_BAR_LEG = {
+    "lengths": {"OA": 0.2, "BC": 0.6, "AC": 0.7, "CD": 0.5},
+    "pivot": (0.6, 0.1),
+    "assembly": {"C": 1},
+    "toe": "D",
+    "heel": None,
+    "travel": 1,
+    "hip_height": 1.0,
+    "mechanism": FOUR_BAR,
+}
+"""Values of a leg of it."""
+
 MECHANISMS = {"paper": PAPER, "four-bar": read_mechanism(FOUR_BAR)}
 
 

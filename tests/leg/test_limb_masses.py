@@ -7,7 +7,6 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from hoof_env.errors import ParameterError
 from hoof_env.gait import load_gait
 from hoof_env.leg.geometry import load_geometry
 from hoof_env.leg.kinematics import FrameMotion, pose
@@ -72,17 +71,3 @@ def test_it_says_whose_masses_it_has():
     assert leg.provenance.startswith(LEG.provenance)
     assert "hind limb of a horse of 500 kg (Buchner" in leg.provenance
     assert leg.name == LEG.name
-
-
-@pytest.mark.parametrize("limb", ["middle", "Fore", None, 1])
-def test_another_limb_is_refused(limb):
-    for ask in (lambda: segment_masses(limb), lambda: with_limb_masses(LEG, limb)):
-        with pytest.raises(ParameterError, match=f"^limb: expected one of fore, hind, got {limb!r}"):
-            ask()
-
-
-@pytest.mark.parametrize("mass", [0, -1.0, np.nan, np.inf, "heavy", None])
-def test_a_bad_body_mass_is_named(mass):
-    for ask in (trunk_mass, lambda m: segment_masses("fore", m), lambda m: with_limb_masses(LEG, "hind", m)):
-        with pytest.raises(ParameterError, match=r"^body_mass: expected a finite number in \(0, inf\], got"):
-            ask(mass)

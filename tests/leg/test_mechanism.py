@@ -171,6 +171,11 @@ def test_bends_of_klanns_links_are_near_those_of_his_patent():
         assert abs(turned) == pytest.approx(bend, abs=4.0)
 
 
+def test_a_leg_that_rocks_has_no_place_where_it_does_not_close():
+    rocks = load_geometry("klann").replace(lengths={"BH": 0.2}, full_turn=False)
+    assert np.isnan(rocks.pose(np.pi).points).any()
+
+
 @pytest.mark.parametrize("name", SHIPPED)
 def test_in_stance_the_foot_goes_back(name):
     """Else the leg would walk backward: its direction of travel is data."""

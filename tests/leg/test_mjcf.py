@@ -7,7 +7,6 @@ import pytest
 
 from hoof_env.constants import GRAVITY
 from hoof_env.dynamics.parts import Motor, Trunk
-from hoof_env.errors import ParameterError
 from hoof_env.ground.contact import Ground
 from hoof_env.leg.geometry import load_geometry
 from hoof_env.leg.link_tree import link_tree
@@ -94,24 +93,3 @@ def test_the_file_is_the_text(tmp_path):
     leg = load_geometry()
     text = leg.to_mjcf(tmp_path / "leg.xml")
     assert (tmp_path / "leg.xml").read_text(encoding="utf-8") == text
-
-
-@pytest.mark.parametrize(
-    ("given", "words"),
-    [
-        ({"theta": np.nan}, "theta: expected"),
-        ({"swing": "far"}, "swing: expected"),
-        ({"timestep": 0}, "timestep: expected"),
-        ({"timestep": 1}, "timestep: expected"),
-        ({"trunk": "suspended"}, "trunk: expected a Trunk"),
-        ({"motor": True}, "motor: expected a Motor"),
-        ({"motor": Motor}, "motor: expected a Motor"),
-        ({"ground": 0.4}, "ground: expected a Ground"),
-        ({"path": "leg.urdf"}, "path: expected a file that ends in .xml"),
-    ],
-)
-def test_what_is_no_model_is_refused(given, words, tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
-    with pytest.raises(ParameterError, match=words):
-        load_geometry().to_mjcf(**given)
-    assert not list(tmp_path.iterdir())

@@ -1,0 +1,402 @@
+"""Legs that cannot be, and calls of legs and about them, by the words of each error: values of a `Geometry`
+(`VALUES`), calls (`CALLS`), files of presets (`FILES`), presets by name and by content (`PRESETS`). Lists of
+a mechanism are in tests/leg/test_refused_mechanisms.py."""
+
+import copy
+import json
+import re
+
+import numpy as np
+import pytest
+
+from hoof_env.dynamics.engine import TrunkEngine
+from hoof_env.dynamics.parts import Limb, Motor, Trunk
+from hoof_env.eq8.solver import ConstrainedLeg
+from hoof_env.errors import DataFileError, GeometryError, OutputError, ParameterError
+from hoof_env.gait import load_gait
+from hoof_env.ground.contact import Ground
+from hoof_env.leg.geometry import Geometry, load_geometry, read_preset
+from hoof_env.leg.kinematics import FrameMotion, pose
+from hoof_env.leg.limb_masses import segment_masses, trunk_mass, with_limb_masses
+from hoof_env.leg.mechanism_list import PAPER, read_mechanism
+from hoof_env.leg.profile import LegProfile
+from tests.leg.mechanisms import leg_with_everything
+from tests.legs import FIRST_FIT, FOUR_BAR, FOUR_BAR_LEG
+
+LEG = load_geometry(FIRST_FIT)
+IDENTIFIED = load_geometry()
+KLANN = load_geometry("klann")
+JANSEN = load_geometry("jansen")
+SHORT = {"CF": 0.8 * LEG.lengths["CF"]}
+ROCKER = LEG.replace(lengths=SHORT, full_turn=False)
+NUMBER = r"expected a finite number in \(0, inf\], got"
+
+
+def four_bar(**numbers):
+    """The list of the four-bar leg, with numbers of the body AC in it."""
+    mechanism = copy.deepcopy(FOUR_BAR)
+    mechanism["bodies"][1] |= numbers
+    return mechanism
+
+
+def with_a_stranger():
+    """A list with a point of a body on which it moves."""
+    mechanism = copy.deepcopy(FOUR_BAR)
+    mechanism["bodies"][2]["points"] = ["D"]
+    return mechanism
+
+
+def with_a_free_body():
+    """A list with as many rows as coordinates, which leave a body free and hold another twice."""
+    given = PAPER.to_mapping()
+    given["joints"].remove(["B", "CB", "PB"])
+    given["welds"] += [["BD", "PB"], ["DE", "BD"]]
+    return given
+
+
+WITHOUT_FG = {name: length for name, length in LEG.lengths.items() if name != "FG"}
+Z = {"mechanism": FOUR_BAR | {"fixed": ["O", "B", "Z"]}, "pivot": {"B": (0.6, 0.1), "Z": (0, "1")}}
+VALUES = [
+    # of the first leg
+    *(
+        (LEG.to_dict(), changes, ParameterError, words)
+        for changes, words in (
+            ({"lengths": WITHOUT_FG}, "lengths: expected exactly .* missing FG"),
+            ({"lengths": {**LEG.lengths, "XY": 1.0}}, "lengths: expected exactly .* unknown XY"),
+            ({"lengths": {**LEG.lengths, "FG": -0.1}}, r"lengths\['FG'\]: expected .* got -0.1"),
+            ({"lengths": {**LEG.lengths, "FG": 0}}, r"lengths\['FG'\]: expected .* got 0"),
+            ({"lengths": {**LEG.lengths, "FG": np.nan}}, r"lengths\['FG'\]: expected .* got nan"),
+            ({"lengths": {**LEG.lengths, "FG": "long"}}, r"lengths\['FG'\]: expected .* got 'long'"),
+            ({"lengths": [0.1] * 15}, "lengths: expected a mapping"),
+            ({"pivot": (0.0, np.inf)}, r"pivot\[1\]: expected .* got inf"),
+            ({"pivot": (0.0,)}, "pivot: expected two numbers"),
+            ({"pivot": 1.0}, "pivot: expected two numbers"),
+            ({"pivot": [[1.0], 1.0]}, r"pivot\[0\]: expected .* got \[1.0\]"),
+            ({"assembly": {**LEG.assembly, "B": 0}}, r"assembly\['B'\]: expected \+1 or -1, got 0"),
+            ({"assembly": {"B": 1}}, "assembly: expected exactly .* missing D, E, F, I, J"),
+            ({"toe": "J"}, "toe and heel: expected I and J, one each, got 'J' and 'J'"),
+            ({"toe": ["I"]}, "toe.*: expected"),
+            ({"heel": "G"}, "toe and heel: expected I and J"),
+            ({"travel": 0}, r"travel: expected \+1 or -1, got 0"),
+            ({"travel": [1, 1]}, "travel.*: expected"),
+            ({"hip_height": 0.0}, "hip_height: expected a finite number in"),
+            ({"linear_density": -1.0}, "linear_density: expected"),
+            ({"masses": (1.0,) * 13}, "masses: expected 14 link masses, got"),
+            ({"masses": (1.0,) * 13 + (0.0,)}, r"masses\[13\]: expected"),
+            ({"masses": 3.0}, "masses: expected 14 link masses"),
+            ({"masses": [[1.0], 2.0]}, "masses: expected 14 link masses"),
+            ({"inertia": "sphere"}, "inertia: expected one of paper, uniform_rod, got 'sphere'"),
+            ({"name": ["l"]}, "name.*: expected"),
+            ({"provenance": 3}, "provenance.*: expected"),
+            ({"full_turn": 1}, "full_turn: expected True or False, got 1"),
+        )
+    ),
+    # of legs of a list
+    *(
+        (FOUR_BAR_LEG, changes, ParameterError, words)
+        for changes, words in (
+            (
+                {"mechanism": four_bar(mass=-1)},
+                r"^mechanism\.bodies\[1\]\['mass'\]: expected a finite number in \(0, inf\]",
+            ),
+            (
+                {"mechanism": four_bar(centre=3)},
+                r"^mechanism\.bodies\[1\]\['centre'\]: expected two numbers",
+            ),
+            (
+                {"mechanism": four_bar(colour=3)},
+                r"^mechanism\.bodies\[1\]: expected exactly name, .*; unknown colour",
+            ),
+            (
+                {"mechanism": four_bar(mass=1), "solids": {"AC": {}}},
+                r"^solids\['AC'\]: mechanism\.bodies\[1\] has numbers of 'AC', too",
+            ),
+            ({"solids": {"XX": {}}}, r"^solids: expected some of OA, AC, BC; unknown XX$"),
+            ({"solids": None}, r"^solids: expected a mapping with OA, AC, BC, got None$"),
+            ({"lengths": 3}, r"^lengths: expected a mapping with OA, AC, BC, CD, got 3$"),
+            (Z, r"^pivot\['Z'\]\[1\]: expected a finite number"),
+        )
+    ),
+    *(
+        (KLANN.to_dict(), changes, ParameterError, words)
+        for changes, words in (
+            (
+                {"lengths": {name: 1.0 for name in KLANN.lengths if name != "EG"}},
+                r"lengths: expected exactly OP, BH.*missing EG",
+            ),
+            ({"pivot": (0.0, 1.0)}, "pivot: expected the places of B, D by name, got"),
+            ({"heel": "E"}, "toe and heel: expected G and None, got 'G' and 'E'"),
+            ({"masses": (1, 1, 1, 0, 1, 1, 1, 1, 1)}, r"masses\[3\]: expected"),
+        )
+    ),
+    # that lock, or whose bodies leave their points
+    (LEG.to_dict(), {"lengths": {**LEG.lengths, **SHORT}}, GeometryError, "does not close at crank angle"),
+    (
+        KLANN.to_dict(),
+        {"lengths": {**KLANN.lengths, "BH": 0.2}},
+        GeometryError,
+        r"dyad 1 \(B-H-P, .* does not close at crank angle [\d.]+ deg",
+    ),
+    (
+        FOUR_BAR_LEG,
+        {"mechanism": with_a_stranger()},
+        GeometryError,
+        r"mechanism.bodies\[2\]: 'D' is no point of body 'BC', on which",
+    ),
+    (
+        IDENTIFIED.to_dict(),
+        {"mechanism": with_a_free_body()},
+        GeometryError,
+        r"mechanism.joints: .* while the crank stands: 'CB'; tie",
+    ),
+]
+"""Values of a leg, others instead, class and words of the error."""
+
+
+@pytest.mark.parametrize(("values", "changes", "error", "words"), VALUES)
+def test_values(values, changes, error, words):
+    for make in (lambda given: Geometry(**given), Geometry.from_dict):
+        with pytest.raises(error, match=words):
+            make(values | changes)
+
+
+CHANGES = [row for row in VALUES if "missing" not in row[3]]
+"""Without those that lack a length or sign, which `replace` takes from the leg."""
+
+
+@pytest.mark.parametrize(("values", "changes", "error", "words"), CHANGES)
+def test_changes(values, changes, error, words):
+    leg = Geometry(**values)
+    with pytest.raises(error, match=words):
+        leg.replace(**changes)
+
+
+def test_the_list_alone_does_not_tell_that_a_body_is_free():
+    assert read_mechanism(with_a_free_body())
+
+
+CALLS = [
+    *(
+        (lambda _, make=make: make(), ParameterError, rf"{name}: expected a finite number")
+        for make, name in (
+            (lambda: pose(LEG, np.nan), "theta"),
+            (lambda: pose(LEG, 0.0, np.inf), "theta_rate"),
+            (lambda: pose(LEG, 0.0, 0.0, "fast"), "theta_acc"),
+            (lambda: FrameMotion(phi_rate=np.nan), r"frame\.phi_rate"),
+            (lambda: FrameMotion(position=(0.0, np.inf)), r"frame\.position"),
+        )
+    ),
+    (
+        lambda _: KLANN.pose(0.0).point("X"),
+        ParameterError,
+        r"point: expected one of B, D, .*, O, P, got 'X'",
+    ),
+    # entries of a leg
+    (lambda _: LEG.replace(lengths={"XY": 1.0}), ParameterError, "unknown XY"),
+    (
+        lambda _: Geometry.from_dict({name: each for name, each in LEG.to_dict().items() if name != "toe"}),
+        ParameterError,
+        r"geometry: expected exactly .* and perhaps .*; missing toe",
+    ),
+    (
+        lambda _: leg_with_everything(solids={"plate": {"mass": 0.0}}),
+        ParameterError,
+        r"solids\['plate'\]\['mass'\]: expected",
+    ),
+    (lambda _: leg_with_everything(solids={"XY": {}}), ParameterError, "solids: .*unknown XY"),
+    # another size
+    *(
+        (
+            lambda _, value=value: LEG.scaled(value),
+            ParameterError,
+            f"^factor: {NUMBER} {re.escape(repr(value))}",
+        )
+        for value in (0, -1.0, np.nan, np.inf, "half", None, True)
+    ),
+    *(
+        (
+            lambda _, value=value: LEG.scaled(2.0, value),
+            ParameterError,
+            f"^mass_per_metre: {NUMBER} {re.escape(repr(value))}",
+        )
+        for value in (0, -1.0, np.nan, np.inf, "half", True)
+    ),
+    *(
+        (
+            lambda _, factor=factor: LEG.scaled(factor),
+            ParameterError,
+            r"lengths\['..'\]: expected a finite number in \[0.001, 1000\]",
+        )
+        for factor in (1e-4, 1e4)
+    ),
+    # masses of a limb
+    *(
+        (call, ParameterError, f"^limb: expected one of fore, hind, got {limb!r}")
+        for limb in ("middle", "Fore", None, 1)
+        for call in (
+            lambda _, limb=limb: segment_masses(limb),
+            lambda _, limb=limb: with_limb_masses(LEG, limb),
+        )
+    ),
+    *(
+        (lambda _, ask=ask, mass=mass: ask(mass), ParameterError, f"^body_mass: {NUMBER}")
+        for mass in (0, -1.0, np.nan, np.inf, "heavy", None)
+        for ask in (
+            trunk_mass,
+            lambda mass: segment_masses("fore", mass),
+            lambda mass: with_limb_masses(LEG, "hind", mass),
+        )
+    ),
+    # models of MuJoCo
+    *(
+        (lambda _, given=given: IDENTIFIED.to_mjcf(**given), ParameterError, words)
+        for given, words in (
+            ({"theta": np.nan}, "theta: expected"),
+            ({"swing": "far"}, "swing: expected"),
+            ({"timestep": 0}, "timestep: expected"),
+            ({"timestep": 1}, "timestep: expected"),
+            ({"trunk": "suspended"}, "trunk: expected a Trunk"),
+            ({"motor": True}, "motor: expected a Motor"),
+            ({"motor": Motor}, "motor: expected a Motor"),
+            ({"ground": 0.4}, "ground: expected a Ground"),
+            ({"path": "leg.urdf"}, "path: expected a file that ends in .xml"),
+            ({"path": 3}, r"path: expected the path of a file .*, got 3"),
+        )
+    ),
+    # what a leg is for
+    (
+        lambda _: LegProfile(LEG.replace(lengths={"GJ": 0.8 * LEG.lengths["GJ"]}, full_turn=False)),
+        GeometryError,
+        "a place at some crank angle",
+    ),
+    (
+        lambda _: ConstrainedLeg(ROCKER, Ground()),
+        GeometryError,
+        "expected a leg that turns through a full revolution",
+    ),
+    (
+        lambda _: TrunkEngine([Limb(IDENTIFIED), Limb(JANSEN, (0.5, 0.0))], Trunk(kind="free", height=1.6)),
+        ParameterError,
+        r"limbs\[1\].geometry: expected the mechanism of the first leg",
+    ),
+    # presets that are written
+    (
+        lambda folder: LEG.save(folder / "mine.txt"),
+        ParameterError,
+        r"path: expected a file that ends in \.json, got .*mine\.txt",
+    ),
+    (lambda folder: LEG.save(folder / "file" / "mine.json"), OutputError, "cannot write to"),
+    *(
+        (lambda folder, given=given: LEG.save(folder / "file.json", **given), ParameterError, words)
+        for given, words in (
+            ({"ground": {"stifness": 1e4}}, r"ground: .*; unknown stifness"),
+            (
+                {"gaits": {"trot": {"crank_speed": "fast"}}},
+                r"gaits\['trot'\]\['crank_speed'\]: expected .*fast",
+            ),
+            ({"gaits": ["walk"]}, "gaits: expected a mapping"),
+        )
+    ),
+]
+"""Call with a folder that has a file, class and words of the error."""
+
+
+@pytest.mark.parametrize(
+    ("call", "error", "words"), CALLS, ids=[f"{k} {row[2]}" for k, row in enumerate(CALLS)]
+)
+def test_calls(call, error, words, tmp_path, monkeypatch):
+    """Nothing is written."""
+    (tmp_path / "file").write_text("")
+    monkeypatch.chdir(tmp_path)
+    with pytest.raises(error, match=words):
+        call(tmp_path)
+    assert [path.name for path in tmp_path.iterdir()] == ["file"]
+
+
+CONTENT = read_preset("identified")
+BARE = {name: value for name, value in CONTENT["geometry"].items() if name != "pivot"}
+
+
+def edited(**changes):
+    """The text of a preset with other entries of its geometry."""
+    return json.dumps(CONTENT | {"geometry": CONTENT["geometry"] | changes})
+
+
+def edited_length(**lengths):
+    return edited(lengths=CONTENT["geometry"]["lengths"] | lengths)
+
+
+FILES = [
+    (None, DataFileError, r"cannot read .*leg\.json: No such file"),
+    *(
+        (text, DataFileError, words)
+        for text, words in (
+            ("{", "does not parse"),
+            ("[" * 100_000, "does not parse"),
+            (b"\xff\xfe\x00\x80", "does not parse"),
+            ("[]", "expected a JSON object with 'geometry' and 'gaits', got list"),
+            ("{}", r"leg\.json: expected an entry 'provenance' .*; found nothing"),
+            ('{"geometry": {}, "gaits": {}}', "expected an entry 'provenance' .*; found geometry, gaits"),
+            ('{"geometry": {}, "provenance": 3}', "expected an entry 'provenance' .*; got 3"),
+            ('{"provenance": ""}', "expected an entry 'geometry' .*, an object; found provenance"),
+            ('{"provenance": "", "geometry": 3}', "expected an entry 'geometry' .*, an object; got 3"),
+            (
+                '{"provenance": "", "geometry": {"pivot": 3}}',
+                r"leg\.json: geometry: .*; missing assembly, heel,",
+            ),
+            (
+                '{"provenance": "", "colour": "bay"}',
+                r"leg\.json: unknown entries colour; expected some of prov",
+            ),
+            (edited(colour="bay"), r"leg\.json: geometry: expected exactly .*; unknown colour$"),
+        )
+    ),
+    (edited_length(FG=np.nan), ParameterError, r"leg\.json: lengths\['FG'\]"),
+    (edited_length(CB=0.1), GeometryError, r"leg\.json: dyad 1"),
+]
+"""Content of a file, or None, class and words of the error."""
+
+
+@pytest.mark.parametrize(("content", "error", "words"), FILES)
+def test_files(content, error, words, tmp_path):
+    path = tmp_path / "leg.json"
+    if content is not None:
+        path.write_bytes(content if isinstance(content, bytes) else content.encode())
+    with pytest.raises(error, match=words):
+        load_geometry(path)
+
+
+def test_a_folder_is_no_file(tmp_path):
+    with pytest.raises(DataFileError, match="cannot read"):
+        load_geometry(tmp_path)
+
+
+PRESETS = [
+    (
+        lambda: load_geometry("first_fit"),
+        "preset: expected one of fourbar, identified, jansen, klann, got 'first_fit'",
+    ),
+    (
+        lambda: load_geometry({**CONTENT, "colour": "bay"}),
+        "preset: unknown entries colour; expected some of provenance, ",
+    ),
+    (
+        lambda: load_geometry({name: CONTENT[name] for name in ("geometry", "gaits")}),
+        r"preset: expected an entry 'provenance' .*geometry, gaits$",
+    ),
+    (
+        lambda: load_gait("walk", {**CONTENT, "gaits": {5: CONTENT["gaits"]["walk"]}}),
+        "gaits: expected names that are texts",
+    ),
+    (
+        lambda: load_geometry({**CONTENT, "geometry": {**BARE, "colour": "bay"}}),
+        r"preset: geometry: .*; missing pivot; unknown colour$",
+    ),
+]
+"""Calls with a preset by name or content, and words."""
+
+
+@pytest.mark.parametrize(("call", "words"), PRESETS)
+def test_presets(call, words):
+    with pytest.raises(ParameterError, match=words):
+        call()
