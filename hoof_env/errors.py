@@ -53,6 +53,18 @@ LEAST = 1e-12
 """Smallest value of positive settings, in any unit."""
 
 
+TEXTS = (str, bytes, bytearray, memoryview)
+"""Types of texts, which are sequences, too."""
+
+
+def is_number(value: Any) -> bool:
+    """Return False for what `float` takes though it is no number: truths, texts of digits, arrays of one of
+    these or of a complex number."""
+    if isinstance(value, (np.ndarray, np.generic)):
+        return value.ndim == 0 and value.dtype.kind in "iuf"
+    return not isinstance(value, (bool, *TEXTS))
+
+
 def check_number(
     name: str, value: Any, *, low: float = -np.inf, high: float = np.inf, exclusive_low: bool = False
 ) -> float:
@@ -62,9 +74,8 @@ def check_number(
         ParameterError: it is not a finite number within [low, high]; or, with `exclusive_low`, it is `low`
             or, for a `low` of 0, less than `LEAST`, so that quotients stay finite.
     """
-    # float() would accept truths and texts of digits
     try:
-        number = np.nan if isinstance(value, (bool, np.bool_, str, bytes)) else float(value)
+        number = float(value) if is_number(value) else np.nan
     except (TypeError, ValueError, OverflowError):
         number = np.nan
     if not (np.isfinite(number) and low <= number <= high) or (exclusive_low and number == low):
@@ -162,8 +173,8 @@ def finite(name: str, value: Any, most: float = np.inf) -> Floats:
     """Return `value` as an array of doubles; raise `ParameterError` unless all are finite and within
     +-`most`."""
     try:
-        numbers = np.asarray(value, dtype=np.float64)
-    except (TypeError, ValueError):
+        numbers = _doubles(np.asarray(value))
+    except (TypeError, ValueError, OverflowError):
         numbers = np.array(np.nan)
     # one pass for both checks, NaN included: every reset of an episode calls this function
     if (np.abs(numbers) <= min(most, LARGEST)).all():
@@ -171,6 +182,15 @@ def finite(name: str, value: Any, most: float = np.inf) -> Floats:
     if not np.isfinite(numbers).all():
         raise ParameterError(f"{name}: expected finite numbers, got {value!r}")
     raise ParameterError(f"{name}: expected numbers within +-{most:g}, got {value!r}")
+
+
+def _doubles(values: NDArray[Any]) -> Floats:
+    """Return numbers as doubles, and NaN for truths, texts and complex numbers."""
+    kind = values.dtype.kind
+    # an object is what NumPy has no type for, such as a fraction or a large integer
+    if kind in "iuf" or (kind == "O" and all(is_number(value) for value in values.flat)):
+        return values.astype(np.float64, copy=False)
+    return np.array(np.nan)
 
 
 def one_of(name: str, value: Any, kind: type[Kind]) -> Kind:

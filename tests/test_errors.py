@@ -1,6 +1,7 @@
 """Errors name what came and what was expected, and an exception is of the kind a caller would catch."""
 
 from decimal import Decimal
+from fractions import Fraction
 
 import numpy as np
 import pytest
@@ -15,6 +16,7 @@ from hoof_env.errors import (
     ParameterError,
     check_choice,
     check_number,
+    finite,
     parse_pairs,
 )
 
@@ -38,16 +40,43 @@ def test_a_number_is_returned_or_named(value, bounds, exclusive):
 
 
 @pytest.mark.parametrize(
-    "value", [True, False, np.True_, b"1", "1", "one", None, [1], (), {}, 1j, np.zeros(2), 10**400, np.nan]
-)
+    "value",
+    [
+        True, False, np.True_, np.array(True), b"1", "1", "one", bytearray(b"1"), memoryview(b"1"),
+        np.str_("1"), np.array("1"), None, [1], (), {}, 1j, np.complex128(1), np.zeros(1), np.zeros(2),
+        10**400, np.nan, np.timedelta64(1, "s"),
+    ],
+)  # fmt: skip
 def test_what_is_no_number_is_refused(value):
     with pytest.raises(ParameterError, match=r"x: expected a finite number in \[-inf, inf\], got "):
         check_number("x", value)
 
 
-@pytest.mark.parametrize("value", [np.float32(0.5), np.int64(3), 2, Decimal("0.25")])
+@pytest.mark.parametrize("value", [np.float32(0.5), np.int64(3), 2, Decimal("0.25"), np.array(3)])
 def test_other_kinds_of_number_are_taken(value):
     assert check_number("x", value) == float(value)
+
+
+@pytest.mark.parametrize(
+    "value",
+    [
+        True, [True, False], np.ones(2, bool), "1", ["1", "2"], np.array(["1"]), [Fraction(1, 2), "1"],
+        [Fraction(1, 2), True], 1j, [1j, 0.0], np.ones(2, complex), [None, 1.0], {}, [[1.0], [1.0, 2.0]],
+        [np.nan], np.inf, 10**400, [10**400, 1],
+    ],
+)  # fmt: skip
+def test_what_are_no_numbers_is_refused(value):
+    with pytest.raises(ParameterError, match="x: expected finite numbers, got "):
+        finite("x", value)
+
+
+@pytest.mark.parametrize(
+    "value", [3, [1, 2.5], [], np.ones((2, 3), np.int8), [Fraction(1, 2), 1], [10**30, 1]]
+)
+def test_numbers_become_doubles(value):
+    numbers = finite("x", value)
+    assert numbers.dtype == np.float64
+    assert (numbers == np.array(value, float)).all()
 
 
 def test_a_choice_is_returned_or_named():

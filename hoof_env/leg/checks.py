@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, is_dataclass
+from pathlib import Path
 from types import MappingProxyType
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from hoof_env.errors import ParameterError, check_number
+from hoof_env.errors import TEXTS, ParameterError, check_number, is_number
 from hoof_env.leg.mechanism import Mechanism
 from hoof_env.leg.mechanism_list import read_mechanism, split_solids
 
@@ -21,14 +22,36 @@ Solids = Mapping[str, Mapping[str, Any]]
 def numbers_of(what: str, given: Any) -> dict[str, Any]:
     """Return the numbers, or lists of them, of a dataclass or mapping by name, as JSON can hold them."""
     found = asdict(given) if is_dataclass(given) and not isinstance(given, type) else given
-    if not isinstance(found, Mapping):
+    if not isinstance(found, Mapping) or not found:
         raise ParameterError(f"{what}: expected numbers by name, got {given!r}")
+    check_names(what, found)
     return {
         name: [check_number(f"{what}[{name!r}][{k}]", part) for k, part in enumerate(value)]
         if isinstance(value, (list, tuple))
         else check_number(f"{what}[{name!r}]", value)
         for name, value in found.items()
     }
+
+
+def check_names(what: str, given: Mapping[Any, Any]) -> None:
+    """Raise `ParameterError` unless all names are texts; a file would hold others as texts."""
+    for name in given:
+        if not isinstance(name, str):
+            raise ParameterError(f"{what}: expected names that are texts, got {name!r}")
+
+
+def checked_path(given: Any, suffix: str) -> Path:
+    """Return the path of a file that is written.
+
+    Raises:
+        ParameterError: no path, or one of another suffix.
+    """
+    if not isinstance(given, (str, Path)):
+        raise ParameterError(f"path: expected the path of a file that ends in {suffix}, got {given!r}")
+    path = Path(given)
+    if path.suffix != suffix:
+        raise ParameterError(f"path: expected a file that ends in {suffix}, got {str(path)!r}")
+    return path
 
 
 def check_keys(what: str, given: Any, expected: Sequence[str], optional: Sequence[str] = ()) -> None:
@@ -48,14 +71,16 @@ def check_keys(what: str, given: Any, expected: Sequence[str], optional: Sequenc
 
 
 def count_of(values: Any) -> int:
-    """Return the number of values in a sequence, 0 if it is none."""
-    return len(values) if isinstance(values, (Sequence, np.ndarray)) else 0
+    """Return the number of values in a sequence or row, 0 if it is none or a text."""
+    if isinstance(values, np.ndarray):
+        return values.size if values.ndim == 1 else 0
+    return len(values) if isinstance(values, Sequence) and not isinstance(values, TEXTS) else 0
 
 
 def check_signs(signs: Mapping[str, Any]) -> None:
     """Raise `ParameterError` unless all values are +1 or -1."""
     for name, sign in signs.items():
-        if np.ndim(sign) or sign not in (1, -1):
+        if not is_number(sign) or sign not in (1, -1):
             raise ParameterError(f"{name}: expected +1 or -1, got {sign!r}")
 
 
@@ -80,7 +105,7 @@ def checked_masses(given: Any, bodies: int) -> tuple[float, ...]:
 def check_feet(toe: Any, heel: Any, feet: Sequence[str]) -> None:
     """Raise `ParameterError` unless toe and heel are the feet of a mechanism; the heel may be None of one."""
     given = [foot for foot in (toe, heel) if foot is not None]
-    if toe is None or sorted(map(str, given)) != sorted(feet):
+    if not all(isinstance(foot, str) for foot in given) or toe is None or sorted(given) != sorted(feet):
         expected = f"{' and '.join(sorted(feet))}, one each" if len(feet) == 2 else f"{feet[0]} and None"
         raise ParameterError(f"toe and heel: expected {expected}, got {toe!r} and {heel!r}")
 

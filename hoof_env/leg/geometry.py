@@ -22,9 +22,11 @@ from hoof_env.errors import DataFileError, ParameterError, check_choice, check_n
 from hoof_env.leg.checks import (
     check_feet,
     check_keys,
+    check_names,
     check_signs,
     check_texts,
     checked_masses,
+    checked_path,
     checked_pivot,
     numbers_of,
     plain_solids,
@@ -110,8 +112,9 @@ class Geometry:
         check_signs({f"assembly[{p!r}]": self.assembly[p] for p in points} | {"travel": self.travel})
         check_feet(self.toe, self.heel, self.mechanism.feet)
         check_texts({"name": self.name, "provenance": self.provenance})
+        object.__setattr__(self, "travel", int(self.travel))
         for name in ("hip_height", "linear_density"):
-            check_number(name, getattr(self, name), low=0, exclusive_low=True)
+            object.__setattr__(self, name, check_number(name, getattr(self, name), low=0, exclusive_low=True))
         check_choice("inertia", self.inertia, ("uniform_rod", "paper"))
         if self.masses is not None:
             object.__setattr__(self, "masses", checked_masses(self.masses, len(self.mechanism.bodies)))
@@ -119,7 +122,7 @@ class Geometry:
         object.__setattr__(self, "pivot", checked_pivot(self.pivot, mechanism.pivots))
         object.__setattr__(self, "assembly", MappingProxyType({p: int(self.assembly[p]) for p in points}))
         object.__setattr__(self, "solids", MappingProxyType(solids))
-        flag("full_turn", self.full_turn)
+        object.__setattr__(self, "full_turn", flag("full_turn", self.full_turn))
         check_motion(self)
 
     def __hash__(self) -> int:
@@ -187,8 +190,7 @@ class Geometry:
         theta_acc: float = 0.0,
         swing_acc: float = 0.0,
     ) -> Pose:
-        """Return places, angles, velocities and accelerations of all points and bodies, with O at rest at the
-        origin.
+        """Return places, angles, velocities and accelerations of all points and bodies, with O at rest at 0.
 
         Args:
             theta, theta_rate, theta_acc: crank angle from the leg's frame, clockwise in that frame before the
@@ -278,7 +280,7 @@ class Geometry:
             ParameterError: another suffix, or gaits or a ground that are not numbers by name.
             OutputError: the file cannot be written.
         """
-        _write_preset(self, Path(path), gaits, ground)
+        _write_preset(self, path, gaits, ground)
 
     def scaled(self, factor: float, mass_per_metre: float | None = None) -> Geometry:
         """A similar leg: lengths, pivot and hip height times `factor`, angles and gaits as before.
@@ -316,23 +318,26 @@ def _preset_content(
     content |= {"units": "m, kg, kg/m, rad, rad/s", "geometry": shape}
     if ground is not None:
         check_keys("ground", ground, (), ("stiffness", "exponent"))
-        content["ground"] = numbers_of("ground", ground)
+        content["ground"] = {
+            name: check_number(f"ground[{name!r}]", value, low=0, exclusive_low=True)
+            for name, value in ground.items()
+        }
     if gaits is not None:
         if not isinstance(gaits, Mapping):
             raise ParameterError(f"gaits: expected a mapping of gaits by name, got {gaits!r}")
+        check_names("gaits", gaits)
         content["gaits"] = {name: numbers_of(f"gaits[{name!r}]", gait) for name, gait in gaits.items()}
     return content
 
 
 def _write_preset(
     geometry: Geometry,
-    path: Path,
+    given_path: str | Path,
     gaits: Mapping[str, Any] | None,
     ground: Mapping[str, float] | None,
 ) -> None:
     """Write the file of `Geometry.save`."""
-    if path.suffix != ".json":
-        raise ParameterError(f"path: expected a file that ends in .json, got {str(path)!r}")
+    path = checked_path(given_path, ".json")
     content = _preset_content(geometry, gaits, ground)
     with staged(path.parent) as stage:
         (stage / path.name).write_text(json.dumps(content, indent=1) + "\n", encoding="utf-8")

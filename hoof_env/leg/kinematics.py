@@ -13,8 +13,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from hoof_env.errors import check_choice, check_number
+from hoof_env.errors import ParameterError, check_choice, check_number, one_of
 from hoof_env.leg.assembly import centres, solve
+from hoof_env.leg.checks import count_of
 from hoof_env.leg.geometry import Geometry
 from hoof_env.leg.mechanism import Mechanism
 from hoof_env.simd.compile import kernel
@@ -52,7 +53,7 @@ class FrameMotion:
     Units: rad, rad/s, rad/s^2; m, m/s, m/s^2 for (x, y) pairs.
 
     Raises:
-        ParameterError: a value is not finite.
+        ParameterError: a value is not finite, or no pair of numbers where one is expected.
     """
 
     phi: float = 0.0
@@ -63,9 +64,13 @@ class FrameMotion:
     acceleration: tuple[float, float] = (0.0, 0.0)
 
     def __post_init__(self) -> None:
-        for name, value in vars(self).items():
-            for part in value if isinstance(value, tuple) else (value,):
-                check_number(f"frame.{name}", part)
+        for name in ("phi", "phi_rate", "phi_acc"):
+            object.__setattr__(self, name, check_number(f"frame.{name}", getattr(self, name)))
+        for name in ("position", "velocity", "acceleration"):
+            pair = getattr(self, name)
+            if count_of(pair) != 2:
+                raise ParameterError(f"frame.{name}: expected two numbers (x, y), got {pair!r}")
+            object.__setattr__(self, name, tuple(check_number(f"frame.{name}", part) for part in pair))
 
 
 @dataclass(frozen=True)
@@ -119,12 +124,12 @@ def pose(
         frame: motion of the leg's frame; at rest at the origin if None.
 
     Raises:
-        ParameterError: an angle, rate or acceleration is not finite.
+        ParameterError: an angle, rate or acceleration is not finite, or leg or frame are something else.
     """
     theta = check_number("theta", theta)
     theta_rate, theta_acc = check_number("theta_rate", theta_rate), check_number("theta_acc", theta_acc)
-    frame = frame or FrameMotion()
-    mechanism = geometry.mechanism
+    frame = FrameMotion() if frame is None else one_of("frame", frame, FrameMotion)
+    mechanism = one_of("geometry", geometry, Geometry).mechanism
     z, dz, ddz = (w[0] for w in solve(geometry, [theta]))
     motion = [
         place(z[k], dz[k], ddz[k], theta_rate, theta_acc,

@@ -16,7 +16,7 @@ from functools import cache
 from importlib import resources
 from typing import Any
 
-from hoof_env.errors import ParameterError, check_choice, check_number
+from hoof_env.errors import ParameterError, check_choice, check_number, one_of
 from hoof_env.leg.geometry import Geometry
 from hoof_env.leg.mechanism_list import PAPER
 
@@ -81,7 +81,7 @@ def with_limb_masses(geometry: Geometry, limb: str, body_mass: float = BODY_MASS
         ParameterError: another limb, a mass that is not finite or not above 0, or a leg of another mechanism
             than the paper's.
     """
-    if geometry.mechanism != PAPER:
+    if one_of("geometry", geometry, Geometry).mechanism != PAPER:
         raise ParameterError(
             f"geometry {geometry.name!r}: expected the paper's mechanism, for whose links it is known which "
             "segment each carries; give other legs `masses`"

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Container, Iterable, Iterator, Mapping, Sequence
 from functools import cache
 from importlib import resources
 from typing import Any
@@ -155,7 +155,7 @@ def _read_body_point(
     body = bodies[keys["body"]]["body"]
     ends = [body.tail, body.head]
     origin = keys.get("from", body.tail)
-    if origin not in ends:
+    if not _known(origin, ends):
         raise ParameterError(f"{where}.from: expected an end of {body.name!r}, {ends}, got {origin!r}")
     _check_found(where, f"{point!r} lies on body {body.name!r} between", ends, known)
     along, across = (_coordinate(f"{where}.{axis}", keys.get(axis, "")) for axis in ("along", "across"))
@@ -202,8 +202,8 @@ def _read_joints(
         if not isinstance(entry, (list, tuple)) or len(entry) != 3:
             raise ParameterError(f"{where}: expected [point, body, body or 'frame'], got {entry!r}")
         point, *names = entry
-        for name in names:
-            if not _known(name, numbers) and not (name == FRAME_NAME and name is names[1]):
+        for name, able in zip(names, (numbers, (*numbers, FRAME_NAME)), strict=True):
+            if not _known(name, able):
                 raise ParameterError(
                     f"{where}: expected [point, body, body or 'frame'] with bodies of the list "
                     f"({', '.join(numbers)}), got {entry!r}"
@@ -211,7 +211,7 @@ def _read_joints(
         i, j = (FRAME if name == FRAME_NAME else numbers[name] for name in names)
         for number, name in ((i, names[0]), (j, names[1])):
             points = fixed if number == FRAME else bodies[number].all_points
-            if point not in points:
+            if not _known(point, points):
                 raise ParameterError(
                     f"{where}: expected a point of {name!r}, one of {', '.join(points)}, got {point!r}"
                 )
@@ -330,8 +330,8 @@ def _entries(where: str, given: Any, required: Sequence[str], optional: Sequence
     return dict(given)
 
 
-def _known(given: Any, names: Mapping[str, Any]) -> bool:
-    # a list or an object has no hash, and would raise a TypeError
+def _known(given: Any, names: Container[str]) -> bool:
+    # a list or an object has no hash and would raise a TypeError, and an array is equal in parts
     return isinstance(given, str) and given in names
 
 
@@ -355,7 +355,7 @@ def _names(where: str, given: Any) -> tuple[str, ...]:
 
 
 def _coordinate(where: str, given: Any) -> str:
-    if given == "":
+    if isinstance(given, str) and not given:
         return ""
     if not isinstance(given, str) or not given.removeprefix("-") or given.startswith("--"):
         raise ParameterError(f"{where}: expected the name of a length, or '-' and a name, got {given!r}")

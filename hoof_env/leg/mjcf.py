@@ -25,6 +25,7 @@ from numpy.typing import NDArray
 from hoof_env._output import staged
 from hoof_env.constants import GRAVITY
 from hoof_env.errors import GeometryError, ParameterError, check_number
+from hoof_env.leg.checks import checked_path
 from hoof_env.leg.geometry import Geometry
 from hoof_env.leg.kinematics import FrameMotion, Pose, pose
 from hoof_env.leg.link_tree import CRANK_LINK, LinkTree, link_tree
@@ -180,11 +181,7 @@ def leg_to_mjcf(
     options = Options(timestep, floor=None if ground is None else ground.friction)
     text = write_mjcf([leg], trunk, (0.0, trunk.height), options)
     if path is not None:
-        if not isinstance(path, (str, Path)):
-            raise ParameterError(f"path: expected the path of a file that ends in .xml, got {path!r}")
-        path = Path(path)
-        if path.suffix != ".xml":
-            raise ParameterError(f"path: expected a file that ends in .xml, got {str(path)!r}")
+        path = checked_path(path, ".xml")
         with staged(path.parent) as stage:
             (stage / path.name).write_text(text, encoding="utf-8")
     return text

@@ -21,7 +21,7 @@ from llvmlite import ir
 from numba.core import types
 from numpy.typing import NDArray
 
-from hoof_env.errors import GeometryError
+from hoof_env.errors import GeometryError, count, one_of
 from hoof_env.leg.assembly import centres, solve
 from hoof_env.leg.geometry import Geometry
 from hoof_env.simd import floor, maximum, minimum
@@ -72,6 +72,9 @@ def by_name(values: NDArray[np.float64]) -> dict[str, NDArray[np.float64]]:
 DEGREE = 5
 CELLS = (1024, 1280, 1536, 2048, 3072, 4096, 6144)
 """Numbers of cells that are tried."""
+
+MOST_CELLS = 2**16
+"""Largest number of cells that may be asked for."""
 
 ROW = float(FUNCTIONS * (DEGREE + 1))  # numbers in a row of the table
 
@@ -137,13 +140,14 @@ class LegProfile:
         derivative_error: largest error of a derivative over its largest value, between the nodes [-].
 
     Raises:
+        ParameterError: no leg, or no number of cells.
         GeometryError: the links have no place at some crank angle, or at any if the leg need not turn fully.
     """
 
     def __init__(self, geometry: Geometry, cells: int | None = None) -> None:
-        self.geometry = geometry
+        self.geometry = one_of("geometry", geometry, Geometry)
         finest = CELLS if geometry.full_turn else CELLS[-1:]  # a rocking crank: as near to its ends as can be
-        for tried in (cells,) if cells else finest:
+        for tried in finest if cells is None else (count("cells", cells, most=MOST_CELLS),):
             self.cells, self.table = tried, _fit(geometry, tried)
             error = self._errors()
             while not geometry.full_turn and np.nanmax(error, initial=0.0) > DERIVATIVE_ERROR:

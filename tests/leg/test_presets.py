@@ -2,6 +2,8 @@
 
 import json
 
+import numpy as np
+
 from hoof_env.gait import load_gait
 from hoof_env.ground.contact import Ground, load_ground
 from hoof_env.leg.geometry import Geometry, load_geometry, preset_names, read_preset
@@ -30,6 +32,15 @@ def test_content_is_taken_as_a_file_is():
     leg = load_geometry(content)
     assert leg.replace(name="identified") == LEG
     assert (leg.name, leg.provenance) == ("custom", LEG.provenance)
+
+
+def test_numbers_of_numpy_go_through_a_file(tmp_path):
+    odd = {"hip_height": np.float32(1.5), "travel": np.int64(1), "full_turn": np.False_, "linear_density": 2}
+    own = LEG.replace(**odd)
+    own.save(tmp_path / "leg.json")
+    again = load_geometry(tmp_path / "leg.json")
+    assert again.replace(name=own.name) == own
+    assert (again.hip_height, again.travel, again.full_turn, again.linear_density) == (1.5, 1, False, 2.0)
 
 
 def test_a_geometry_goes_through_a_dictionary_and_a_file(tmp_path):

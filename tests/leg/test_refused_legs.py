@@ -89,6 +89,27 @@ VALUES = [
             ({"name": ["l"]}, "name.*: expected"),
             ({"provenance": 3}, "provenance.*: expected"),
             ({"full_turn": 1}, "full_turn: expected True or False, got 1"),
+            # what Python or NumPy would take for numbers or texts
+            *(
+                ({"travel": value}, rf"travel: expected \+1 or -1, got {re.escape(repr(value))}")
+                for value in (True, np.True_, np.array(True), "1", np.nan, None)
+            ),
+            ({"assembly": {**LEG.assembly, "B": True}}, r"assembly\['B'\]: expected \+1 or -1, got True"),
+            *(
+                ({"hip_height": value}, f"^hip_height: {NUMBER} {re.escape(repr(value))}")
+                for value in (np.array(True), np.array("1"), bytearray(b"1"), np.complex128(1), 10**400)
+            ),
+            *(
+                ({"pivot": value}, f"pivot: expected two numbers .* got {re.escape(repr(value))}")
+                for value in (np.array(1.0), np.ones((2, 2)), b"12", "12", {1.0, 2.0}, None)
+            ),
+            *(
+                ({"masses": value}, f"masses: expected 14 link masses, got {re.escape(repr(value))}")
+                for value in (np.array(1.0), bytearray(range(1, 15)), "1" * 14, [])
+            ),
+            ({"masses": [True] * 14}, r"masses\[0\]: expected a finite number .* got True"),
+            ({"toe": np.array("I")}, "toe and heel: expected I and J"),
+            ({"toe": None}, "toe and heel: expected I and J"),
         )
     ),
     # of legs of a list
@@ -114,6 +135,15 @@ VALUES = [
             ({"solids": {"XX": {}}}, r"^solids: expected some of OA, AC, BC; unknown XX$"),
             ({"solids": None}, r"^solids: expected a mapping with OA, AC, BC, got None$"),
             ({"lengths": 3}, r"^lengths: expected a mapping with OA, AC, BC, CD, got 3$"),
+            *(
+                (
+                    {"solids": {"AC": {"centre": value}}},
+                    rf"^solids\['AC'\]\['centre'\]: expected two numbers, .* got {re.escape(repr(value))}",
+                )
+                for value in (np.array(1.0), b"12", (0.1,), None)
+            ),
+            ({"solids": {"AC": {"inertia": np.inf}}}, r"^solids\['AC'\]\['inertia'\]: expected .* got inf"),
+            ({"solids": {"AC": 3}}, r"^solids\['AC'\]: expected a mapping with mass, .* got 3"),
             (Z, r"^pivot\['Z'\]\[1\]: expected a finite number"),
         )
     ),
@@ -184,8 +214,27 @@ CALLS = [
             (lambda: pose(LEG, 0.0, 0.0, "fast"), "theta_acc"),
             (lambda: FrameMotion(phi_rate=np.nan), r"frame\.phi_rate"),
             (lambda: FrameMotion(position=(0.0, np.inf)), r"frame\.position"),
+            (lambda: FrameMotion(phi=(1.0,)), r"frame\.phi"),
+            (lambda: FrameMotion(velocity=("1", "2")), r"frame\.velocity"),
         )
     ),
+    *(
+        (
+            lambda _, value=value: FrameMotion(acceleration=value),
+            ParameterError,
+            rf"frame\.acceleration: expected two numbers \(x, y\), got {re.escape(repr(value))}",
+        )
+        for value in (1.0, np.array(1.0), (0.0, 1.0, 2.0), (), "12", b"12", None)
+    ),
+    *(
+        (
+            lambda _, value=value: pose(LEG, 0.0, frame=value),
+            ParameterError,
+            "frame: expected FrameMotion, got",
+        )
+        for value in (0, "", {}, np.zeros(2), FrameMotion)
+    ),
+    (lambda _: pose("klann", 0.0), ParameterError, "geometry: expected Geometry, got 'klann'"),
     (
         lambda _: KLANN.pose(0.0).point("X"),
         ParameterError,
@@ -247,6 +296,16 @@ CALLS = [
             lambda mass: with_limb_masses(LEG, "hind", mass),
         )
     ),
+    (
+        lambda _: with_limb_masses("klann", "fore"),
+        ParameterError,
+        "geometry: expected Geometry, got 'klann'",
+    ),
+    (
+        lambda _: with_limb_masses(KLANN, "fore"),
+        ParameterError,
+        "geometry 'klann': expected the paper's mechanism",
+    ),
     # models of MuJoCo
     *(
         (lambda _, given=given: IDENTIFIED.to_mjcf(**given), ParameterError, words)
@@ -264,6 +323,11 @@ CALLS = [
         )
     ),
     # what a leg is for
+    (lambda _: LegProfile("klann"), ParameterError, "geometry: expected Geometry, got 'klann'"),
+    *(
+        (lambda _, cells=cells: LegProfile(LEG, cells), ParameterError, "cells: expected")
+        for cells in (0, -1, True, 1024.0, "1024", np.array([1024]), 10**400)
+    ),
     (
         lambda _: LegProfile(LEG.replace(lengths={"GJ": 0.8 * LEG.lengths["GJ"]}, full_turn=False)),
         GeometryError,
@@ -295,7 +359,26 @@ CALLS = [
                 r"gaits\['trot'\]\['crank_speed'\]: expected .*fast",
             ),
             ({"gaits": ["walk"]}, "gaits: expected a mapping"),
+            ({"gaits": {5: {"crank_speed": 1.0}}}, "gaits: expected names that are texts, got 5"),
+            ({"gaits": {"trot": {5: 1.0}}}, r"gaits\['trot'\]: expected names that are texts, got 5"),
+            ({"gaits": {"trot": {}}}, r"gaits\['trot'\]: expected numbers by name, got {}"),
+            ({"ground": 1.4}, "ground: expected a mapping with stiffness, exponent, got 1.4"),
+            *(
+                (
+                    {"ground": {"exponent": value}},
+                    rf"ground\['exponent'\]: {NUMBER} {re.escape(repr(value))}",
+                )
+                for value in (0, -1.0, np.nan, True, "1.4", [1.4], None)
+            ),
         )
+    ),
+    *(
+        (
+            lambda _, path=path: LEG.save(path),
+            ParameterError,
+            rf"path: expected the path of a file that ends in \.json, got {re.escape(repr(path))}",
+        )
+        for path in (3, None, True, b"leg.json", ["leg.json"])
     ),
 ]
 """Call with a folder that has a file, class and words of the error."""
@@ -372,6 +455,10 @@ def test_a_folder_is_no_file(tmp_path):
 
 
 PRESETS = [
+    *(
+        (lambda given=given: load_geometry(given), "preset: expected one of fourbar, .* got")
+        for given in (3, None, True, ["klann"], np.zeros(2), b"klann", "")
+    ),
     (
         lambda: load_geometry("first_fit"),
         "preset: expected one of fourbar, identified, jansen, klann, got 'first_fit'",

@@ -2,6 +2,7 @@
 
 import copy
 
+import numpy as np
 import pytest
 
 from hoof_env.errors import ParameterError
@@ -12,6 +13,13 @@ from tests.legs import FOUR_BAR
 
 JANSEN = read_preset("jansen")["geometry"]["mechanism"]
 CRANK, COUPLER, ROCKER = FOUR_BAR["bodies"]
+
+
+def with_names(entry, place):
+    """An entry with an array of names at a place."""
+    odd = copy.copy(entry)
+    odd[place] = np.array(["O", "A"])
+    return odd
 
 
 def changed(**changes):
@@ -111,6 +119,27 @@ WRONG = {
         {**copy.deepcopy(EVERYTHING), "points": [*EVERYTHING["points"][:4], {"point": "G", "body": "ankle"}]},
         r"mechanism.points\[4\]: expected 'along' or 'across', else 'G' is 'A' itself",
     ),
+    "a joint of the frame with itself": (
+        FOUR_BAR | {"joints": [["O", "frame", "frame"], *FOUR_BAR["joints"][1:]]},
+        r"mechanism.joints\[0\]: expected \[point, body, body or 'frame'\]",
+    ),
+    **{
+        f"{part}, an array for {place!r}": (
+            FOUR_BAR | {part: [with_names(entry, place)]},
+            rf"mechanism.{part}\[0\].*: expected",
+        )
+        for part, place, entry in (
+            ("points", "from", {"point": "D", "body": "OA", "along": "CD"}),
+            ("points", "along", {"point": "D", "body": "OA"}),
+            ("points", "across", {"point": "D", "body": "OA"}),
+            ("points", "dyad", FOUR_BAR["points"][0]),
+            ("points", "lengths", FOUR_BAR["points"][0]),
+            ("bodies", "name", CRANK),
+            ("bodies", "points", CRANK),
+            ("bodies", "role", CRANK),
+            *(("joints", k, ["O", "OA", "frame"]) for k in range(3)),
+        )
+    },
     "numbers of a body": (
         FOUR_BAR | {"bodies": [CRANK, COUPLER | {"mass": 2.0}, ROCKER]},
         r"bodies\[1\]: a structure has no mass.*Geometry\(mechanism",
