@@ -7,7 +7,6 @@ from agents import carry_over
 from agents.runs import make_env
 from agents.score import score_vector
 from agents.ship import POLICIES
-from hoof_env.errors import DataFileError, ParameterError
 
 LEG, FIXED = "hoof_env/HorseLeg-v0", "hoof_env/HorseLegFixed-v0"
 AGENT = str(POLICIES / "HorseLeg-v0")
@@ -45,11 +44,3 @@ def test_the_same_command_goes_on(tmp_path, capsys, monkeypatch):
     carry_over.main(command)
     assert (tmp_path / carry_over.TABLE).read_text() == first
     assert "HorseLeg-v0" in capsys.readouterr().out
-
-
-def test_what_cannot_be_is_refused(tmp_path):
-    with pytest.raises(ParameterError, match="--strengths"):
-        carry_over.main(["--strengths", "0", "--out", str(tmp_path)])
-    (tmp_path / carry_over.TABLE).write_text("a,b\n1,2\n")
-    with pytest.raises(DataFileError, match="expected the columns"):
-        carry_over.main([AGENT, "--out", str(tmp_path)])

@@ -1,14 +1,11 @@
 """The search for a four-bar leg, the figures of feet's paths, and the page that compares legs."""
 
-import json
-
 import numpy as np
 import pytest
 
 from agents import four_bar, legs
 from agents.foot_paths import figures, path_of
 from agents.stock_plan import COLUMNS, FIGURES, LEG, LEGS
-from hoof_env.errors import DataFileError
 from hoof_env.gait import GaitParameters, load_gait
 from hoof_env.leg.geometry import load_geometry
 
@@ -60,13 +57,6 @@ def test_gaits_of_the_presets_are_those_that_were_found():
     for preset in LEGS:
         for name in ("walk", "run"):
             assert load_gait(name, preset) == gaits[preset][name]
-
-
-def test_a_file_of_gaits_that_is_none_is_refused(tmp_path):
-    path = tmp_path / "gaits.json"
-    path.write_text(json.dumps({"jansen": {}}), encoding="utf-8")
-    with pytest.raises(DataFileError, match=r"gaits.json: expected the gaits of agents.legs --search"):
-        legs.read_gaits(path)
 
 
 def test_trainings_that_are_there_have_a_line(tmp_path):

@@ -15,6 +15,7 @@ import torch
 from agents import (
     baselines,
     baselines_run,
+    carry_over,
     command,
     dataset,
     demo,
@@ -22,6 +23,7 @@ from agents import (
     evaluate,
     falls,
     judge,
+    legs,
     open_loop,
     score,
     ship,
@@ -30,11 +32,13 @@ from agents import (
     tune,
 )
 from agents.settings import ALGORITHMS, algorithm_class, load_settings, model_arguments
+from agents.ship import POLICIES
 from hoof_env.errors import DataFileError, HoofEnvError, MissingExtraError, OutputError, ParameterError
 from tests.agents.conftest import ENV_ID, SHORT, TINY, train_tiny
 
 GPU = torch.cuda.is_available()
 CORES = os.cpu_count() or 1
+AGENT = str(POLICIES / "HorseLeg-v0")
 MINARI = importlib.util.find_spec("minari") is not None
 
 
@@ -259,6 +263,19 @@ CASES = [
         r"--froude: expected a finite number in \(0, inf\], got -1", "reference", "--froude", "-1"
     ),
     case(lambda _: falls.main(["--strengths", "11"]), "--strengths: expected .* got 11"),
+    case(lambda folder: carry_over.main(["--strengths", "0", "--out", str(folder)]), "--strengths"),
+    case(
+        lambda folder: carry_over.main([AGENT, "--out", str(folder)]),
+        "expected the columns",
+        DataFileError,
+        **{carry_over.TABLE: "a,b\n1,2\n"},
+    ),
+    case(
+        lambda folder: legs.read_gaits(folder / "gaits.json"),
+        r"gaits.json: expected the gaits of agents.legs --search",
+        DataFileError,
+        **{"gaits.json": '{"jansen": {}}'},
+    ),
     *(
         collects("dataset_id: expected NAMESPACE/NAME-vK", "run", "--dataset-id", name)
         for name in ("foo", "x/foo-v0", "a b-v0", "ab/../foo-v0", "/foo-v0", "ab/foo-v")

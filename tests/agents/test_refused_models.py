@@ -1,5 +1,6 @@
 """Models on disk that do not fit or are damaged, by the words of each error: runs, plain or as a zip
-(`RUNS`), ONNX files (`EXPORTS`), requests to `agents.export` (`REQUESTS`)."""
+(`RUNS`), ONNX files (`EXPORTS`), requests to `agents.export` (`REQUESTS`), policies that `agents.score` does
+not play (`SCORES`)."""
 
 import json
 import os
@@ -8,16 +9,18 @@ import sys
 from importlib.util import find_spec
 from pathlib import Path
 
+import numpy as np
 import pytest
 import torch
 from safetensors.torch import load_file, save_file
 
-from agents import export
+from agents import export, score
 from agents.runs import SavedModel, make_env
 from agents.score import find_policy
+from hoof_env.envs.policies import GAITS
 from hoof_env.errors import DataFileError, HoofEnvError, OutputError, ParameterError
 from hoof_env.saved_policy import ABOUT, WEIGHTS, OnnxPolicy
-from tests.agents.conftest import ENV_ID, KWARGS, change, save_untrained
+from tests.agents.conftest import ENV_ID, KWARGS, SHORT, change, save_untrained
 
 RAIL = "hoof_env/HorseLegRail-v0"
 
@@ -256,3 +259,75 @@ def test_missing_packages(package, call, run, exported, tmp_path, monkeypatch):
     with pytest.raises(HoofEnvError, match=rf"{package}: pip install \"hoof-env\[.*onnx\]\""):
         call(run, exported, tmp_path / "policy.onnx")
     assert not list(tmp_path.iterdir())
+
+
+# What `agents.score` plays: nothing that was found or trained for something else
+
+RUN_GAIT = GAITS / "HorseLegRail-v0-constant.json"
+
+
+def refuses(observations):
+    """A policy with actions that cannot be."""
+    return np.full((len(observations), 3), np.nan)
+
+
+def found_as(**values):
+    """A file of a gait with other entries."""
+
+    def write(folder, trained):
+        path = folder / "gait.json"
+        path.write_text(json.dumps({**json.loads(RUN_GAIT.read_text()), **values}))
+        return path
+
+    return write
+
+
+def trained_as(part, **values):
+    """A run whose record has other entries in a part."""
+
+    def write(folder, trained):
+        copied = Path(shutil.copytree(trained.folder, folder / "run"))
+        kept = json.loads((copied / "run.json").read_text())[part]
+        change(copied / "run.json", **{part: {**kept, **values}})
+        return copied
+
+    return write
+
+
+def as_it_was(folder, trained):
+    return trained.folder
+
+
+SCORES = [
+    (as_it_was, {"env_id": RAIL, "env_kwargs": SHORT}, "trained for env_id hoof_env/HorseLeg-v0"),
+    (as_it_was, {"env_kwargs": ("episode_seconds=1",)}, "episode_seconds=0.4, here .* another task"),
+    (as_it_was, {"env_kwargs": (*SHORT, "friction=0.1")}, "trained with friction"),
+    (trained_as("settings", preset="pony.json"), {}, "preset='pony.json', here 'identified'"),
+    (trained_as("versions", **{"hoof-env": "0.0.1"}), {}, "hoof-env 0.0.1, here"),
+    (found_as(), {"env_id": ENV_ID}, " found for hoof_env/HorseLegRail-v0"),
+    (found_as(versions={"hoof-env": "9.9.9"}), {"env_id": RAIL}, " found for hoof-env 9.9.9, here"),
+    (
+        found_as(env_kwargs={"preset": "first_fit"}),
+        {"env_id": RAIL, "env_kwargs": ("preset=identified",)},
+        "preset='first_fit', here",
+    ),
+    *(
+        (lambda folder, trained, name=name: name, {}, words)
+        for name, words in (
+            ("nobody:act", "expected MODULE:NAME, got 'nobody:act'"),
+            (f"{__name__}:walk", "expected MODULE:NAME"),
+            (f"{__name__}:RUN_GAIT", "expected a function of observations"),
+            (f"{__name__}:refuses", r"expected finite actions of shape \(100, 4\)"),
+            ("gallop", "policy: expected a name"),
+        )
+    ),
+]
+"""Function of a folder and a run that gives a policy, other arguments of the command, and words."""
+
+
+@pytest.mark.parametrize(("policy", "kwargs", "words"), SCORES)
+def test_scores(policy, kwargs, words, trained, tmp_path, monkeypatch):
+    if "finite actions" not in words:
+        monkeypatch.setattr(score, "score_vector", lambda *_, **__: pytest.fail("was played"))
+    with pytest.raises(HoofEnvError, match=words):
+        score.score(score.Args((str(policy(tmp_path, trained)),), **kwargs))

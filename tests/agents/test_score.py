@@ -13,8 +13,8 @@ from agents import score
 from agents.open_loop import decode
 from agents.runs import make_env
 from agents.score import Args, find_policy, play, score_vector
-from hoof_env.envs.policies import GAITS, Scripted, open_loop
-from hoof_env.errors import DataFileError, HoofEnvError
+from hoof_env.envs.policies import Scripted, open_loop
+from hoof_env.errors import DataFileError
 from hoof_env.saved_record import environment_of
 from tests.agents.conftest import ENV_ID, KWARGS, SHORT
 
@@ -86,14 +86,6 @@ def act(observations):
     return np.repeat(-0.1 * observations[:, :1], 4, axis=1)
 
 
-def refuses(observations):
-    return np.full((len(observations), 3), np.nan)
-
-
-RAIL = "hoof_env/HorseLegRail-v0"
-RUN_GAIT = GAITS / "HorseLegRail-v0-constant.json"
-
-
 def test_each_policy_gets_the_line_of_the_table(capsys, tmp_path, monkeypatch, trained):
     monkeypatch.setattr(score, "FINAL_SEEDS", range(1_000_000, 1_000_005))
     other = shutil.copytree(trained.folder, tmp_path / "other")
@@ -113,57 +105,11 @@ def test_each_policy_gets_the_line_of_the_table(capsys, tmp_path, monkeypatch, t
     assert [float(row["return"]) for row in rows[:5]] == [one["return"] for one in episodes]
 
 
-@pytest.mark.parametrize(
-    ("policy", "kwargs", "message"),
-    [
-        ("trained", {"env_id": RAIL, "env_kwargs": SHORT}, "trained for env_id hoof_env/HorseLeg-v0"),
-        ("trained", {"env_kwargs": ("episode_seconds=1",)}, "episode_seconds=0.4, here .* another task"),
-        ("trained", {"env_kwargs": (*SHORT, "friction=0.1")}, "trained with friction"),
-        (str(RUN_GAIT), {"env_id": ENV_ID}, " found for hoof_env/HorseLegRail-v0"),
-        ("another version", {"env_id": RAIL}, " found for hoof-env 9.9.9, here"),
-        ("another leg", {"env_id": RAIL, "env_kwargs": ("preset=identified",)}, "preset='first_fit', here"),
-        ("nobody:act", {}, "expected MODULE:NAME, got 'nobody:act'"),
-        (f"{__name__}:walk", {}, "expected MODULE:NAME"),
-        (f"{__name__}:RUN_GAIT", {}, "expected a function of observations"),
-        (f"{__name__}:refuses", {}, r"expected finite actions of shape \(100, 4\)"),
-        ("gallop", {}, "policy: expected a name"),
-    ],
-)  # fmt: skip
-def test_a_policy_for_something_else_is_refused(policy, kwargs, message, trained, monkeypatch, tmp_path):
-    if policy.startswith("another"):
-        gait = json.loads(RUN_GAIT.read_text())
-        of_leg = {"env_kwargs": {"preset": "first_fit"}}
-        gait |= of_leg if "leg" in policy else {"versions": {"hoof-env": "9.9.9"}}
-        (tmp_path / "gait.json").write_text(json.dumps(gait))
-        policy = str(tmp_path / "gait.json")
-    if "refuses" not in policy:
-        monkeypatch.setattr(score, "score_vector", lambda *_, **__: pytest.fail("was played"))
-    with pytest.raises(HoofEnvError, match=message):
-        score.score(Args((str(trained.folder) if policy == "trained" else policy,), **kwargs))
-
-
 def test_a_model_without_a_record_is_told(trained, tmp_path, monkeypatch):
     monkeypatch.setattr(score, "score_vector", lambda *_, **__: [])
     bare = shutil.copy(trained.folder / "model.zip", tmp_path / "bare.zip")
     with pytest.warns(UserWarning, match=r"bare.zip: nothing says what it was trained for"):
         score.score(Args((str(bare),), env_kwargs=SHORT))
-
-
-def test_a_policy_of_another_leg_or_version_is_refused(trained, tmp_path):
-    for change, said in (
-        (
-            lambda record: record["settings"].update(preset="pony.json"),
-            "preset='pony.json', here 'identified'",
-        ),
-        (lambda record: record["versions"].update({"hoof-env": "0.0.1"}), "hoof-env 0.0.1, here"),
-    ):
-        folder = tmp_path / said[:6]
-        shutil.copytree(trained.folder, folder)
-        record = json.loads((folder / "run.json").read_text())
-        change(record)
-        (folder / "run.json").write_text(json.dumps(record))
-        with pytest.raises(DataFileError, match=said):
-            score.score(Args((str(folder),)))
 
 
 class TestIdsOfFiles:

@@ -224,33 +224,6 @@ def test_options_go_before_a_schedule():
 
 
 @pytest.mark.parametrize(
-    ("words", "schedule"),
-    [
-        (r"schedule: expected a mapping with some of strength, .*, got \{'dt'", {"dt": [1, 2, 3]}),
-        (r"schedule: expected a mapping", [1, 2]),
-        (r"schedule\['strength'\]: expected \[first, last, control steps\], got", {"strength": [0, 1]}),
-        (r"schedule\['strength'\], last: expected .*10.*, got 11", {"strength": [0, 11, 5]}),
-        (r"schedule\['strength'\], control steps: expected .*, got 0", {"strength": [0, 1, 0]}),
-        (r"schedule\['strength'\], control steps: expected .*, got 2.5", {"strength": [0, 1, 2.5]}),
-        (r"friction: expected .*, got -0.1", {"friction": [0.5, -0.1, 5]}),
-        (r"schedule\['friction'\], first.*expected .*, got nan", {"friction": [float("nan"), 0.1, 5]}),
-        (r"schedule\['target_speed'\], last: target_speed", {"target_speed": [1.0, [3.0, 2.0], 5]}),
-        (r"schedule\['motor_gain'\], first.*expected drive='motor'", {"motor_gain": [50.0, 90.0, 5]}),
-    ],
-)  # fmt: skip
-def test_refused_schedules(words, schedule):
-    with pytest.raises(ParameterError, match=words):
-        gym.make(LEG, schedule=schedule)
-
-
-def test_what_is_drawn_and_scheduled_is_refused():
-    with pytest.raises(ParameterError, match=r"schedule\['friction'\]: expected none beside randomize"):
-        gym.make(LEG, schedule={"friction": [0.1, 0.2, 5]}, randomize={"friction": (0.2, 0.3)})
-    with pytest.raises(ParameterError, match=r"schedule.*expected a target_speed beside it, got None"):
-        gym.make("hoof_env/HorseLegRail-v0", schedule={"target_speed": [1.0, 2.0, 5]})
-
-
-@pytest.mark.parametrize(
     ("name", "value", "course"),
     [
         ("friction", 0.3, [0.8, 0.2, 30]),

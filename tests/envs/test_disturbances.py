@@ -5,7 +5,6 @@ from __future__ import annotations
 import copy
 import pickle
 
-import gymnasium as gym
 import numpy as np
 import pytest
 from family import HORSE, actions, make, same, steps
@@ -302,40 +301,6 @@ def test_an_end_has_its_reason_and_says_whether_it_was_a_success():
         *_, infos = learners.step(np.zeros((2, 4), np.float32))
     assert {type(info["is_success"]) for info in infos} == {bool}
     assert [info["end"] for info in infos] == ["time limit"] * 2
-
-
-REFUSED = [
-    (LEG, {"noise": {"target": 0.1}}, "noise: expected a mapping with some of the groups that are observed"),
-    (LEG, {"noise": 0.1}, "noise: expected a mapping"),
-    (LEG, {"bias": {"trunk": -0.1}}, r"bias\['trunk'\]: expected a finite number"),
-    (LEG, {"noise": {"trunk": float("nan")}}, r"noise\['trunk'\]: expected"),
-    (LEG, {"strength": 11.0}, "strength: expected"),
-    (LEG, {"push_seconds": (1.0, 2.0)}, "push_seconds: expected a push_impulse"),
-    (LEG, {"push_impulse": 10.0, "push_seconds": 0.001}, r"push_seconds\[0\]: expected"),
-    (LEG, {"push_impulse": (3.0, -3.0)}, r"push_impulse\[1\]: expected"),
-    (LEG, {"push_impulse": 3.0, "pushes": [[1.0, 2.0, 0.0]]}, "pushes: expected none beside a push_impulse"),
-    (LEG, {"pushes": [[1.0, 2.0]]}, r"pushes\[0\]: expected \[s, N s forward, N s upward\]"),
-    (LEG, {"pushes": [[10.0, 2.0, 0.0]]}, r"pushes\[0\], time: expected"),
-    (LEG, {"drive": "motor", "push_impulse": 3.0}, 'push_impulse: expected none with drive="motor"'),
-    (RAIL, {"pushes": [[1.0, 2.0, 1.0]]}, "pushes: expected no impulse upward on a rail"),
-    (LEG, {"push_impulse": 2e5}, r"push_impulse\[0\]: expected a finite number in \[-100000, 100000\]"),
-    (
-        LEG,
-        {"pushes": [[1.0, 9e4, 0.0], [1.0, 9e4, 0.0]]},
-        r"pushes\[1\], impulse: expected a finite number in",
-    ),
-    (FIXED, {"noise": {"trunk": 0.1}}, "noise: nothing of 'trunk' is observed on a fixed trunk"),
-    (FIXED, {"bias": {"trunk": 0.1}}, "bias: nothing of 'trunk' is observed on a fixed trunk"),
-    (FIXED, {"push_impulse": 3.0}, "push_impulse: expected"),
-    (FIXED, {"pushes": [[0.5, 2.0, 0.0]]}, "pushes: expected"),
-    (FIXED, {"solver": "paper", "pushes": [[0.5, 2.0, 0.0]]}, "pushes: expected"),
-]
-
-
-@pytest.mark.parametrize(("env_id", "settings", "words"), REFUSED, ids=str)
-def test_what_cannot_be_is_refused_in_words(env_id, settings, words):
-    with pytest.raises(ParameterError, match=words):
-        gym.make(env_id, **settings)
 
 
 def test_calls_and_options_that_cannot_be_are_refused_and_change_nothing():

@@ -59,11 +59,6 @@ def test_gaits_of_presets_carry_the_trunk_and_keep_their_speed(preset):
     assert speeds["run"] > 2.0
 
 
-def test_a_horse_refuses_them_with_words():
-    with pytest.raises(ParameterError, match="geometry 'klann': expected the paper's mechanism"):
-        gym.make("hoof_env/Horse-v0", preset="klann")
-
-
 @pytest.mark.parametrize("preset", PRESETS)
 def test_the_paper_is_not_reproduced_by_another_leg(preset):
     from hoof_env.paper.reproduce import reproduce

@@ -218,7 +218,118 @@ SIZES = [
 ]
 """Sizes of pictures."""
 
-ROWS = [(env_id, *row) for env_id, rows in SETTINGS.items() for row in rows] + EFFECTS + SIZES
+DISTURBANCES = [
+    (LEG, {"noise": {"target": 0.1}}, "noise: expected a mapping with some of the groups that are observed"),
+    (LEG, {"noise": 0.1}, "noise: expected a mapping"),
+    (LEG, {"bias": {"trunk": -0.1}}, r"bias\['trunk'\]: expected a finite number"),
+    (LEG, {"noise": {"trunk": NAN}}, r"noise\['trunk'\]: expected"),
+    *((LEG, {"strength": value}, "strength: expected") for value in (11.0, True, np.array(True), "1", 1j)),
+    (LEG, {"push_seconds": (1.0, 2.0)}, "push_seconds: expected a push_impulse"),
+    (LEG, {"push_impulse": 10.0, "push_seconds": 0.001}, r"push_seconds\[0\]: expected"),
+    (LEG, {"push_impulse": (3.0, -3.0)}, r"push_impulse\[1\]: expected"),
+    (LEG, {"push_impulse": 3.0, "pushes": [[1.0, 2.0, 0.0]]}, "pushes: expected none beside a push_impulse"),
+    (LEG, {"pushes": [[1.0, 2.0]]}, r"pushes\[0\]: expected \[s, N s forward, N s upward\]"),
+    (LEG, {"pushes": [[10.0, 2.0, 0.0]]}, r"pushes\[0\], time: expected"),
+    (LEG, {"drive": "motor", "push_impulse": 3.0}, 'push_impulse: expected none with drive="motor"'),
+    (RAIL, {"pushes": [[1.0, 2.0, 1.0]]}, "pushes: expected no impulse upward on a rail"),
+    (LEG, {"push_impulse": 2e5}, r"push_impulse\[0\]: expected a finite number in \[-100000, 100000\]"),
+    (
+        LEG,
+        {"pushes": [[1.0, 9e4, 0.0], [1.0, 9e4, 0.0]]},
+        r"pushes\[1\], impulse: expected a finite number in",
+    ),
+    (FIXED, {"noise": {"trunk": 0.1}}, "noise: nothing of 'trunk' is observed on a fixed trunk"),
+    (FIXED, {"bias": {"trunk": 0.1}}, "bias: nothing of 'trunk' is observed on a fixed trunk"),
+    (FIXED, {"push_impulse": 3.0}, "push_impulse: expected"),
+    (FIXED, {"pushes": [[0.5, 2.0, 0.0]]}, "pushes: expected"),
+    (FIXED, {"solver": "paper", "pushes": [[0.5, 2.0, 0.0]]}, "pushes: expected"),
+]
+"""Noise, pushes and how strong they are."""
+
+DELAYS = [
+    *(
+        (LEG, given, words)
+        for given, words in (
+            ({"action_delay": 500.0}, r"action_delay: expected a finite number in \[0, 499\]"),
+            ({"observation_delay": -1}, "observation_delay: expected"),
+            (
+                {"observation_delay": 0.51},
+                "observation_delay: expected whole substeps, of which a control step has 20",
+            ),
+            ({"action_delay": (0.5, 1)}, "action_delay: expected whole numbers of a range"),
+            ({"action_delay": (2, 1)}, r"action_delay\[1\]: expected"),
+            ({"observation_history": 0}, "observation_history: expected a whole number, 1 or more"),
+            ({"last_actions": 1.5}, "last_actions: expected a whole number"),
+            ({"privileged": ["nothing"]}, "privileged: expected a list of some of"),
+            ({"privileged": "trunk"}, "privileged: expected a list of some of"),
+            ({"privileged": 3}, "privileged: expected a list of some of"),
+            ({"privileged": None}, "privileged: expected a list of some of"),
+            (
+                {"privileged": ["target"], "target_speed": None},
+                "privileged: 'target' is constant without target_speed",
+            ),
+            ({"privileged": ["ground"]}, "privileged: 'ground' is constant without terrain"),
+            ({"episode_seconds": 0.02, "action_delay": 1}, "action_delay: expected"),
+        )
+    ),
+    (FIXED, {"privileged": ["trunk"]}, "privileged: nothing of 'trunk' is observed on a fixed trunk"),
+    (FIXED, {**PAPER, "last_actions": 1, "action_delay": 0.5}, "whole steps"),
+]
+"""Delays, and what is observed besides."""
+
+SCHEDULES = [
+    (
+        LEG,
+        {"schedule": {"dt": [1, 2, 3]}},
+        r"schedule: expected a mapping with some of strength, .*, got \{'dt'",
+    ),
+    (LEG, {"schedule": [1, 2]}, r"schedule: expected a mapping"),
+    (
+        LEG,
+        {"schedule": {"strength": [0, 1]}},
+        r"schedule\['strength'\]: expected \[first, last, control steps\], got",
+    ),
+    (LEG, {"schedule": {"strength": [0, 11, 5]}}, r"schedule\['strength'\], last: expected .*10.*, got 11"),
+    (
+        LEG,
+        {"schedule": {"strength": [0, 1, 0]}},
+        r"schedule\['strength'\], control steps: expected .*, got 0",
+    ),
+    (
+        LEG,
+        {"schedule": {"strength": [0, 1, 2.5]}},
+        r"schedule\['strength'\], control steps: expected .*, got 2.5",
+    ),
+    (LEG, {"schedule": {"friction": [0.5, -0.1, 5]}}, r"friction: expected .*, got -0.1"),
+    (LEG, {"schedule": {"friction": [NAN, 0.1, 5]}}, r"schedule\['friction'\], first.*expected .*, got nan"),
+    (
+        LEG,
+        {"schedule": {"target_speed": [1.0, [3.0, 2.0], 5]}},
+        r"schedule\['target_speed'\], last: target_speed",
+    ),
+    (
+        LEG,
+        {"schedule": {"motor_gain": [50.0, 90.0, 5]}},
+        r"schedule\['motor_gain'\], first.*expected drive='motor'",
+    ),
+    (
+        LEG,
+        {"schedule": {"friction": [0.1, 0.2, 5]}, "randomize": {"friction": (0.2, 0.3)}},
+        r"schedule\['friction'\]: expected none beside randomize",
+    ),
+    (
+        RAIL,
+        {"schedule": {"target_speed": [1.0, 2.0, 5]}},
+        r"schedule.*expected a target_speed beside it, got None",
+    ),
+]
+"""Changes of settings over control steps."""
+
+LEGS = [(HORSE, {"preset": "klann"}, "geometry 'klann': expected the paper's mechanism")]
+ROWS = [
+    *((env_id, *row) for env_id, rows in SETTINGS.items() for row in rows),
+    *(row for rows in (EFFECTS, SIZES, DISTURBANCES, DELAYS, SCHEDULES, LEGS) for row in rows),
+]
 NAMES = [f"{row[0][9:]}-{row[1]}"[:90] for row in ROWS]
 
 
