@@ -171,6 +171,9 @@ PREFERRED = {
     r"make again": "reproduce",
     r"grants": "rewards",
     r"one's own": "your own",
+    r"\btrainings\b": "training runs",
+    r"\bbeside\b": "next to, compared with",
+    r"turn\w* (?:it )?round": "flip, reverse",
 }
 """Words that pages no longer use, and those that they use instead."""
 

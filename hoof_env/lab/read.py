@@ -126,8 +126,8 @@ def read_record(
     Args:
         path: the file.
         mapping: columns of the file by their meaning: "time", "force_x" and "force_y" of one limb,
-            "left_fore_force_x" and so on of several; a "-" before a column turns it round, and a "+" between
-            columns adds them, as those of several plates. "Fz#2" is the second column with the name Fz, "#3"
+            "left_fore_force_x" and so on of several; a "-" before a column flips its sign, and a "+" between
+            columns adds them, for several plates. "Fz#2" is the second column with the name Fz, "#3"
             the third column of the file. A new name for a limb of the file, as in left_fore="plate_1",
             renames that limb; left_fore="plate_1+plate_3" is the sum of both.
         unit: unit of the forces, one of `FORCE_UNITS`; "auto" takes the unit that the file states.

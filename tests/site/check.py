@@ -15,6 +15,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from functools import partial
 from http.server import SimpleHTTPRequestHandler, ThreadingHTTPServer
+from io import BytesIO
 from itertools import product
 from pathlib import Path
 
@@ -38,6 +39,26 @@ PICTURES = {
     "evidence": ("docs/evidence/README.html", 1280, "dark"),
 }
 """Pages to take pictures of: file, width, scheme."""
+
+SHEETS = ("index", "start", "environments/README", "environments/HorseLeg", "task", "engine", "horse", "help")
+"""Pages of docs on the contact sheets, in rows of four."""
+
+QUESTIONS = (
+    "install",
+    "slow first start",
+    "weight share",
+    "cost of transport",
+    "which environment",
+    "custom reward",
+    "open loop",
+    "force plate c3d",
+    "GPU",
+    "trot",
+)
+"""What a newcomer may search for."""
+
+TALL, SHEET_WIDTH = 1.6, {1280: 460, 390: 220}
+"""Part of a page on a sheet, over the height of a window; width of a page there [pixels]."""
 
 TOO_WIDE = "document.documentElement.scrollWidth - document.documentElement.clientWidth"
 BAD_IMAGES = (
@@ -108,11 +129,49 @@ def take_pictures(browser: Browser, root: str, out: Path) -> None:
         page.close()
 
 
+def answers(browser: Browser, root: str) -> str:
+    """Return the first three results of a search for each of `QUESTIONS`, as rows of a table."""
+    rows = ["| search for | first | second | third |", "|---|---|---|---|"]
+    for question in QUESTIONS:
+        page = browser.new_page()
+        page.goto(f"{root}/search.html?q={question.replace(' ', '+')}")
+        page.wait_for_selector("#search-results ul.search li", timeout=60_000)
+        page.wait_for_timeout(2_000)  # results come in one after the other
+        found = page.locator("#search-results ul.search > li > a:first-of-type").all_inner_texts()
+        rows.append(f"| {' | '.join([question, *found[:3]])} |")
+        page.close()
+    return "\n".join(rows)
+
+
+def take_sheets(browser: Browser, root: str, out: Path) -> None:
+    """Write a contact sheet for each width and scheme of colours: the first part of each of `SHEETS`."""
+    from PIL import Image
+
+    out.mkdir(parents=True, exist_ok=True)
+    for width, scheme in product(HEIGHTS, ("light", "dark")):
+        shots = []
+        for name in SHEETS:
+            size = {"width": width, "height": int(TALL * HEIGHTS[width])}
+            page = browser.new_page(viewport=size, color_scheme=scheme)
+            page.goto(f"{root}/docs/{name}.html", wait_until="load")
+            shots.append(Image.open(BytesIO(page.screenshot(animations="disabled"))).convert("RGB"))
+            page.close()
+        narrow = SHEET_WIDTH[width]
+        tall = narrow * shots[0].height // shots[0].width
+        sheet = Image.new("RGB", (4 * narrow + 30, 2 * tall + 10), (128, 128, 128))
+        for k, shot in enumerate(shots):
+            place = (k % 4 * (narrow + 10), k // 4 * (tall + 10))
+            sheet.paste(shot.resize((narrow, tall), Image.Resampling.LANCZOS), place)
+        sheet.save(out / f"{width}-{scheme}.webp", quality=60, method=6)
+
+
 def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--site", type=Path, default=SITE, help="the folder that make docs wrote")
     parser.add_argument("--only", default="", help="pages whose path has this alone")
     parser.add_argument("--pictures", type=Path, help="also write pictures of some pages there")
+    parser.add_argument("--sheets", type=Path, help="only write contact sheets of eight pages there")
+    parser.add_argument("--search", action="store_true", help="only print what searches find")
     parser.add_argument("--all", action="store_true", help="both widths, light and dark each")
     given = parser.parse_args()
     windows = tuple(product(HEIGHTS, ("light", "dark"))) if given.all else WINDOWS
@@ -124,6 +183,13 @@ def main() -> int:
     chromium = os.environ.get("CHROMIUM") or shutil.which("chromium") or shutil.which("chromium-browser")
     with served(given.site) as root, sync_playwright() as players:
         browser = players.chromium.launch(executable_path=chromium)
+        if given.sheets or given.search:
+            if given.sheets:
+                take_sheets(browser, root, given.sheets)
+            if given.search:
+                print(answers(browser, root))
+            browser.close()
+            return 0
         for file in files:
             for width, scheme in windows:
                 for fault in faults_of(browser, f"{root}/{file}", width, scheme):
