@@ -20,10 +20,10 @@ LONGEST_FUNCTION, LONGEST_CLASS, LONGEST_FILE = 60, 250, 450
 MOST_PARAMETERS, MOST_OF_KERNELS = 8, 12
 
 MOST = {
-    "packed": 97,
-    "unformatted": 11,
+    "packed": 25,
+    "unformatted": 5,
     "fragments": 0,
-    "people": 2,
+    "people": 1,
     "long_functions": 1,
     "long_classes": 1,
     "long_files": 0,

@@ -250,7 +250,8 @@ def write_pages(out: Path, films: Path | None = None) -> list[Path]:
 
 def _shortened(whole: Mapping[str, str]) -> dict[str, str]:
     """Return the files of all pages by name: what they share, and what is left of each."""
-    usual, horse = shared_sections(whole[COMMON]), shared_sections(whole[HORSES[0]])
+    usual = shared_sections(whole[COMMON])
+    horse = shared_sections(whole[HORSES[0]])
     of_horse = without_common(horse, {"common": _with_id(usual, COMMON, HORSES[0])})
     texts = {
         "common.md": WORDS["common"].lstrip() + usual,

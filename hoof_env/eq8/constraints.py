@@ -65,7 +65,10 @@ class Constraints:
         """Evaluate everything at coordinates q, rates qd (shape (size,) each) and a `MOTION` record."""
         x = np.append(q, (0.0, 0.0, motion["phi"])).reshape(-1, 3)
         v = np.append(qd, (0.0, 0.0, motion["phi_rate"]))
-        i, j, x_rows, y_rows = self._i, self._j, self._x_rows, self._y_rows
+        i = self._i
+        j = self._j
+        x_rows = self._x_rows
+        y_rows = self._y_rows
         centre = x[:, 0] + 1j * x[:, 1]
         e = np.exp(1j * x[:, 2])
         rate = v[2::3]

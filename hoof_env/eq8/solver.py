@@ -115,7 +115,8 @@ class ConstrainedLeg:
     ) -> None:
         if not geometry.full_turn:
             check_full_revolution(geometry)
-        self.geometry, self.ground = geometry, ground
+        self.geometry = geometry
+        self.ground = ground
         filters = filters or FilterSettings()
         self.sim_dt = check_number("sim_dt", sim_dt, low=1e-7, high=filters.longest_step)
         self.alpha = check_number("alpha", alpha, low=0)
@@ -139,9 +140,13 @@ class ConstrainedLeg:
         self._weight = np.zeros(size)
         self._weight[1::3] = -masses * GRAVITY  # Eq. 7
         self.state = ConstrainedState(
-            np.zeros(1, BODY)[0], np.zeros(1, MOTION)[0], steady_filters(np.zeros(4)), new_contacts(),
-            np.zeros(size), np.zeros(size),
-        )  # fmt: skip
+            np.zeros(1, BODY)[0],
+            np.zeros(1, MOTION)[0],
+            steady_filters(np.zeros(4)),
+            new_contacts(),
+            np.zeros(size),
+            np.zeros(size),
+        )
 
     def reset(
         self,
@@ -163,8 +168,11 @@ class ConstrainedLeg:
             raise ParameterError(
                 f"height, speed: a fixed trunk rests at {self.trunk.height:g} m, got {height!r} and {speed!r}"
             )
-        state, command = self.state, gait_array(gait, 1)
-        state.body["time"], state.body["x"], state.motion["theta"] = 0.0, x, theta
+        state = self.state
+        command = gait_array(gait, 1)
+        state.body["time"] = 0.0
+        state.body["x"] = x
+        state.motion["theta"] = theta
         state.filters[:] = steady_filters(command)
         state.contacts[:] = new_contacts()
         evaluate_motion(state.motion, state.filters)
@@ -185,7 +193,8 @@ class ConstrainedLeg:
         command = np.asarray(command, dtype=np.float64)
         if command.shape != (4,):
             raise ParameterError(f"command: expected 4 values {PARAMETERS}, got shape {command.shape}")
-        before, result = self.state.copy(), Result.OK
+        before = self.state.copy()
+        result = Result.OK
         try:
             with np.errstate(all="ignore"):  # a diverging integration is a result, not a warning
                 for k, row in enumerate(trace):
@@ -208,7 +217,8 @@ class ConstrainedLeg:
 
     def reactions(self) -> Reactions:
         """Joint forces and moments at the present state, ground included."""
-        closure, travel = self.closure(), self._travel
+        closure = self.closure()
+        travel = self._travel
         _, multipliers = self._solve(closure, self._ground_load())
         load = -multipliers  # the constraints load the bodies with -Phi_q^T lambda; Phi_q is +1 at body i
         rows = self.constraints.joint_rows
@@ -225,7 +235,8 @@ class ConstrainedLeg:
 
         def acceleration(elapsed: float, q: Vector, qd: Vector) -> Vector:
             # Ground forces stay out: they do not change qdd, and a contact must not latch at a stage.
-            motion, filters = state.motion.copy(), state.filters.copy()
+            motion = state.motion.copy()
+            filters = state.filters.copy()
             advance_motion(motion, filters, elapsed)
             evaluate_motion(motion, filters)
             return self._solve(self.constraints(q, qd, motion))[0]
@@ -237,7 +248,8 @@ class ConstrainedLeg:
 
     def _evaluate(self, command: NDArray[np.float64], row: np.void) -> bool:
         """Contact and multipliers at the present instant; fills `row`, returns whether these are finite."""
-        state, travel = self.state, self._travel
+        state = self.state
+        travel = self._travel
         command_filters(state.filters, command, self._settings)
         evaluate_motion(state.motion, state.filters)
         trunk = complex(state.body["x"], self.trunk.height)
@@ -252,26 +264,35 @@ class ConstrainedLeg:
         closure = self.closure()
         _, multipliers = self._solve(closure, self._ground_load())
         # The drives bring in lambda . Phi_t, so the torques are lambda . dPhi/dtheta and lambda . dPhi/dphi.
-        crank, hip = multipliers[-1], multipliers @ closure.by_phi
+        crank = multipliers[-1]
+        hip = multipliers @ closure.by_phi
         self._report(row, float(crank), float(hip))
         return bool(np.isfinite(multipliers).all())
 
     def _report(self, row: np.void, crank: float, hip: float) -> None:
         """Fill a row of dtype `TRACE`; `crank` and `hip` are the torques of the drives [N m]."""
-        body, motion = self.state.body, self.state.motion
-        row["time"], row["x"], row["y"] = body["time"], body["x"], self.trunk.height
-        row["centre_x"], row["centre_y"] = row["x"], row["y"]
+        body = self.state.body
+        motion = self.state.motion
+        row["time"] = body["time"]
+        row["x"] = body["x"]
+        row["y"] = self.trunk.height
+        row["centre_x"] = row["x"]
+        row["centre_y"] = row["y"]
         for name, symbol in zip(MOTION_NAMES, MOTION.names or (), strict=True):
             row[name] = motion[symbol]
         for name, command in zip(PARAMETERS, self.state.filters, strict=True):
-            row[name], row[f"{name}_rate"] = command["value"], command["rate"]
-        row["crank_torque"], row["crank_power"] = crank, crank * motion["theta_rate"]
-        row["hip_torque"], row["hip_power"] = hip, hip * motion["phi_rate"]
+            row[name] = command["value"]
+            row[f"{name}_rate"] = command["rate"]
+        row["crank_torque"] = crank
+        row["crank_power"] = crank * motion["theta_rate"]
+        row["hip_torque"] = hip
+        row["hip_power"] = hip * motion["phi_rate"]
         for point, contact in zip(("toe", "heel"), self.state.contacts, strict=True):
             for name in ("x", "penetration", "normal", "friction"):
                 row[f"{point}_{name}"] = contact[name]
             row[f"{point}_penetration_rate"] = contact["rate"]
-            row[f"{point}_y"], row[f"{point}_slide"] = -contact["penetration"], contact["vx"]
+            row[f"{point}_y"] = -contact["penetration"]
+            row[f"{point}_slide"] = contact["vx"]
             row[f"{point}_inverse_approach_speed"] = (
                 1 / contact["approach"] if contact["approach"] > 0 else 0.0
             )

@@ -235,12 +235,12 @@ class Quantity:
     Attributes:
         value: function of the stance in the row's condition (elastic if it has none) and in the other one.
         definition: definition of the value in words.
-        beside: function of the same stances that returns values under other readings, by name.
+        other_readings: function of the same stances that returns values under other readings, by name.
     """
 
     value: Callable[[Stance, Stance], float | None]
     definition: str
-    beside: Callable[[Stance, Stance], dict[str, float | None]] = lambda stance, other: {}
+    other_readings: Callable[[Stance, Stance], dict[str, float | None]] = lambda stance, other: {}
 
 
 def _reduction(elastic: float, inelastic: float) -> float:
@@ -370,7 +370,7 @@ def _measure(row: PublishedRow, stances: Stances) -> tuple[float | None, str, di
     condition = row.condition or "elastic"
     opposite = "inelastic" if condition == "elastic" else "elastic"
     pair = (stances[row.gait, condition], stances[row.gait, opposite])
-    return quantity.value(*pair), quantity.definition, quantity.beside(*pair)
+    return quantity.value(*pair), quantity.definition, quantity.other_readings(*pair)
 
 
 def severity(row: Mapping[str, Any], published: Published) -> float:

@@ -68,9 +68,12 @@ class Brush:
 
         `paint` is called with the fine surface and the map from a pixel (complex) to a position on it.
         """
-        x, y = np.real(points), np.imag(points)
-        left, top = int(np.floor(x.min() - margin)), int(np.floor(y.min() - margin))
-        right, bottom = int(np.ceil(x.max() + margin)), int(np.ceil(y.max() + margin))
+        x = np.real(points)
+        y = np.imag(points)
+        left = int(np.floor(x.min() - margin))
+        top = int(np.floor(y.min() - margin))
+        right = int(np.ceil(x.max() + margin))
+        bottom = int(np.ceil(y.max() + margin))
         box = pygame.Rect(left, top, right - left, bottom - top).clip(self._frame)
         if not box.width or not box.height:
             return
@@ -91,7 +94,8 @@ class Brush:
 
 def bar(surface: Any, colour: Colour, a: Position, b: Position, radius_a: float, radius_b: float) -> None:
     """A bar from `a` to `b` with round ends."""
-    one, two = complex(*a), complex(*b)
+    one = complex(*a)
+    two = complex(*b)
     side = 1j * (two - one) / max(abs(two - one), 1e-9)
     corners = (one + radius_a * side, two + radius_b * side, two - radius_b * side, one - radius_a * side)
     pygame.draw.polygon(surface, colour, [(z.real, z.imag) for z in corners])
@@ -101,11 +105,13 @@ def bar(surface: Any, colour: Colour, a: Position, b: Position, radius_a: float,
 
 def arrow(surface: Any, colour: Colour, a: Position, b: Position, width: float, grow: float = 0.0) -> None:
     """An arrow from `a` to `b`, grown on all sides by `grow`; the head of a short one shrinks with it."""
-    tail, tip = complex(*a), complex(*b)
+    tail = complex(*a)
+    tip = complex(*b)
     along = (tip - tail) / max(abs(tip - tail), 1e-9)
     head = min(3.0 * width, abs(tip - tail))
     neck = tip - (head + grow) * along
-    half, wide = (width / 2 + grow) * 1j * along, (0.45 * head + 1.6 * grow) * 1j * along
+    half = (width / 2 + grow) * 1j * along
+    wide = (0.45 * head + 1.6 * grow) * 1j * along
     tip += 1.6 * grow * along
     shape = (tail + half, neck + half, neck + wide, tip, neck - wide, neck - half, tail - half)
     pygame.draw.polygon(surface, colour, [(z.real, z.imag) for z in shape])

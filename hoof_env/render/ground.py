@@ -30,9 +30,14 @@ class GroundPainter:
         self, brush: Brush, terrain: Terrain, size: tuple[int, int], scale: float, clear: float
     ) -> None:
         self._terrain = terrain
-        self._brush, self._size, self._scale, self._clear = brush, size, scale, clear
-        self._knots, self._heights = terrain.x, terrain.height_at(terrain.x)
-        self._stiffness, self._friction = np.array(terrain.stiffness), np.array(terrain.friction)
+        self._brush = brush
+        self._size = size
+        self._scale = scale
+        self._clear = clear
+        self._knots = terrain.x
+        self._heights = terrain.height_at(terrain.x)
+        self._stiffness = np.array(terrain.stiffness)
+        self._friction = np.array(terrain.friction)
         self._level = bool(np.ptp(self._heights) == 0)
         self._labelled = [p for p in find_patches(terrain) if p.end - p.start > LABEL * brush.unit / scale]
         self._grid = COLUMN * brush.unit / scale
@@ -90,9 +95,11 @@ class GroundPainter:
                 yield line[start : end + 1], colour
 
     def _draw_ticks(self, canvas: Any, corner: complex) -> None:
-        unit, scale = self._brush.unit, self._scale
+        unit = self._brush.unit
+        scale = self._scale
         thick = max(1, round(2 * unit))
-        first, last = corner.real, corner.real + self._size[0] / scale
+        first = corner.real
+        last = corner.real + self._size[0] / scale
         halves = np.arange(np.floor(2 * first), np.ceil(2 * last) + 1)
         tops = (corner.imag - self.height(halves / 2)) * scale
         for half, top in zip(halves.astype(int).tolist(), tops.tolist(), strict=True):
@@ -104,10 +111,12 @@ class GroundPainter:
                 self._brush.write(canvas, f"{half // 2} m", (at, top + 13 * unit), 17, SOIL_LINE, "midtop")
 
     def _draw_labels(self, canvas: Any, corner: complex) -> None:
-        unit, left = self._brush.unit, corner.real
+        unit = self._brush.unit
+        left = corner.real
         right = left + self._clear / self._scale
         for patch in self._labelled:
-            start, end = max(patch.start, left), min(patch.end, right)
+            start = max(patch.start, left)
+            end = min(patch.end, right)
             if (end - start) * self._scale < LABEL * unit:
                 continue
             middle = (start + end) / 2

@@ -36,11 +36,16 @@ class HorsePanel:
         lift_off_n: float,
     ) -> None:
         unit = brush.unit
-        self._brush, self._box, self._legs = brush, pygame.Rect(box), tuple(legs)
-        self._weight, self._lift_off = weight_n, lift_off_n
+        self._brush = brush
+        self._box = pygame.Rect(box)
+        self._legs = tuple(legs)
+        self._weight = weight_n
+        self._lift_off = lift_off_n
         self._inside = self._box.inflate(-36 * unit, -28 * unit)
-        left, width = self._inside.left + round(34 * unit), self._inside.width - round(40 * unit)
-        top, high = self._inside.top + 126 * unit, 50 * unit
+        left = self._inside.left + round(34 * unit)
+        width = self._inside.width - round(40 * unit)
+        top = self._inside.top + 126 * unit
+        high = 50 * unit
         self._plots = [
             pygame.Rect(left, round(top + k * (high + 17 * unit)), width, round(high))
             for k in range(len(legs))
@@ -67,7 +72,9 @@ class HorsePanel:
     def add(self, instants: Sequence[HorseInstant]) -> None:
         for now in instants:
             for k, leg in enumerate(now.legs):
-                stances, curve, bars = self.each[k], self._curves[k], self._stances[k]
+                stances = self.each[k]
+                curve = self._curves[k]
+                bars = self._stances[k]
                 stances.add(leg)
                 if not curve or interval_of(curve[-1][0]) != interval_of(now.time):
                     curve.append((now.time, leg.grf))
@@ -107,7 +114,8 @@ class HorsePanel:
         return float(plot.right - (now - time) * plot.width / SECONDS)
 
     def _draw_curve(self, canvas: Any, k: int, now: float, colour: Colour) -> None:
-        plot, unit = self._plots[k], self._brush.unit
+        plot = self._plots[k]
+        unit = self._brush.unit
         line = [
             (self._across(plot, now, time), plot.bottom - force * plot.height / self.full_scale)
             for time, force in self._curves[k]
@@ -125,7 +133,8 @@ class HorsePanel:
         whole = pygame.Surface(self._box.bottomright, pygame.SRCALPHA, 32)
 
         def paint(fine: Any, place: Any) -> None:
-            edge, radius = fine.get_rect(), round(12 * unit * FINE)
+            edge = fine.get_rect()
+            radius = round(12 * unit * FINE)
             pygame.draw.rect(fine, FAINT, edge, border_radius=radius)
             pygame.draw.rect(fine, PAPER, edge.inflate(-2 * FINE, -2 * FINE), border_radius=radius - FINE)
 
@@ -145,7 +154,8 @@ class HorsePanel:
                 whole.fill(FAINT, (plot.left, round(y), plot.width, 1))
                 write(f"{part * full_scale / 1000:g}", plot.left - 7 * unit, y, 16, "midright")
             write(leg.replace("_", " "), plot.right, plot.top - 8 * unit, 17, "midright", colour)
-        first, last = self._rows[0], self._rows[-1]
+        first = self._rows[0]
+        last = self._rows[-1]
         write("footfall", self._inside.left, first.top - 14 * unit, 20)
         for row, leg in zip(self._rows, self._legs, strict=True):
             whole.fill(FAINT, row)

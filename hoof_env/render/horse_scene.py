@@ -23,7 +23,11 @@ from hoof_env.render.scene import AROUND_M, ARROW_M, Scene
 
 NEAR = (0, 2)  # the left legs
 FAR_COAT = 0.45  # how far the colour of far legs is from the sky's [-]
-WIDE_M, SOIL_M = (1.75, 2.25), 0.45  # seen behind and before the trunk's centre, and below the ground [m]
+WIDE_M = (1.75, 2.25)
+"""Width that is seen behind and before the trunk's centre [m]."""
+
+SOIL_M = 0.45
+"""Depth that is seen below the ground [m]."""
 ARROW_SHARE = 0.75  # length of a full-scale arrow over that of one leg's scene, at the usual hips [-]
 
 
@@ -33,7 +37,9 @@ class HorseScene(Scene):
     def __init__(
         self, brush: Brush, geometry: Geometry, terrain: Terrain, size: tuple[int, int], right: int
     ) -> None:
-        self._brush, self._geometry, self._size = brush, geometry, size
+        self._brush = brush
+        self._geometry = geometry
+        self._size = size
         self._animal = geometry.hip_height / HORSE_HIP_M
         self._centre = (size[0] - right) * WIDE_M[0] / sum(WIDE_M)
         self._scale = (size[0] - right) / sum(WIDE_M) / self._animal
@@ -77,7 +83,8 @@ class HorseScene(Scene):
         canvas.blit(far, (0, 0), special_flags=pygame.BLEND_PREMULTIPLIED)
 
     def _draw_body(self, canvas: Any, now: HorseInstant) -> None:
-        centre, turn = complex(now.x, now.y), np.exp(1j * now.pitch)
+        centre = complex(now.x, now.y)
+        turn = np.exp(1j * now.pitch)
         metre = self._scale * self._animal
 
         def at(point: tuple[float, float]) -> complex:
@@ -93,7 +100,8 @@ class HorseScene(Scene):
         self._brush.smooth(canvas, [z for part in parts for z in part[:2]], 0.4 * metre, paint)
 
     def _paint_key(self, full_scale: float) -> Any:
-        unit, force = self._brush.unit, full_scale / 5
+        unit = self._brush.unit
+        force = full_scale / 5
         length = self._share * ARROW_M * self._scale / 5
         image = pygame.Surface(self._size, pygame.SRCALPHA, 32)
         rows = [(20 + (20 + 20 * k) * 1j) * unit for k in range(4)]

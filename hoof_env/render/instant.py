@@ -212,31 +212,38 @@ def columns_of_engine(
         turning = 1j * arm * np.atleast_1d(record["pitch_rate"][..., 0])
         of_trunk["x"], of_trunk["y"] = of_trunk["x"] + arm.real, of_trunk["y"] + arm.imag
         of_trunk["vx"], of_trunk["vy"] = of_trunk["vx"] + turning.real, of_trunk["vy"] + turning.imag
+    commands = zip(PARAMETERS, wanted.tolist(), strict=True)
     columns = {
         "time": of_trunk["time"],
         **{name: of_trunk[name] for name in ("x", "y", "vx", "vy", "pitch")},
         **{name: of_leg[name] for name in ("crank_angle", "crank_angle_rate", "swing_angle")},
         **{name: of_leg[name] for name in PARAMETERS[1:]},
-        **{f"command_{name}": np.full(n, value)
-           for name, value in zip(PARAMETERS, wanted.tolist(), strict=True)},
-    }  # fmt: skip
+        **{f"command_{name}": np.full(n, value) for name, value in commands},
+    }
     for point in POINTS:
         x, y, normal, friction = (of_leg[f"{point}_{name}"] for name in ("x", "y", "normal", "friction"))
         height, across = ground_at(ground, x)
         force = (normal - 1j * friction) * across  # the tangent is the normal turned clockwise
         columns |= {
-            f"{point}_x": x, f"{point}_y": y, f"{point}_depth": (height - y) * across.imag,
-            f"{point}_normal": normal, f"{point}_friction": friction,
-            f"{point}_force_x": force.real, f"{point}_force_y": force.imag,
-        }  # fmt: skip
+            f"{point}_x": x,
+            f"{point}_y": y,
+            f"{point}_depth": (height - y) * across.imag,
+            f"{point}_normal": normal,
+            f"{point}_friction": friction,
+            f"{point}_force_x": force.real,
+            f"{point}_force_y": force.imag,
+        }
     return NamedColumns(columns | _together(columns))
 
 
 _TRUNK = ("time", "x", "y", "vx", "vy", "pitch")
 _LEG = (
-    "crank_angle", "crank_angle_rate", "swing_angle", *PARAMETERS[1:],
+    "crank_angle",
+    "crank_angle_rate",
+    "swing_angle",
+    *PARAMETERS[1:],
     *(f"{point}_{name}" for point in POINTS for name in ("x", "y", "normal", "friction")),
-)  # fmt: skip
+)
 
 
 def ground_at(terrain: Terrain, x: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.complex128]]:
@@ -260,9 +267,11 @@ def _together(columns: Columns) -> Columns:
     at = [columns[f"{point}_x"] + 1j * columns[f"{point}_y"] for point in POINTS]
     forces = [columns[f"{point}_force_x"] + 1j * columns[f"{point}_force_y"] for point in POINTS]
     normals = [columns[f"{point}_normal"] for point in POINTS]
-    force, normal = forces[0] + forces[1], normals[0] + normals[1]
+    force = forces[0] + forces[1]
+    normal = normals[0] + normals[1]
     loaded = (normal > 0) & (np.abs(force) > 0)
-    load, size = np.where(loaded, normal, 1.0), np.where(loaded, np.abs(force), 1.0)
+    load = np.where(loaded, normal, 1.0)
+    size = np.where(loaded, np.abs(force), 1.0)
     mean = (normals[0] * at[0] + normals[1] * at[1]) / load
     moment = sum((np.conj(z - mean) * f).imag for z, f in zip(at, forces, strict=True))
     # a force F moved by d turns with Im(conj(d) F); d = -i moment F / |F|^2 has exactly `moment`

@@ -56,7 +56,8 @@ class LegOutline:
 
 def reach(geometry: Geometry) -> tuple[float, float]:
     """Return how far from O, and how far above it, the leg reaches within its limits [m]."""
-    out, up = 0.0, 0.0
+    out = 0.0
+    up = 0.0
     bounds = [LIMITS[name] for name in ("swing_offset", "swing_sin", "swing_cos")]
     for theta in np.linspace(0, 2 * np.pi, 72, endpoint=False):
         z = pose(geometry, theta).points @ (1, 1j)

@@ -39,7 +39,8 @@ class Unit(NamedTuple):
     digits: int
 
 
-KILONEWTONS, NEWTONS = Unit("kN", 1000.0, 2), Unit("N", 1.0, 0)
+KILONEWTONS = Unit("kN", 1000.0, 2)
+NEWTONS = Unit("N", 1.0, 0)
 LIGHT = 10.0  # lift-off force of a leg whose forces are written in newtons [N]; it goes with the weight
 SMALLEST_OF_LIGHT = 10.0  # least full scale of its curve [N]
 
@@ -114,9 +115,13 @@ class Panel:
         lift_off_n: float,
         limits: Mapping[str, tuple[float, float]],
     ) -> None:
-        unit, self._limits = brush.unit, limits
-        self._brush, self._box, self._weight = brush, pygame.Rect(box), weight_n
-        self._lift_off, self._force = lift_off_n, unit_of(lift_off_n)
+        unit = brush.unit
+        self._limits = limits
+        self._brush = brush
+        self._box = pygame.Rect(box)
+        self._weight = weight_n
+        self._lift_off = lift_off_n
+        self._force = unit_of(lift_off_n)
         self._least = SMALLEST_OF_LIGHT if self._force is NEWTONS else SMALLEST_SCALE
         self._inside = self._box.inflate(-36 * unit, -32 * unit)
         self._plot = pygame.Rect(0, 0, self._inside.width - 40 * unit, 150 * unit)
@@ -160,10 +165,12 @@ class Panel:
     def _paint_card(self, full_scale: float) -> Any:
         unit = self._brush.unit
         whole = pygame.Surface(self._box.bottomright, pygame.SRCALPHA, 32)
-        plot, inside = self._plot, self._inside
+        plot = self._plot
+        inside = self._inside
 
         def paint(fine: Any, place: Any) -> None:
-            edge, radius = fine.get_rect(), round(12 * unit * FINE)
+            edge = fine.get_rect()
+            radius = round(12 * unit * FINE)
             pygame.draw.rect(fine, FAINT, edge, border_radius=radius)
             pygame.draw.rect(fine, PAPER, edge.inflate(-2 * FINE, -2 * FINE), border_radius=radius - FINE)
 
@@ -188,8 +195,8 @@ class Panel:
             whole.fill(FAINT, (round(left), round(y - unit), round(right - left), max(2, round(3 * unit))))
             low, high = self._limits[parameter]
             if low < 0 < high:
-                whole.fill(GREY, (round(left + (right - left) * -low / (high - low)), round(y - 4 * unit), 1,
-                                  round(9 * unit)))  # fmt: skip
+                zero = round(left + (right - left) * -low / (high - low))
+                whole.fill(GREY, (zero, round(y - 4 * unit), 1, round(9 * unit)))
         head = plot.top - 20 * unit
         write(f"ground reaction force, {self._force.name}", inside.left, head, 20)
         for part in (0.0, 0.5, 1.0):
@@ -231,14 +238,18 @@ class Panel:
 
     def _mark_command(self, canvas: Any, x: float, y: float) -> None:
         unit = self._brush.unit
-        tip, half, top = y - 4 * unit, 5 * unit, y - 12 * unit
+        tip = y - 4 * unit
+        half = 5 * unit
+        top = y - 12 * unit
         shape = [(x, tip), (x - half, top), (x + half, top)]
         pygame.draw.polygon(canvas, INK, shape)
         pygame.draw.aalines(canvas, INK, True, shape)
 
     def _draw_curve(self, canvas: Any, now: float) -> None:
-        plot, unit = self._plot, self._brush.unit
-        per_second, per_newton = plot.width / SECONDS, plot.height / self.full_scale
+        plot = self._plot
+        unit = self._brush.unit
+        per_second = plot.width / SECONDS
+        per_newton = plot.height / self.full_scale
 
         def place(t: float, force: float) -> tuple[float, float]:
             return plot.right - (now - t) * per_second, plot.bottom - force * per_newton

@@ -83,7 +83,8 @@ class Renderer:
         # laid out in memory as a frame is, so that the copy is quick
         self._packed = pygame.Surface(self.size, 0, 24, (0xFF, 0xFF00, 0xFF0000, 0))
         self.brush = brush = Brush(self.size)
-        edge, column = round(16 * brush.unit), round(304 * brush.unit)
+        edge = round(16 * brush.unit)
+        column = round(304 * brush.unit)
         ground = Terrain.flat() if terrain is None else terrain
         box = (self.size[0] - edge - column, edge, column, round(508 * brush.unit))
         if hips:
@@ -224,7 +225,8 @@ def check_side(name: str, pixels: Any) -> int:
 
 
 def _check_size(size: Any) -> tuple[int, int]:
-    (low_w, low_h), high = SMALLEST_SIZE, LARGEST_SIDE
+    low_w, low_h = SMALLEST_SIZE
+    high = LARGEST_SIDE
     try:
         width, height = size
         good = high >= width == int(width) >= low_w and high >= height == int(height) >= low_h

@@ -77,7 +77,9 @@ class Scene:
         forces: Unit = KILONEWTONS,
     ) -> None:
         self._unit, self._newtons, self._digits = forces
-        self._brush, self._geometry, self._size = brush, geometry, size
+        self._brush = brush
+        self._geometry = geometry
+        self._size = size
         self.small = min(1.0, geometry.hip_height / USUAL_HIP_M)
         out, up = reach(geometry)
         spare = (HEIGHT_SLACK_M + MARGIN_M) * self.small
@@ -90,7 +92,8 @@ class Scene:
         self._paths: deque[tuple[float, complex, complex]] = deque()  # time [s], heel, toe [m]
         self._ground = GroundPainter(brush, terrain, size, self._scale, 2 * self._centre)
         self._leg = LegOutline(geometry)
-        self._kind, self._girth = trunk, self.small
+        self._kind = trunk
+        self._girth = self.small
         self._trunk = self._paint_trunk()
         self._sky = self._paint_sky()
         self._key = lru_cache(maxsize=8)(self._paint_key)
@@ -141,7 +144,8 @@ class Scene:
         usual = self._geometry.hip_height
         hip = complex(now.x, now.y)
         level = float(self._ground.height(hip.real + self.small * AROUND_M).mean())
-        high, slack = hip.imag - level, HEIGHT_SLACK_M * self.small
+        high = hip.imag - level
+        slack = HEIGHT_SLACK_M * self.small
         rise = high - min(max(high, usual - slack), usual + slack)
         self._camera = complex(hip.real, level + rise)
         return self.points_of(now)
@@ -176,7 +180,9 @@ class Scene:
 
     def _draw_support(self, canvas: Any, hip: complex) -> None:
         """The spring, the rail with wheels or the plate that holds the trunk around O at pixel `hip`."""
-        half, top, hold = TRUNK_M[0] * self._metre, hip - 1j * TRUNK_M[1] * self._metre, HOLD_M * self._metre
+        half = TRUNK_M[0] * self._metre
+        top = hip - 1j * TRUNK_M[1] * self._metre
+        hold = HOLD_M * self._metre
         if self._kind == "suspended":
             coil = np.linspace(complex(hip.real, 0), top, 17)
             coil[2:-2] += 0.06 * self._metre * np.resize([1, -1], 13)
@@ -188,7 +194,8 @@ class Scene:
             self._brush.smooth(canvas, coil, 3, paint)
             return
         thick = max(2, round(4 * self._brush.unit))
-        rail, plate = round(top.imag - hold), canvas.get_rect()
+        rail = round(top.imag - hold)
+        plate = canvas.get_rect()
         ends = [top - half / 2, top + half / 2]
         if self._kind == "rail":
             for end in ends:
@@ -204,7 +211,8 @@ class Scene:
     def _draw_trunk(self, canvas: Any, hip: complex, pitch: float) -> None:
         """The trunk around O at pixel `hip`, turned by `pitch` [rad]."""
         half, above, below = (self._metre * length for length in TRUNK_M)
-        image, corner = self._trunk, hip - complex(half, above)
+        image = self._trunk
+        corner = hip - complex(half, above)
         if pitch:
             image = pygame.transform.rotozoom(image, float(np.degrees(pitch)), 1.0)
             middle = hip + 0.5j * (below - above) * np.exp(-1j * pitch)
@@ -286,11 +294,11 @@ class Scene:
             (HEEL, 3.0, complex(now.heel_x, now.heel_y), complex(now.heel_force_x, now.heel_force_y)),
             (FORCE, 7.0, complex(now.cop_x, now.cop_y), complex(now.force_x, now.force_y)),
         ]
-        ends = [
-            (colour, width * self._brush.unit * FINE, self._pixels(foot),
-             self._pixels(foot + force * share * self.small * ARROW_M / full_scale))
-            for colour, width, foot, force in reversed(forces) if force
-        ]  # fmt: skip
+        ends = []
+        for colour, width, foot, force in reversed(forces):
+            if force:
+                head = self._pixels(foot + force * share * self.small * ARROW_M / full_scale)
+                ends.append((colour, width * self._brush.unit * FINE, self._pixels(foot), head))
 
         def paint(fine: Any, place: Any) -> None:
             for colour, width, tail, tip in ends:

@@ -98,7 +98,9 @@ class Scene:
     def _frame(self, name: str) -> Any:
         """Make the empty figure."""
         drawing = self.drawing
-        low, high, wide = drawing.low, drawing.high, drawing.half_width
+        low = drawing.low
+        high = drawing.high
+        wide = drawing.half_width
         f = figure(
             name=name,
             x_range=Range1d(-wide, wide),
