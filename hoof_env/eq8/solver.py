@@ -29,7 +29,7 @@ from hoof_env.dynamics.layout import LEG_REPORT, LEG_STATE, TRUNK_REPORT, TRUNK_
 from hoof_env.dynamics.parts import Reactions, Result, Trunk
 from hoof_env.eq8.constraints import Closure, Constraints, Vector, closed_form
 from hoof_env.eq8.integrators import INTEGRATORS
-from hoof_env.errors import ParameterError, check_choice, check_number
+from hoof_env.errors import ParameterError, check_choice, check_number, finite, one_of
 from hoof_env.gait import (
     MOTION,
     PARAMETERS,
@@ -113,11 +113,11 @@ class ConstrainedLeg:
         integrator: str = "euler",
         height: float | None = None,
     ) -> None:
+        self.geometry = one_of("geometry", geometry, Geometry)
         if not geometry.full_turn:
             check_full_revolution(geometry)
-        self.geometry = geometry
-        self.ground = ground
-        filters = filters or FilterSettings()
+        self.ground = one_of("ground", ground, Ground)
+        filters = FilterSettings() if filters is None else one_of("filters", filters, FilterSettings)
         self.sim_dt = check_number("sim_dt", sim_dt, low=1e-7, high=filters.longest_step)
         self.alpha = check_number("alpha", alpha, low=0)
         self.beta = check_number("beta", beta, low=0)
@@ -161,15 +161,17 @@ class ConstrainedLeg:
         A hoof point that starts inside the ground has entered it at its present rate. Returns one trace row.
 
         Raises:
-            ParameterError: theta or x is not finite, or `height` or `speed` is not that of the fixed trunk.
+            ParameterError: no gait, theta or x is not finite, or `height` or `speed` is not that of the fixed
+                trunk.
         """
         theta, x = check_number("theta", theta), check_number("x", x)
-        if height not in (None, self.trunk.height) or speed != 0.0:
+        own = self.trunk.height
+        if check_number("height", own if height is None else height) != own or check_number("speed", speed):
             raise ParameterError(
                 f"height, speed: a fixed trunk rests at {self.trunk.height:g} m, got {height!r} and {speed!r}"
             )
         state = self.state
-        command = gait_array(gait, 1)
+        command = gait_array(one_of("gait", gait, GaitParameters), 1)
         state.body["time"] = 0.0
         state.body["x"] = x
         state.motion["theta"] = theta
@@ -188,11 +190,13 @@ class ConstrainedLeg:
         result says so and `trace` is without meaning.
 
         Raises:
-            ParameterError: the command is not four numbers.
+            ParameterError: the command is not four finite numbers, or `trace` is none of `new_trace`.
         """
-        command = np.asarray(command, dtype=np.float64)
+        command = finite("command", command)
         if command.shape != (4,):
             raise ParameterError(f"command: expected 4 values {PARAMETERS}, got shape {command.shape}")
+        if one_of("trace", trace, np.ndarray).dtype != TRACE:
+            raise ParameterError(f"trace: expected rows of new_trace, got an array of {trace.dtype}")
         before = self.state.copy()
         result = Result.OK
         try:
