@@ -34,13 +34,23 @@ from agents.baselines_run import (
     versions_of,
 )
 from agents.command import run
-from agents.score import FINAL_SEEDS, score_vector
 from agents.settings import load_settings
-from agents.statistics import PUBLISHED, TABLE, Floats, Scored, cells, compare, iqm, over_episodes, over_seeds
+from agents.statistics import compare
 from hoof_env._output import markdown_table
 from hoof_env._plotting import BLUE, GREEN, GREY, ORANGE, PURPLE, STYLE
 from hoof_env.errors import HoofEnvError
-from hoof_env.saved_policy import ABOUT
+from hoof_env.evaluation.episodes import FINAL_SEEDS, score_vector
+from hoof_env.evaluation.statistics import (
+    PUBLISHED,
+    TABLE,
+    Floats,
+    Scored,
+    cells,
+    iqm,
+    over_episodes,
+    over_seeds,
+)
+from hoof_env.policies.saved import ABOUT
 from hoof_env.tasks.registry import TASKS
 
 GAITS = ("run", "walk")
@@ -83,7 +93,7 @@ def references(env_id: str) -> dict[str, Scored]:
 
 
 def reference(name: str, policy: Any, env_id: str) -> Scored:
-    """Score a policy without learning, as `agents.score.score_vector` takes it."""
+    """Score a policy without learning, as `score_vector` takes it."""
     return Scored(name, over_episodes(score_vector(policy, env_id, FINAL_SEEDS)))
 
 

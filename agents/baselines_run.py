@@ -26,13 +26,13 @@ import yaml
 
 from agents import runs
 from agents.command import parse_pairs, run
-from agents.score import CURVE_SEEDS, FINAL_SEEDS, score_vector
 from agents.settings import FOLDER, TrainingArgs, load_settings
-from agents.statistics import FIGURES, Scored, mean_figures, over_seeds
 from agents.train import Args as TrainArgs
 from agents.train import train
 from agents.watch import Scorer
 from hoof_env.errors import DataFileError, check_number, parse_json
+from hoof_env.evaluation.episodes import CURVE_SEEDS, FINAL_SEEDS, score_vector
+from hoof_env.evaluation.statistics import FIGURES, Scored, mean_figures, over_seeds
 
 PLANS = Path(__file__).with_name("plans")
 Plan = Literal["full", "nightly", "trainers"]

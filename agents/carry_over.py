@@ -24,12 +24,14 @@ from tyro.conf import Positional
 
 from agents import runs
 from agents.command import run
-from agents.score import read_policy_record, score_vector
 from agents.ship import POLICIES, UNTRAINED
 from hoof_env._output import check_folder, markdown_table
 from hoof_env.envs.policies import STANDS_FOR
 from hoof_env.errors import DataFileError, ParameterError, check_number, count
-from hoof_env.saved_policy import own_id
+from hoof_env.evaluation.episodes import score_vector
+from hoof_env.policies.find import read_policy_record
+from hoof_env.policies.onnx_file import FILE
+from hoof_env.policies.saved import own_id
 from hoof_env.tasks.disturbances import MOST_STRENGTH, ROUGH_PUSH, ROUGH_SLOPE, ROUGHNESS, rough_ground
 
 FIRST_SEED = 3_000_000  # on which nothing else is played
@@ -218,7 +220,7 @@ def play(policy: str, name: str, strength: float, episodes: int) -> Found | None
 
 def shipped() -> tuple[str, ...]:
     """Return the paths of the policies that ship, but those that are another id's."""
-    folders = sorted(path.parent for path in POLICIES.glob(f"*/{runs.RECORD}"))
+    folders = sorted(path.parent for path in POLICIES.glob(f"*/{FILE}"))
     others = {**STANDS_FOR, **UNTRAINED}
     return tuple(str(folder) for folder in folders if f"hoof_env/{folder.name}" not in others)
 

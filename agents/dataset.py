@@ -3,7 +3,7 @@
     python -m agents.dataset run walk random --episodes 100 --dataset-id hoof_env/HorseLeg/scripted-v0
     python -m agents.dataset agents/policies/Horse-v0 --env-id hoof_env/Horse-v0
 
-A policy is what agents.score takes. Episode k of each policy is reset with seed + k and the options that its
+A policy is what `hoof-env evaluate` takes. Episode k of each is reset with seed + k and the options that its
 policy starts with, so that resetting `dataset.recover_environment()` likewise and taking the same actions
 gives the same numbers. Next to Minari's files lies manifest.json with the command, the versions, the licence,
 the returns of each policy and how its episodes start, and the SHA-256 of every file and of the files of
@@ -34,12 +34,12 @@ from tyro.conf import Positional
 import hoof_env
 from agents import runs
 from agents.command import parse_pairs, run
-from agents.score import find_policy, is_model
 from hoof_env.envs.policies import start_of
 from hoof_env.errors import DataFileError, MissingExtraError, OutputError, ParameterError, count
 from hoof_env.gait import GaitParameters
-from hoof_env.saved_policy import ABOUT, STATISTICS, WEIGHTS, find_saved
-from hoof_env.saved_record import describe_actions
+from hoof_env.policies.find import find_policy, find_saved, is_model
+from hoof_env.policies.record import describe_actions
+from hoof_env.policies.saved import ABOUT, STATISTICS, WEIGHTS
 
 MANIFEST = "manifest.json"
 PROJECT = Path(__file__).parents[1] / "pyproject.toml"  # file of the checkout, which need not be installed

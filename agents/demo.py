@@ -3,52 +3,43 @@
     python -m agents.demo              into runs/demo, in a minute or two
     python -m agents.demo --quick      tiny numbers, only to see that everything works
 
-The paper's four conditions with every solver, published next to simulated; scripted gaits and the simplest
-policies in hoof_env/HorseLeg-v0; a small PPO agent, trained for five seconds and scored on the same episodes;
-and report.html, one file with tables, figures and films. The folder is a run folder, too, which
-agents.evaluate plays. Ctrl-C leaves an older report as it was.
+The report of `hoof-env demo` with an agent of its own: PPO learns for five seconds, and is scored and filmed
+in place of the agent that ships. The folder is a run folder, too, which all commands play. Ctrl-C leaves an
+older report as it was.
 """
 
 from __future__ import annotations
 
-import base64
-import json
 import os
 import shutil
 import time
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from agents import evaluate, runs, train
+from agents import runs, train
 from agents.command import run
-from agents.pages import draw_learning_curve, render_template
+from agents.pages import draw_learning_curve
 from hoof_env._output import check_folder, staged
+from hoof_env.demo.demo import (
+    EPISODES,
+    FILM_SECONDS,
+    FIRST_SEED,
+    PAGE,
+    QUICK_EPISODES,
+    QUICK_FILM_SECONDS,
+    SCRIPTED,
+    Steps,
+    film_all,
+    named,
+    reproduce_paper,
+)
+from hoof_env.demo.report import OPEN_LOOP, Learning, Report
 from hoof_env.errors import check_number
-from hoof_env.film import render_episode
-from hoof_env.paper.report import format_error, format_number
-from hoof_env.paper.reproduce import GAITS, SOLVERS, reproduce, write_reproduction
-from hoof_env.paper.rows import OURS, REPORTED, Reproduction, counted
+from hoof_env.evaluation.scores import Score, evaluate, text_table, write_json
+from hoof_env.paper.reproduce import GAITS
 
-ENV_ID = "hoof_env/HorseLeg-v0"
-FIXED_ID = "hoof_env/HorseLegFixed-v0"
+ENV_ID = runs.DEFAULT_ENV
 TRAINED = "trained agent"
-OPEN_LOOP = "open-loop"
-SCRIPTED = ("walk", "run", OPEN_LOOP, "idle", "random", "bang-bang")
-FIRST_SEED = 1000  # first of the scored episodes; training starts its own from another seed
-BETTER = {
-    "distance_m": 1,
-    "highest_grf_n": -1,
-    "stance_peak_n": -1,
-    "weight_share": 1,
-    "cost_of_transport": -1,
-    "failed": -1,
-    "loading_rate_n_s": -1,
-}
-"""Figures of an episode: 1 where more is better, -1 where less is."""
-
-SLOW = 4  # factor of the slow motion in which the films of the fixed trunk play
 
 
 @dataclass(frozen=True)
@@ -70,8 +61,9 @@ class Budget:
     params: tuple[str, ...] = ()
 
 
-FULL = Budget(seconds=5.0, steps=1_000_000, episodes=20, film_seconds=8.0)
-QUICK = Budget(60.0, 2_048, 2, 0.4, params=("n_envs=4", "n_steps=512", "batch_size=512", "n_epochs=1"))
+FULL = Budget(5.0, 1_000_000, EPISODES, FILM_SECONDS)
+SMALL = ("n_envs=4", "n_steps=512", "batch_size=512", "n_epochs=1")
+QUICK = Budget(60.0, 2_048, QUICK_EPISODES, QUICK_FILM_SECONDS, params=SMALL)
 
 
 @dataclass(frozen=True)
@@ -96,47 +88,33 @@ def demo(args: Args) -> Path:
     check_number("seed", args.seed, low=0, high=FIRST_SEED - 1)
     check_folder(args.out)
     budget = QUICK if args.quick else FULL
+    steps = Steps(4, say)
     with staged(args.out) as stage:
-        with announced(1, "the paper's four conditions, walking and running, elastic and inelastic"):
-            reproduction = reproduce(say)
-            write_reproduction(reproduction, stage, command=runs.command())
-            print_counts(reproduction)
-
-        with announced(2, f"scripted policies in {ENV_ID}, {budget.episodes} episodes each"):
-            # The same episodes for all policies, the agent included
-            playing = evaluate.Args(policy=SCRIPTED, episodes=budget.episodes, seed=FIRST_SEED, env_id=ENV_ID)
-            scores, _ = evaluate.evaluate(playing)
-            evaluate.print_table(scores)
-
-        with announced(3, f"PPO learns for {budget.seconds:g} s, or {budget.steps:,} steps"):
+        reproduction = reproduce_paper(stage, runs.command(), steps)
+        with steps.announced(f"PPO learns for {budget.seconds:g} s, or {budget.steps:,} steps"):
             trained = train_agent(args, budget, stage)
-            say(f"{trained.steps:,} steps in {trained.seconds:.1f} s, {trained.rate:,.0f} steps/s")
-            (score,), setting = evaluate.evaluate(replace(playing, policy=(str(stage / runs.MODEL),)))
-            scores.append(replace(score, policy=TRAINED))
-            evaluate.print_table(scores)
-
-        with announced(4, "films and report"):
-            about = {"seed": FIRST_SEED, "command": runs.command(), "versions": runs.versions()}
-            data = evaluate.to_json(scores, **setting, **about)
-            runs.write_text(stage / "scores.json", json.dumps(data, indent=1, allow_nan=False) + "\n")
-            clips = film_all(scores, budget, stage)
-            html = render(args, reproduction, scores, trained, clips, stage)
-            (stage / "report.html").write_text(html, encoding="utf-8")
-    return args.out / "report.html"
+            steps.say(f"{trained.steps:,} steps in {trained.seconds:.1f} s, {trained.rate:,.0f} steps/s")
+        with steps.announced(f"the agent and scripted policies in {ENV_ID}, {budget.episodes} episodes each"):
+            model = str(stage / runs.MODEL)
+            found = evaluate((*SCRIPTED, model), ENV_ID, None, budget.episodes, FIRST_SEED)
+            found = named(found, TRAINED)
+            steps.say_all(text_table(found.scores))
+            write_json(found, stage / "scores.json")
+        with steps.announced("films and report"):
+            clips = film_all(found.scores, model, budget.film_seconds, stage, steps)
+            report = Report(
+                reproduction, found.scores, clips, stage, FIRST_SEED, runs.command(), runs.versions()
+            )
+            curve = draw_curve(found.scores, stage)
+            learning = Learning(trained.steps, trained.seconds, args.seed, curve)
+            html = replace(report, learning=learning, quick=args.quick).html()
+            (stage / PAGE).write_text(html, encoding="utf-8")
+    return args.out / PAGE
 
 
 def say(line: str) -> None:
-    """Print a line of a step's output."""
-    print(f"      {line}", flush=True)
-
-
-@contextmanager
-def announced(number: int, title: str) -> Iterator[None]:
-    """Print the title of a step, and its time at the end."""
-    print(f"[{number}/4] {title}", flush=True)
-    started = time.monotonic()
-    yield
-    say(f"done in {time.monotonic() - started:.0f} s")
+    """Print a line at once."""
+    print(line, flush=True)
 
 
 def train_agent(args: Args, budget: Budget, stage: Path) -> train.Trained:
@@ -158,115 +136,18 @@ def train_agent(args: Args, budget: Budget, stage: Path) -> train.Trained:
     if trained.stopped_by:
         raise KeyboardInterrupt
     for name in filter(lambda name: (folder / name).is_file(), (*runs.FILES, runs.STATISTICS)):
-        # Into the report's folder, so that agents.evaluate can play it as a run
+        # Into the report's folder, so that commands can play it as a run
         os.replace(folder / name, stage / name)
     shutil.rmtree(folder)  # TensorBoard's curves are in monitor.csv too
     return trained
 
 
-def film_all(scores: Sequence[evaluate.Score], budget: Budget, stage: Path) -> list[dict[str, str]]:
-    """Film gaits and agent on their own trunk, and the gaits, slowly, on a fixed one; return title, caption
-    and film of each."""
-    clips = []
-    size = (640, 360)
-    first_episodes = {score.policy: score.episodes[0] for score in scores}
-    for name in (TRAINED, *GAITS):
-        policy = str(stage / runs.MODEL) if name == TRAINED else name
-        path = stage / f"{name.replace(' ', '-')}.mp4"
-        render_episode(path, policy, ENV_ID, seed=FIRST_SEED, seconds=budget.film_seconds, size=size)
-        # The film shows the first scored episode: its caption has the figures of that
-        first = first_episodes[name]
-        way = "forward" if first["distance_m"] >= 0 else "backward"
-        caption = (
-            f"{abs(first['distance_m']):.1f} m {way} in an episode of {first['seconds']:.0f} s, "
-            f"return {first['return']:.1f}"
-        )
-        title = f"{name.capitalize()}, moving trunk"
-        clips.append({"title": title, "caption": caption, "film": data_uri(path)})
-        say(f"filmed {name}")
-    for gait in GAITS:
-        path = stage / f"{gait}-fixed.mp4"
-        seconds = min(1.0, budget.film_seconds)
-        render_episode(path, gait, FIXED_ID, (f"gait={gait}",), seconds=seconds, slow=SLOW, size=size)
-        caption = f"one cycle of 1 s as in the paper, in slow motion, {SLOW} x"
-        title = f"{gait.capitalize()}, fixed trunk"
-        clips.append({"title": title, "caption": caption, "film": data_uri(path)})
-        say(f"filmed {gait} on a fixed trunk")
-    return clips
-
-
-def print_counts(reproduction: Reproduction) -> None:
-    """Print how many published numbers each solver reproduces."""
-    for solver in SOLVERS:
-        say(f"{solver} solver: {counted(reproduction.rows, reproduction.shapes, solver)}")
-
-
-def render(
-    args: Args,
-    reproduction: Reproduction,
-    scores: Sequence[evaluate.Score],
-    trained: train.Trained,
-    clips: Sequence[dict[str, str]],
-    folder: Path,
-) -> str:
-    """Return the report: one HTML page that holds its pictures and films and needs no network.
-
-    The trained policy is the last of `scores`; its run folder is `folder`, which also has the figures as SVG.
-    """
-    *others, agent = scores
-    episodes = len(agent.episodes)
-    gaits = [score for score in others if score.policy in GAITS]
-    references = [*gaits, *(score for score in others if score.policy == OPEN_LOOP)]
-    draw_learning_curve(folder, [agent, *references], folder / "curve.svg", metadata={"Date": None})
-    return render_template(
-        "report.html.j2",
-        quick=args.quick,
-        reproduction=reproduction,
-        simulated={(row["id"], row["solver"]): row for row in reproduction.rows},
-        shapes={(shape["id"], shape["solver"]): shape for shape in reproduction.shapes},
-        number=format_number,
-        error=format_error,
-        solvers=SOLVERS,
-        figures={path.stem: data_uri(path) for path in folder.glob("figure*.svg")},
-        metrics=[evaluate.METRICS[key] for key in agent.estimates],
-        scores=[
-            (score.policy, [evaluate.cell(*pair) for pair in score.estimates.items()]) for score in scores
-        ],
-        episodes=episodes,
-        seeds=(FIRST_SEED, FIRST_SEED + episodes - 1),
-        by_policy={score.policy: score.estimates for score in scores},
-        reported=REPORTED,
-        ours=[shape["claim"] for shape in reproduction.shapes if shape["claim"].startswith(OURS)],
-        worse=worse(agent, next(score for score in gaits if score.policy == "run")),
-        agent=agent.policy,
-        open_loop=OPEN_LOOP,
-        gaits=[score.policy for score in gaits],
-        trained=trained,
-        training_seed=args.seed,
-        curve=data_uri(folder / "curve.svg"),
-        clips=clips,
-        command=runs.command(),
-        versions=runs.versions(),
-    )
-
-
-def worse(agent: evaluate.Score, run: evaluate.Score) -> list[str]:
-    """Return the figures of an agent that are worse than those of a gait, both in words."""
-    found = []
-    for key, sense in BETTER.items():
-        if key in agent.estimates and key in run.estimates:
-            own = agent.estimates[key]
-            other = run.estimates[key]
-            if sense * own.mean < sense * other.mean:
-                title = evaluate.METRICS[key].title.replace("\n", " ")
-                found.append(f"{title} {evaluate.cell(key, own)[0]} against {evaluate.cell(key, other)[0]}")
-    return found
-
-
-def data_uri(path: Path) -> str:
-    """Return a file as a data URI."""
-    kind = {".svg": "image/svg+xml", ".mp4": "video/mp4"}[path.suffix]
-    return f"data:{kind};base64,{base64.b64encode(path.read_bytes()).decode('ascii')}"
+def draw_curve(scores: list[Score], stage: Path) -> Path:
+    """Draw the learning curve of the run in `stage`, with the scripted gaits' returns; return the picture."""
+    references = [score for score in scores if score.policy in (*GAITS, OPEN_LOOP)]
+    path = stage / "curve.svg"
+    draw_learning_curve(stage, [scores[-1], *references], path, metadata={"Date": None})
+    return path
 
 
 def main(argv: list[str] | None = None) -> None:

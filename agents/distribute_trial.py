@@ -13,11 +13,11 @@ from typing import Any, ClassVar
 from ray import tune
 
 from agents import checkpoints, runs
-from agents.score import CURVE_SEEDS
 from agents.settings import ENV
 from agents.train import Args, train
 from agents.watch import DivergedError, Scorer
 from hoof_env.errors import DataFileError, ParameterError
+from hoof_env.evaluation.episodes import CURVE_SEEDS
 
 FIXED = ("train", "env_kwargs", "params", "report_every", "seed", "command")
 """Keys of a trial's configuration that no search chooses, seeds aside."""

@@ -5,8 +5,8 @@
 The file maps observations of the environment, shape (batch, k), to deterministic actions, (batch, n), float32
 both: the normalisation of observations and the limits of actions are inside. It is kept only if it gives the
 actions of the model it was made from. Its metadata describe the environment and the actions
-(`hoof_env/saved_policy.py`). A .zip is a pickle and can run any code when it is loaded: give only files that
-you trust. ONNX is data.
+(`hoof_env/policies/onnx_file.py`). A .zip is a pickle and can run any code when it is loaded: give only files
+that you trust. ONNX is data.
 """
 
 from __future__ import annotations
@@ -25,14 +25,13 @@ import numpy as np
 import torch
 from tyro.conf import Positional
 
-import hoof_env
 from agents import runs
 from agents.command import run
 from hoof_env._output import staged
 from hoof_env.errors import DataFileError, HoofEnvError, ParameterError
+from hoof_env.policies.onnx_file import INPUT, LISTS, OUTPUT, OnnxPolicy
+from hoof_env.policies.record import about, environment_of
 from hoof_env.records import check_place
-from hoof_env.saved_policy import INPUT, LISTS, OUTPUT, OnnxPolicy
-from hoof_env.saved_record import describe, environment_of, settings_of
 
 OPSET = 18  # version of ONNX's operators; onnxruntime reads it from 1.14 on
 TRIED = 1000  # random observations on which file and model must agree
@@ -70,16 +69,6 @@ def export(model: Path, out: Path, env_id: str | None = None) -> float:
         trained = saved.load(env, env_id)
         metadata = about(env, env_id, kwargs, saved.record)
     return write_policy(trained, out, metadata)
-
-
-def about(env: Any, env_id: str, env_kwargs: dict[str, Any], record: dict[str, Any]) -> dict[str, Any]:
-    """Return the metadata of a policy for an environment; `record` is the run.json of its training, or
-    empty."""
-    known = {key: str(record[key]) for key in ("algo", "seed") if key in record}
-    settings = record.get("settings") or settings_of(env)
-    made_with = record.get("versions", {}).get("hoof-env", hoof_env.__version__)
-    environment = {"env_id": env_id, "env_kwargs": env_kwargs, "settings": settings, "hoof_env": made_with}
-    return environment | describe(env) | known
 
 
 def write_policy(trained: runs.TrainedPolicy, out: Path, metadata: dict[str, Any]) -> float:

@@ -3,7 +3,7 @@
     python -m agents.falls reference agents/policies/Horse-v0
     python -m agents.falls runs/rough --strengths 1 --episodes 200
 
-A policy is what agents.score takes, or a folder with runs of agents.train, one row for each. The strengths
+A policy is what `hoof-env evaluate` takes, or a folder with runs of agents.train, a row each. The strengths
 are factors of those that `hoof_env.tasks.disturbances` has in units: slopes, bumps, and pushes on the trunk.
 Episode i of every policy has the same ground, start, commands and, as long as it lasts, pushes. Each policy
 plays on its own id, whose disturbances are replaced: the ids of horses differ in nothing else.
@@ -20,10 +20,11 @@ from tyro.conf import Positional
 
 from agents import runs
 from agents.command import run
-from agents.score import read_policy_record, score_vector
 from hoof_env._output import markdown_table
 from hoof_env.errors import check_number, count
-from hoof_env.saved_policy import own_id
+from hoof_env.evaluation.episodes import score_vector
+from hoof_env.policies.find import read_policy_record
+from hoof_env.policies.saved import own_id
 from hoof_env.tasks.disturbances import MOST_STRENGTH, rough_ground
 from hoof_env.tasks.horse import MASS
 

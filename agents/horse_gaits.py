@@ -25,10 +25,10 @@ from numpy.typing import NDArray
 from agents import gait_figures, runs
 from agents.command import run
 from agents.evolution import generations, make_strategy, mean_costs, require
-from agents.score import make_rows
 from hoof_env.constants import GRAVITY
 from hoof_env.envs.policies import make_policy
 from hoof_env.errors import parse_json
+from hoof_env.evaluation.episodes import make_rows
 from hoof_env.tasks.horse import HIP_HEIGHT
 from hoof_env.tasks.horse_gaits import LEGS, LIMITS, PAIRS, Stride, bounds
 

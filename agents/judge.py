@@ -3,7 +3,7 @@
     python -m agents.judge reference
     python -m agents.judge runs/ppo-Horse-v0-s0 runs/ppo-Horse-v0-s1 --out runs/judge
 
-A policy is what agents.score takes. It is given one speed after the other, each kept for a whole episode; the
+A policy is what `hoof-env evaluate` takes. It gets one speed after the other, each for a whole episode; the
 first two seconds do not count. `agents/judges.json` has the horse's figures, their sources and the bars;
 nothing in it may enter a reward, a search or a choice of settings.
 
@@ -33,10 +33,11 @@ from agents.gait_figures import SECONDS, mean_lag, play
 from agents.horse_gaits import speed_of
 from agents.judge_pictures import draw
 from agents.judges import of_speeds, read_judges
-from agents.score import find_policy, make_rows
-from agents.statistics import estimate
 from hoof_env._output import markdown_table
 from hoof_env.errors import ParameterError, check_number, count
+from hoof_env.evaluation.episodes import make_rows
+from hoof_env.evaluation.statistics import estimate
+from hoof_env.policies.find import find_policy
 from hoof_env.tasks.horse import HIP_HEIGHT
 from hoof_env.tasks.horse_gaits import PAIRS
 

@@ -24,8 +24,6 @@ from agents import open_loop, runs
 from agents.command import run
 from agents.foot_paths import figures
 from agents.legs_picture import draw
-from agents.score import FINAL_SEEDS, make_rows, play_rows
-from agents.statistics import iqm
 from agents.stock import LEGS_OUT
 from agents.stock_page import at
 from agents.stock_plan import LEG, LEGS, SPEED, read_curves
@@ -33,6 +31,8 @@ from hoof_env._output import markdown_table, staged
 from hoof_env.constants import GRAVITY
 from hoof_env.envs.policies import constant_gait
 from hoof_env.errors import DataFileError
+from hoof_env.evaluation.episodes import FINAL_SEEDS, make_rows, play_rows
+from hoof_env.evaluation.statistics import iqm
 from hoof_env.gait import GaitParameters
 from hoof_env.leg.geometry import DEFAULT_PRESET, Geometry, load_geometry
 

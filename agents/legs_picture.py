@@ -11,9 +11,9 @@ from numpy.typing import NDArray
 
 from agents import runs
 from agents.foot_paths import path_of
-from agents.score import FINAL_SEEDS
 from agents.stock_plan import LEG
 from hoof_env.envs.policies import constant_gait
+from hoof_env.evaluation.episodes import FINAL_SEEDS
 from hoof_env.gait import GaitParameters
 from hoof_env.leg.assembly import solve
 from hoof_env.leg.geometry import Geometry, load_geometry

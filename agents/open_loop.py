@@ -2,12 +2,12 @@
 
     python -m agents.open_loop                                             mean return on hoof_env/HorseLeg-v0
     python -m agents.open_loop --env-id hoof_env/HorseLegRail-v0 --family clocked
-    python -m agents.evaluate --policy run runs/open_loop/HorseLeg-v0-constant.json
+    hoof-env evaluate run runs/open_loop/HorseLeg-v0-constant.json
 
 Families: "constant", the paper's gaits, four gait parameters that are held; "clocked", each of the four with
 a first harmonic of one clock as well, which starts with the episode, thirteen numbers. An episode starts in a
 gait of its own, and goes from there to the one that was found as fast as is allowed. The best of several
-searches is chosen by starts that none has met and scored with yet others, the episodes of agents.evaluate.
+searches is chosen by starts that none has met and scored with yet others, those of `hoof-env evaluate`.
 The file is written after every search; searches that are in it are not made again. `agents.horse_gaits` finds
 the gaits of the horse.
 """
@@ -30,11 +30,11 @@ from numpy.typing import NDArray
 from agents import runs
 from agents.command import parse_pairs, run
 from agents.evolution import generations, make_strategy, mean_costs, require
-from agents.score import make_rows, play_rows
-from agents.statistics import estimate
 from hoof_env._output import check_folder
 from hoof_env.envs.policies import FORM, open_loop, open_loop_record
 from hoof_env.errors import DataFileError, ParameterError, check_number, parse_json
+from hoof_env.evaluation.episodes import make_rows, play_rows
+from hoof_env.evaluation.statistics import estimate
 from hoof_env.gait import PARAMETERS
 from hoof_env.tasks.observation import HALF_RANGE, MIDDLE
 
@@ -58,7 +58,7 @@ wide."""
 
 TEST_SEED = 1000
 SEARCH_SEED = 10_000_000
-"""First seeds of the final score, `agents.evaluate`'s, and of the searches."""
+"""First seeds of the final score, those of `hoof-env evaluate`, and of the searches."""
 
 TOLERANCES = {"tolx": 1e-3, "tolfun": 0, "tolfunhist": 0, "tolstagnation": 10**9}
 """Options of CMA-ES that end a search when its steps are small, and for no other reason."""

@@ -12,8 +12,9 @@ from matplotlib.figure import Figure
 
 from agents import runs
 from agents.baselines_run import CURVE, read_curve
-from agents.evaluate import Score
 from hoof_env._plotting import BLUE, GREEN, GREY, ORANGE, STYLE
+from hoof_env.demo import report
+from hoof_env.evaluation.scores import Score
 
 TEMPLATES = Path(__file__).with_name("templates")
 
@@ -75,17 +76,8 @@ def draw_learning_curve(folder: Path, scores: Sequence[Score], path: Path, **opt
 
 
 def render_template(file: str, /, **values: Any) -> str:
-    """Fill a file of agents/templates; values are escaped in a page of HTML."""
-    from jinja2 import Environment, FileSystemLoader, StrictUndefined
-
-    templates = Environment(
-        loader=FileSystemLoader(TEMPLATES),
-        autoescape=".html" in file,
-        undefined=StrictUndefined,
-        trim_blocks=True,
-        lstrip_blocks=True,
-    )
-    return templates.get_template(file).render(values)
+    """Fill a file of agents/templates, see `hoof_env.demo.report.render_template`."""
+    return report.render_template(TEMPLATES / file, **values)
 
 
 def training_length(folder: Path) -> tuple[int, float]:

@@ -1,6 +1,6 @@
 """Folder of one training run: its files, how they are written and how a model is read back.
 
-    policy.*          the trained policy as plain data (hoof_env/saved_policy.py): this is what is loaded
+    policy.*          the trained policy as plain data (hoof_env/policies/saved.py): this is what is loaded
     model.zip         the trained model (Stable-Baselines3); vecnormalize.pkl: statistics, if normalised
     config.yml        the hyperparameters that were used, in rl-baselines3-zoo's form
     run.json          environment, settings, spaces, command, arguments, versions; "finished" when through
@@ -15,14 +15,12 @@ from __future__ import annotations
 import csv
 import io
 import json
-import platform
 import shlex
 import subprocess
 import sys
 import warnings
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
-from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
 
@@ -31,14 +29,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hoof_env._output import check_folder, staged
-from hoof_env.errors import OutputError, ParameterError
-from hoof_env.saved_policy import ABOUT, WEIGHTS, save_policy
-from hoof_env.saved_policy import CHECKPOINTS as CHECKPOINTS
-from hoof_env.saved_policy import STATISTICS as STATISTICS
-from hoof_env.saved_policy import SavedModel as SavedModel
-from hoof_env.saved_policy import TrainedPolicy as TrainedPolicy
-from hoof_env.saved_record import describe_env as describe_env
-from hoof_env.saved_record import read_record as read_record
+from hoof_env.envs.made import make_env as make_env
+from hoof_env.errors import OutputError
+from hoof_env.evaluation.versions import PACKAGES as PACKAGES
+from hoof_env.evaluation.versions import versions as versions_of_packages
+from hoof_env.policies.record import describe_env as describe_env
+from hoof_env.policies.record import read_record as read_record
+from hoof_env.policies.saved import ABOUT, WEIGHTS, save_policy
+from hoof_env.policies.saved import CHECKPOINTS as CHECKPOINTS
+from hoof_env.policies.saved import STATISTICS as STATISTICS
+from hoof_env.policies.saved import SavedModel as SavedModel
+from hoof_env.policies.saved import TrainedPolicy as TrainedPolicy
 
 MODEL = "model.zip"
 CONFIG = "config.yml"
@@ -48,8 +49,6 @@ FILES = (MODEL, WEIGHTS, ABOUT, CONFIG, RECORD, MONITOR)
 """Files of a finished run without normalisation, except TensorBoard's."""
 
 DEFAULT_ENV = "hoof_env/HorseLeg-v0"
-
-PACKAGES = ("hoof-env", "numpy", "gymnasium", "numba", "stable-baselines3", "sb3-contrib", "torch")
 
 
 @contextmanager
@@ -79,20 +78,6 @@ def alone(folder: Path) -> Iterator[None]:
         raise
     finally:
         lock.release()
-
-
-def make_env(env_id: str, **kwargs: Any) -> gym.Env[Any, Any]:
-    """Call `gymnasium.make`; `ParameterError` for an unknown id, or an argument that the environment does not
-    take."""
-    try:
-        return gym.make(env_id, **kwargs)
-    except ParameterError:
-        raise
-    except (gym.error.Error, ModuleNotFoundError, TypeError) as error:
-        raise ParameterError(
-            f"environment {env_id!r} with {kwargs or 'no arguments'}: expected a registered id and arguments "
-            f"that it takes: {error}"
-        ) from None
 
 
 def make_vec_env(env_id: str, n_envs: int, num_threads: int = 1, **kwargs: Any) -> Any:
@@ -129,10 +114,7 @@ def command() -> str:
 
 def versions() -> dict[str, str]:
     """Return Python, platform, the packages that a result depends on, and the git commit if there is one."""
-    packages = {"python": platform.python_version(), "platform": f"{platform.system()} {platform.machine()}"}
-    for package in PACKAGES:
-        with suppress(PackageNotFoundError):
-            packages[package] = version(package)
+    packages = versions_of_packages()
     with suppress(OSError, subprocess.SubprocessError):
         command = ["git", "-C", str(Path(__file__).parent), "describe", "--always", "--dirty", "--abbrev=12"]
         packages["commit"] = subprocess.run(

@@ -12,14 +12,14 @@ import numpy as np
 import yaml
 
 from hoof_env.errors import DataFileError
-from hoof_env.saved_policy import ALGORITHMS as ALGORITHMS
-from hoof_env.saved_policy import algorithm_class as library_class
+from hoof_env.policies.saved import ALGORITHMS as ALGORITHMS
+from hoof_env.policies.saved import algorithm_class as library_class
 
 Algorithm = Literal["ppo", "ppo_flat", "sac", "td3", "tqc"]  # `ALGORITHMS` and our own, for the commands
 
 
 def algorithm_class(name: str) -> Any:
-    """Return the class of an algorithm: those of `saved_policy.algorithm_class`, and `agents.ppo_flat`."""
+    """Return the class of an algorithm: those of `saved.algorithm_class`, and `agents.ppo_flat`."""
     if name != "ppo_flat":
         return library_class(name)
     from agents.ppo_flat import FlatPPO

@@ -3,15 +3,16 @@
     python -m agents.ship runs/baselines                for each id the best of all runs beneath this folder
     python -m agents.ship runs/ppo-HorseLeg-v0-s0       this run
 
-The best of an id is that with the highest mean return in episodes on which nothing is reported. Its folder
-agents/policies/NAME, written whole or not at all, holds the exported policy and its weights as plain data,
-how it was trained, its returns with those of gaits and how far other machines may be off, a model card, a
-curve and a film. agents/policies/README.md lists all shipped policies.
+The best of an id is that with the highest mean return in episodes on which nothing is reported. What plays is
+in the package, hoof_env/data/policies/NAME: its weights as plain data, how it was trained, its returns with
+those of gaits and how far other machines may be off. agents/policies/NAME has the exported policy, a model
+card, a curve and a film, and agents/policies/README.md lists all. Each folder is written whole or not at all.
 """
 
 from __future__ import annotations
 
 import json
+import os
 import shlex
 import shutil
 from collections.abc import Sequence
@@ -26,19 +27,21 @@ from tyro.conf import Positional
 
 from agents import runs
 from agents.command import run
-from agents.evaluate import METRICS, Score, cell, to_json
-from agents.export import about, write_policy
+from agents.export import write_policy
 from agents.pages import draw_learning_curve, render_template, training_length
-from agents.score import FINAL_SEEDS as SCORE_SEEDS
-from agents.score import score_vector
-from agents.statistics import Interval
 from hoof_env._output import check_folder, markdown_table, staged
 from hoof_env.envs.policies import STANDS_FOR
+from hoof_env.envs.shipped import SHIPPED
 from hoof_env.errors import DataFileError, OutputError, ParameterError, check_choice, parse_json
+from hoof_env.evaluation.episodes import FINAL_SEEDS as SCORE_SEEDS
+from hoof_env.evaluation.episodes import score_vector
+from hoof_env.evaluation.scores import METRICS, Score, cell, to_json
+from hoof_env.evaluation.statistics import Interval
 from hoof_env.film import render_episode
+from hoof_env.policies.onnx_file import FILE, OnnxPolicy
+from hoof_env.policies.record import about, environment_of, own_id
+from hoof_env.policies.saved import ABOUT, WEIGHTS
 from hoof_env.records import surroundings
-from hoof_env.saved_policy import ABOUT, FILE, WEIGHTS, OnnxPolicy
-from hoof_env.saved_record import environment_of, own_id
 from hoof_env.tasks.registry import TASKS
 
 POLICIES = Path(__file__).with_name("policies")
@@ -61,8 +64,11 @@ FILM_LIMIT = 650_000
 FILM_SECONDS = 4.0
 
 FILM = "film.gif"
+SCORE = "score.json"
 
 COPIED = (WEIGHTS, ABOUT, runs.CONFIG)
+PACKAGED = (WEIGHTS, ABOUT, runs.RECORD, SCORE)
+"""Files of the package; the others are looked at."""
 
 
 @dataclass(frozen=True)
@@ -74,7 +80,7 @@ class Args:
     ids: tuple[str, ...] = ()
     """only these ids"""
     out: Path = POLICIES
-    """folder for the policies' folders"""
+    """folder for the policies' folders; in another one than this they have all files"""
 
 
 UNTRAINED = {"hoof_env/HorseRough-v0": "hoof_env/Horse-v0"}
@@ -164,7 +170,7 @@ def ship(choice: Choice, env_id: str, out: Path) -> dict[str, Any]:
                 shutil.copyfile(saved.path.with_name(name), stage / name)
         (stage / runs.RECORD).write_text(json.dumps(record, indent=2) + "\n", encoding="utf-8")
         text = json.dumps(score, indent=1, allow_nan=False)
-        (stage / "score.json").write_text(text + "\n", encoding="utf-8")
+        (stage / SCORE).write_text(text + "\n", encoding="utf-8")
         no_name = {"Software": None}  # the drawing program's name would change the file
         draw_learning_curve(saved.path.parent, scores, stage / "curve.png", dpi=90, metadata=no_name)
         shown = shared_film(stage, out / trained_on.rpartition("/")[2]) if env_id != played_on else ""
@@ -176,12 +182,17 @@ def ship(choice: Choice, env_id: str, out: Path) -> dict[str, Any]:
             raise OutputError(f"{folder}: expected at most {LIMIT:,} bytes, got {size:,}")
     if shown:
         (folder / FILM).unlink(missing_ok=True)  # of an earlier policy
+    if out == POLICIES:
+        with staged(SHIPPED / folder.name) as stage:
+            for name in filter(lambda name: (folder / name).is_file(), PACKAGED):
+                os.replace(folder / name, stage / name)
     return score
 
 
 def shared_film(folder: Path, other: Path) -> str:
     """Find a film of the same weights in another policy's folder, as a link from `folder`; "" for none."""
-    both = folder / WEIGHTS, other / WEIGHTS
+    beside = SHIPPED / other.name if other.parent == POLICIES else other
+    both = folder / WEIGHTS, beside / WEIGHTS
     if not all(file.is_file() for file in (*both, other / FILM)):
         return ""
     return f"../{other.name}/{FILM}" if both[0].read_bytes() == both[1].read_bytes() else ""
@@ -301,11 +312,11 @@ def write_card(
     (folder / "card.md").write_text(text, encoding="utf-8")
 
 
-def write_index(folder: Path) -> None:
-    """Write README.md, the table of the policies in `folder`."""
+def write_index(folder: Path, scores: Path) -> None:
+    """Write README.md into `folder`, the table of its policies, whose scores are beneath `scores`."""
     rows = []
     references = ("open-loop", "run", "reference")
-    for path in sorted(folder.glob("*/score.json")):
+    for path in sorted(scores.glob(f"*/{SCORE}")):
         score = parse_json(path.read_text(encoding="utf-8"))
         algo = parse_json(path.with_name(runs.RECORD).read_text(encoding="utf-8"))["algo"]
         row = [f"`{score['env_id']}`", algo.upper()]
@@ -345,7 +356,7 @@ def main(argv: list[str] | None = None) -> None:
     for env_id in ids:
         score = ship(choices[sources[env_id]], env_id, args.out)
         means = {name: of_policy["mean"]["return"] for name, of_policy in score["policies"].items()}
-        write_index(args.out)
+        write_index(args.out, SHIPPED if args.out == POLICIES else args.out)
         print(f"{env_id}: " + ", ".join(f"{name} {value:.2f}" for name, value in means.items()), flush=True)
 
 

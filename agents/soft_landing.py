@@ -30,13 +30,14 @@ from tyro.conf import Positional
 
 from agents import runs
 from agents.command import run
-from agents.score import find_policy, make_rows
 from agents.soft_terms import CHARGES, PRICE, TERMS, WEIGHTS, id_of
 from agents.train import Args as TrainingArgs
 from agents.train import train
 from hoof_env._output import check_folder, markdown_table
 from hoof_env.envs.policies import start_of
 from hoof_env.errors import count
+from hoof_env.evaluation.episodes import make_rows
+from hoof_env.policies.find import find_policy
 
 FIRST_SEED = 5_000_000  # on which nothing else is played
 

@@ -25,14 +25,14 @@ import numpy as np
 
 from agents import runs, stock_page
 from agents.command import run
-from agents.score import FINAL_SEEDS, make_rows, play_rows
 from agents.settings import FOLDER, load_settings
 from agents.stock_plan import COLUMNS, FIGURES, LEGS, LEGS_PLAN, PLAN, TUNED, Curves, read_curves
 from agents.train import Args as TrainArgs
 from agents.train import make_model
 from hoof_env._output import check_folder
 from hoof_env.errors import ParameterError, check_choice, check_number
-from hoof_env.saved_policy import ALGORITHMS, algorithm_class
+from hoof_env.evaluation.episodes import FINAL_SEEDS, make_rows, play_rows
+from hoof_env.policies.saved import ALGORITHMS, algorithm_class
 
 OUT = Path(__file__).parents[1] / "docs" / "evidence" / "stock"
 """Folder of the published curves."""

@@ -11,10 +11,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from agents import runs
-from agents.score import FINAL_SEEDS, find_policy, make_rows, play_rows
-from agents.statistics import iqm
 from agents.stock_plan import LEG, OTHERS, PLAN, TUNED
 from hoof_env._output import markdown_table, staged
+from hoof_env.evaluation.episodes import FINAL_SEEDS, make_rows, play_rows
+from hoof_env.evaluation.statistics import iqm
+from hoof_env.policies.find import find_policy
 
 BEST = "best open loop"
 

@@ -33,7 +33,7 @@ from agents.settings import (
     normalize_arguments,
 )
 from hoof_env.errors import HoofEnvError, OutputError, ParameterError, check_number
-from hoof_env.saved_policy import WEIGHTS
+from hoof_env.policies.saved import WEIGHTS
 
 
 @dataclass(frozen=True)

@@ -20,8 +20,8 @@ from stable_baselines3.common.callbacks import BaseCallback
 from tqdm import tqdm
 
 from agents import checkpoints, runs
-from agents.score import score_vector
 from hoof_env.errors import HoofEnvError
+from hoof_env.evaluation.episodes import score_vector
 
 
 class DivergedError(HoofEnvError, ArithmeticError):
@@ -180,7 +180,7 @@ class Scorer(BaseCallback):
 
     @abstractmethod
     def keep(self, episodes: list[dict[str, float]]) -> None:
-        """Store or report a score; `episodes` are those of `agents.score.play`."""
+        """Store or report a score; `episodes` are those of `play`."""
 
     def score(self) -> None:
         """Score the policy, with the clock stopped."""

@@ -26,11 +26,12 @@ from stable_baselines3.common.vec_env import VecMonitor  # noqa: E402
 
 from agents import runs  # noqa: E402
 from agents.ppo_flat import FlatPPO  # noqa: E402
-from agents.score import find_policy, make_rows, play_rows  # noqa: E402
 from agents.settings import FOLDER, load_settings, model_arguments  # noqa: E402
 from benchmarks.history import RESULTS, write  # noqa: E402
 from benchmarks.machine import machine, vector_bits  # noqa: E402
 from hoof_env._output import markdown_table  # noqa: E402
+from hoof_env.evaluation.episodes import make_rows, play_rows  # noqa: E402
+from hoof_env.policies.find import find_policy  # noqa: E402
 
 IMPORTED = time.perf_counter()
 

@@ -19,11 +19,12 @@ import numpy as np
 
 from agents import runs
 from agents.command import run
-from agents.score import find_policy, play
 from benchmarks.mujoco_episode import Floats, MujocoEpisode
 from hoof_env._output import check_folder, markdown_table
 from hoof_env.envs.policies import start_of
 from hoof_env.errors import count
+from hoof_env.evaluation.episodes import play
+from hoof_env.policies.find import find_policy
 
 ENV_ID = "hoof_env/HorseLeg-v0"
 POLICY = "agents/policies/HorseLeg-v0"

@@ -43,6 +43,8 @@ if TYPE_CHECKING:
     from hoof_env.leg.geometry import Geometry as Geometry
     from hoof_env.leg.geometry import load_geometry as load_geometry
     from hoof_env.leg.geometry import read_preset as read_preset
+    from hoof_env.policies.find import load_policy as load_policy
+    from hoof_env.policies.onnx_file import stamp_onnx as stamp_onnx
     from hoof_env.tasks.horse_gaits import HorseGait as HorseGait
     from hoof_env.tasks.observation import Entry as Entry
     from hoof_env.tasks.observation import Scale as Scale
@@ -60,6 +62,8 @@ _MODULES = {
     "envs.horse_leg": "HorseLegEnv HorseLegMOEnv RandomizeParameters",
     "tasks.observation": "Entry Scale",
     "envs.policies": "make_policy",
+    "policies.find": "load_policy",
+    "policies.onnx_file": "stamp_onnx",
     "tasks.horse_gaits": "HorseGait",
     "tasks.own_parts": "ActionMap Constant Kept",
     "tasks.reward": "Term",

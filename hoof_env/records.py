@@ -22,7 +22,8 @@ from numpy.typing import NDArray
 import hoof_env
 from hoof_env._output import check_folder, free_memory, staged
 from hoof_env.dynamics.memory import LIFT_OFF
-from hoof_env.envs.policies import constant_gait, load_open_loop, make_policy, policy_names, start_of
+from hoof_env.envs import made
+from hoof_env.envs.policies import start_of
 from hoof_env.errors import (
     MissingExtraError,
     OutputError,
@@ -31,16 +32,17 @@ from hoof_env.errors import (
     check_number,
     parse_pairs,
 )
-from hoof_env.gait import PARAMETERS, GaitParameters
+from hoof_env.gait import PARAMETERS
 from hoof_env.ground.terrain import Terrain
 from hoof_env.lab.c3d import ezc3d, write_c3d
 from hoof_env.lab.forces import THRESHOLD, above_threshold, in_units, limbs_of, onto_surface
 from hoof_env.lab.forces import UNITS as FORCE_UNITS
 from hoof_env.lab.opensim import check_bodies, loads_path, write_mot
 from hoof_env.lab.reactions import JointReactions, reaction_units
+from hoof_env.policies.find import default_policy as default_policy
+from hoof_env.policies.find import find_policy as find_policy
 from hoof_env.render import instant
 from hoof_env.render.instant import UNITS, Columns, Surroundings, columns_of, units_of_legs
-from hoof_env.saved_policy import find_saved
 
 RECORD = {name: unit for name, unit in UNITS.items() if name not in PARAMETERS[1:]} | {"free_moment": "N m"}
 """Units of a record's columns: fields of `Instant` without the swing's parameters, which are known at the
@@ -97,59 +99,10 @@ def make_env(env_id: str, arguments: Mapping[str, Any] | None = None) -> gym.Env
     arguments = dict(arguments or {})
     if "render_mode" in arguments:
         raise ParameterError("render_mode: expected none here, where the environment need not draw itself")
-    try:
-        env = gym.make(env_id, **arguments)
-    except ParameterError:
-        raise
-    except (gym.error.Error, ModuleNotFoundError, TypeError) as error:
-        raise ParameterError(
-            f"environment {env_id!r} with {arguments or 'no arguments'}: expected a registered id and "
-            f"arguments that it takes: {error}"
-        ) from None
+    env = made.make_env(env_id, **arguments)
     # Refuses environments of other packages, which have no substeps to read.
     surroundings(env)
     return env
-
-
-def default_policy(env: gym.Env[Any, Any]) -> str:
-    """Return the name of the policy that plays if none is named."""
-    names = policy_names(env)
-    return next((name for name in ("reference", "run") if name in names), names[0])
-
-
-def find_policy(name: str | None, env: gym.Env[Any, Any], env_id: str, seed: int = 0) -> Any:
-    """Return a policy for an environment; raise `ParameterError` for an unknown name, and `DataFileError`
-    for a file that cannot be read or does not fit.
-
-    The name is that of a gait or of another scripted policy; "6.28,0.7,-0.2,-0.3" (crank speed [rad/s], swing
-    offset, sine and cosine coefficient [rad]); "open-loop", the best gait that this package has for the id;
-    or a path. None is "reference" of a horse, else "run", or the first gait of a preset without one.
-    `seed` is that of the policy "random".
-
-    The .zip or run folder of a model is a pickle: it can run code. An .onnx file, the folder of a shipped
-    policy and a gait's .json are data.
-    """
-    names = policy_names(env)
-    if name is None:
-        name = default_policy(env)
-    if name in names:
-        return make_policy(name, env, seed)
-    if name.endswith(".json"):
-        return load_open_loop(name, env)
-    if name == "open-loop":
-        return load_open_loop(env_id, env)
-    if name.lower().endswith((".zip", ".onnx")) or Path(name).is_dir():
-        return find_saved(Path(name)).load(env, env_id)
-    try:
-        numbers = [float(number) for number in name.split(",")]
-    except ValueError:
-        numbers = []
-    if len(numbers) == len(PARAMETERS):
-        return constant_gait(GaitParameters(*numbers), env, starts_in_it=True)
-    raise ParameterError(
-        f"policy: expected a name ({', '.join(names)}, open-loop), four gait parameters as "
-        f"6.28,0.7,-0.2,-0.3, or the path of a trained model or a gait's .json, got {name!r}"
-    )
 
 
 def episode(

@@ -16,6 +16,7 @@ import tempfile
 import warnings
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from copy import deepcopy
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
@@ -585,10 +586,14 @@ def policies() -> Cases:
         name = env_id.partition("/")[2]
         with tempfile.TemporaryDirectory() as folder:
             scores = Path(folder) / "scores.json"
-            command(
-                "agents.evaluate", "--policy", f"agents/policies/{name}", "--episodes", "3",
-                "--env-id", env_id, "--json", str(scores),
-            )  # fmt: skip
+            policy = f"agents/policies/{name}"
+            # Older bases have another command.
+            if find_spec("agents.evaluate"):
+                options = ("--policy", policy, "--env-id", env_id, "--json", str(scores))
+                command("agents.evaluate", *options, "--episodes", "3")
+            else:
+                options = (policy, "--id", env_id, "--out", str(scores))
+                command("hoof_env.cli", "evaluate", *options, "--episodes", "3")
             found = json.loads(scores.read_text())
             digests = Digests()
             digests.add("episodes", [score["episodes"] for score in found["policies"].values()])

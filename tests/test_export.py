@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 import math
 import sys
-from pathlib import Path
 
 import gymnasium as gym
 import numpy as np
@@ -15,6 +14,7 @@ from hoof_env import __version__, cli, records
 from hoof_env.constants import GRAVITY
 from hoof_env.dynamics.layout import TRUNK_STATE
 from hoof_env.envs.policies import GAITS, make_policy, open_loop_record, start_of
+from hoof_env.envs.shipped import SHIPPED
 from hoof_env.errors import parse_pairs
 from hoof_env.gait import PARAMETERS, load_gait
 from hoof_env.lab.opensim import MOT_COLUMNS
@@ -253,22 +253,24 @@ def test_the_commands_play_the_gait_of_a_file_and_the_best_of_the_repository(tmp
     assert (tmp_path / "file.csv").read_bytes() == (tmp_path / "name.csv").read_bytes()
 
 
-def test_a_trained_model_without_its_library_is_one_line(tmp_path, capsys, monkeypatch):
-    shipped = Path(__file__).parents[1] / "agents" / "policies" / "HorseLeg-v0"
+def test_a_trained_model_without_its_library(tmp_path, capsys, monkeypatch):
+    """A .zip needs it, in one line; plain data are played by NumPy."""
     run = tmp_path / "run"
     run.mkdir()
     for name in ("policy.json", "policy.safetensors", "run.json"):
-        (run / name).write_bytes((shipped / name).read_bytes())
+        (run / name).write_bytes((SHIPPED / "HorseLeg-v0" / name).read_bytes())
     (run / "model.zip").touch()  # beside which the plain data are read
-    command = ["export", "--out", str(tmp_path / "x.csv"), "--seconds", "0.1", "--policy"]
-    with monkeypatch.context() as without:
-        for library in ("stable_baselines3", "safetensors", "safetensors.torch"):
-            without.setitem(sys.modules, library, None)
-        assert cli.main([*command, str(run)]) == 2
-        said = capsys.readouterr().err
-        assert 'reading it needs pip install "hoof-env[train]"' in said
-        assert said.count("\n") == 1
-    assert cli.main([*command, str(run)]) == 0
+    (tmp_path / "alone.zip").touch()
+    command = ["export", "--seconds", "0.1", "--policy"]
+    for library in ("stable_baselines3", "safetensors", "safetensors.torch"):
+        monkeypatch.setitem(sys.modules, library, None)
+    assert cli.main([*command, str(tmp_path / "alone.zip"), "--out", str(tmp_path / "x.csv")]) == 2
+    said = capsys.readouterr().err
+    assert 'reading it needs pip install "hoof-env[train]"' in said
+    assert said.count("\n") == 1
+    for name, policy in (("a.csv", str(run)), ("b.csv", "shipped")):
+        assert cli.main([*command, policy, "--out", str(tmp_path / name)]) == 0
+    assert (tmp_path / "a.csv").read_bytes() == (tmp_path / "b.csv").read_bytes()
 
 
 def test_arguments_are_pairs_or_objects():

@@ -17,7 +17,7 @@ ROOT = Path(__file__).resolve().parent.parent
 HEAVY = {"numba", "torch", "pygame", "matplotlib", "tyro", "stable_baselines3", "scipy", "importlib.metadata"}
 
 
-SHIPPED = {".py", ".json", ".typed", ".toml", ".in", ".md", ".html", ".css", ".js"}
+SHIPPED = {".py", ".json", ".typed", ".toml", ".in", ".md", ".html", ".css", ".js", ".j2", ".safetensors"}
 
 
 @pytest.fixture(scope="module")

@@ -12,12 +12,9 @@ from typing import Any
 import gymnasium
 from sphinx.application import Sphinx
 
-from hoof_env.envs.policies import STANDS_FOR
-from hoof_env.errors import HoofEnvError
 from hoof_env.view.controls import CONDITIONS, PAPER_ID
 from hoof_env.view.playback import Playback
 
-ROOT = Path(__file__).parents[2]
 FOLDER = Path("_static") / "view"
 LIBRARY = "bokeh.min.js"
 SECONDS = {"hoof_env/Horse-v0": 2.0, "hoof_env/HorseLegFixed-v0": 1.0}
@@ -36,19 +33,11 @@ def name_of(env_id: str) -> str:
 
 
 def playback_of(env_id: str) -> Playback:
-    """Return the page of the policy that ships for an id, or of its usual gait where no library plays it."""
-    shipped = ROOT / "agents" / "policies" / STANDS_FOR.get(env_id, env_id).removeprefix("hoof_env/")
-    seconds = SECONDS.get(env_id, USUAL)
+    """Return the page of the policy that ships for an id."""
+    run: dict[str, Any] = {"env_id": env_id, "policy": "shipped"}
     skip = 0.0 if env_id == PAPER_ID else SKIP
-    for policy in (str(shipped / "policy.onnx"), None):
-        try:
-            run: dict[str, Any] = {"env_id": env_id, "policy": policy}
-            title = f"{name_of(env_id)}, " + ("the agent that ships" if policy else "its usual gait")
-            return Playback.play(run, seconds=seconds, skip=skip, title=title)
-        except HoofEnvError:
-            if policy is None:
-                raise
-    raise AssertionError
+    title = f"{name_of(env_id)}, the agent that ships"
+    return Playback.play(run, seconds=SECONDS.get(env_id, USUAL), skip=skip, title=title)
 
 
 def of_paper() -> Playback:

@@ -25,6 +25,7 @@ from hoof_env.envs.manual_bodies import page_of_body
 from hoof_env.envs.manual_common import own_sections, sections_left, shared_sections, without_common
 from hoof_env.envs.manual_words import HERE, TABLES, WORDS, rows_of
 from hoof_env.envs.policies import STANDS_FOR
+from hoof_env.envs.shipped import shipped_returns
 from hoof_env.envs.shown import Markdown
 from hoof_env.errors import DataFileError, OutputError, check_choice
 from hoof_env.render.renderer import USUAL_SIZE
@@ -314,15 +315,14 @@ def _returns(policy: Path, films: Path, name: str) -> dict[str, float]:
     Raises:
         DataFileError: the policy has no scores, or the file of returns cannot be read.
     """
-    path = policy / "score.json"
+    scored = shipped_returns(policy.name)
+    found = {key: scored[key] for key in SCORED if key in scored}
+    path = films / RETURNS
     try:
-        policies = json.loads(path.read_text(encoding="utf-8"))["policies"]
-        found = {key: policies[key]["mean"]["return"] for key in SCORED if key in policies}
-        path = films / RETURNS
         others = json.loads(path.read_text(encoding="utf-8")) if path.is_file() else {}
         return found | others.get(f"hoof_env/{name}-v0", {})
     except (OSError, ValueError, KeyError, TypeError) as error:
-        raise DataFileError(f"scores {path}: expected those that agents.ship writes: {error!r}") from None
+        raise DataFileError(f"returns {path}: expected those that agents.gallery writes: {error!r}") from None
 
 
 def _score(returns: Mapping[str, float]) -> str:

@@ -33,21 +33,12 @@ from agents.baselines_run import (
     seconds_to,
     train_one,
 )
-from agents.score import CURVE_SEEDS, FINAL_SEEDS, score_vector
 from agents.settings import FOLDER, load_settings
-from agents.statistics import (
-    LOWER,
-    Interval,
-    Scored,
-    compare,
-    dominates,
-    dominates_with_confidence,
-    iqm,
-    mean_figures,
-    over_episodes,
-)
+from agents.statistics import LOWER, compare, dominates, dominates_with_confidence
 from hoof_env.envs.policies import open_loop
 from hoof_env.errors import DataFileError
+from hoof_env.evaluation.episodes import CURVE_SEEDS, FINAL_SEEDS, score_vector
+from hoof_env.evaluation.statistics import Interval, Scored, iqm, mean_figures, over_episodes
 from tests.agents.conftest import SHORT, TINY
 
 # The plan

@@ -5,8 +5,8 @@ import pytest
 
 from agents import carry_over
 from agents.runs import make_env
-from agents.score import score_vector
 from agents.ship import POLICIES
+from hoof_env.evaluation.episodes import score_vector
 
 LEG, FIXED = "hoof_env/HorseLeg-v0", "hoof_env/HorseLegFixed-v0"
 AGENT = str(POLICIES / "HorseLeg-v0")

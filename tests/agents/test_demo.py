@@ -12,7 +12,8 @@ import numpy as np
 import pytest
 
 from agents import demo
-from agents.evaluate import METRICS, Args, evaluate
+from hoof_env.demo import demo as shared
+from hoof_env.evaluation.scores import METRICS, evaluate
 from hoof_env.paper.reproduce import SOLVERS
 from hoof_env.paper.rows import load_published
 
@@ -124,9 +125,10 @@ def test_pictures_films_and_versions_of_a_quick_run(report):
 
 
 def test_the_agent_of_the_report_can_be_played(folder):
-    (score,), setting = evaluate(Args(policy=(str(folder),), episodes=2, seed=demo.FIRST_SEED))
+    found = evaluate([str(folder)], episodes=2, seed=demo.FIRST_SEED)
+    (score,) = found.scores
     data = json.loads((folder / "scores.json").read_text())
-    assert setting["env_id"] == data["env_id"]
+    assert found.env_id == data["env_id"]
     shown = [episode["return"] for episode in data["policies"][demo.TRAINED]["episodes"]]
     np.testing.assert_allclose([episode["return"] for episode in score.episodes], shown, rtol=1e-6)
 
@@ -139,9 +141,9 @@ def test_a_failed_run_leaves_the_older_report(folder, monkeypatch, failure):
     def fail(*_, **__):
         raise failure
 
-    monkeypatch.setattr(demo, "reproduce", lambda say: None)
-    monkeypatch.setattr(demo, "write_reproduction", lambda r, stage, **_: (stage / "walk.mp4").touch())
-    monkeypatch.setattr(demo, "print_counts", fail)
+    monkeypatch.setattr(shared, "reproduce", lambda say: None)
+    monkeypatch.setattr(shared, "write_reproduction", lambda r, stage, **_: (stage / "walk.mp4").touch())
+    monkeypatch.setattr(shared, "counted", fail)
     with pytest.raises(type(failure)):
         demo.demo(demo.Args(out=folder, quick=True))
     assert {path.name: path.read_bytes() for path in folder.iterdir()} == before
@@ -150,8 +152,8 @@ def test_a_failed_run_leaves_the_older_report(folder, monkeypatch, failure):
 def test_interrupted_from_the_keyboard_says_one_line(tmp_path):
     """The signal comes while the first step is at work."""
     code = (
-        "import os, signal, sys; from agents import command, demo;"
-        "demo.reproduce = lambda say: os.kill(os.getpid(), signal.SIGINT);"
+        "import os, signal, sys; from agents import command, demo; from hoof_env.demo import demo as shared;"
+        "shared.reproduce = lambda say: os.kill(os.getpid(), signal.SIGINT);"
         "sys.argv = ['demo', '--out', sys.argv[1], '--quick']; command.run(demo.main)"
     )
     out = subprocess.run(

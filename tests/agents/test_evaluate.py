@@ -1,18 +1,22 @@
 """Scores: intervals against known cases, episodes against a loop by hand, models that do not fit."""
 
+import csv
 import json
 import math
-from pathlib import Path
+import warnings
 
 import numpy as np
 import pytest
 
-from agents.evaluate import METRICS, Args, Score, estimate, evaluate, film_paths, main, table, to_json
 from agents.runs import make_env
-from agents.score import find_policy, play
+from hoof_env import cli
 from hoof_env.envs.policies import GAITS, start_of
 from hoof_env.errors import DataFileError
-from tests.agents.conftest import ENV_ID, SHORT, train_tiny
+from hoof_env.evaluation.episodes import play
+from hoof_env.evaluation.scores import METRICS, Score, evaluate, text_table, to_json
+from hoof_env.evaluation.statistics import estimate, iqm
+from hoof_env.policies.find import find_policy
+from tests.agents.conftest import ENV_ID, KWARGS, train_tiny
 
 COLUMNS = set(METRICS)
 
@@ -56,45 +60,57 @@ def test_a_return_is_the_sum_of_its_rewards(env, name):
     )
 
 
-def test_policies_meet_the_same_episodes_whatever_stands_beside_them(env):
-    alone, _ = evaluate(Args(policy=("run",), episodes=2, env_kwargs=SHORT))
-    beside, _ = evaluate(Args(policy=("walk", "run"), episodes=2, env_kwargs=SHORT))
-    assert alone[0] == beside[1]
+def test_policies_meet_the_same_episodes_whatever_stands_beside_them():
+    alone = evaluate(["run"], ENV_ID, KWARGS, episodes=2)
+    beside = evaluate(["walk", "run"], ENV_ID, KWARGS, episodes=2)
+    assert alone.scores[0] == beside.scores[1]
 
 
-def test_table_json_and_video(trained, tmp_path, capsys):
-    scores, video = tmp_path / "scores.json", tmp_path / "film.mp4"
+def test_intervals_are_those_of_scipy():
+    """The bootstrap that the published tables were made with, and that of a skewed sample."""
+    from scipy.stats import bootstrap, trim_mean
+
+    for count in (2, 5, 40):
+        sample = np.random.default_rng(count).gamma(1.5, size=(count, 2))
+        rng = np.random.default_rng(0)
+        bounds = bootstrap((sample[:, 0],), np.mean, rng=rng).confidence_interval
+        found = estimate(sample[:, 0])
+        assert (found.low, found.high) == pytest.approx(tuple(bounds), rel=1e-12)
+
+        def middle(values, axis):
+            return np.asarray(trim_mean(values, 0.25, axis=axis))
+
+        options = {"axis": 0, "n_resamples": 5000, "method": "percentile", "rng": np.random.default_rng(0)}
+        bounds = bootstrap((sample,), middle, **options).confidence_interval
+        np.testing.assert_allclose(iqm(sample), [middle(sample, 0), *bounds], rtol=1e-12)
+
+
+def test_table_and_files(trained, tmp_path, capsys):
     model = str(trained.folder)
-    main(["--policy", "run", model, "--episodes", "2", "--json", str(scores), "--video", str(video)])
-    printed = capsys.readouterr().out
-    assert all(word in printed for title in ("return", "policy") for word in title.split())
-    data = json.loads(scores.read_text())
-    assert data["env_id"] == ENV_ID
-    assert data["env_kwargs"] == {"episode_seconds": 0.4}  # those of the model
+    for name in ("scores.json", "scores.csv"):
+        command = ["evaluate", "run", model, "--episodes", "2", "--out", str(tmp_path / name)]
+        assert cli.main(command) == 0
+        where, _, head, means, intervals, *_ = capsys.readouterr().out.splitlines()
+        assert where == f"{ENV_ID} with {KWARGS}, episodes 1,000 to 1,001"  # the arguments of the model
+        assert head.startswith("policy ")
+        assert "return" in head
+        assert means.startswith("run ")
+        assert intervals.split()[0].startswith("[")
+    data = json.loads((tmp_path / "scores.json").read_text())
+    assert (data["env_id"], data["env_kwargs"]) == (ENV_ID, KWARGS)
     assert set(data["policies"]) == {"run", model}
     for policy in data["policies"].values():
         assert set(policy["mean"]) == set(policy["interval95"]) == COLUMNS
         assert len(policy["episodes"]) == 2
-        assert policy["mean"]["return"] == pytest.approx(
-            np.mean([one["return"] for one in policy["episodes"]])
-        )
-    for name in ("run", trained.folder.name):
-        check_film(tmp_path / f"film-{name}.mp4", seconds=0.4)
-
-
-def check_film(path, seconds):
-    """H.264 in yuv420p, with the index in front, and pictures that change."""
-    import imageio_ffmpeg
-
-    reader = imageio_ffmpeg.read_frames(str(path))
-    meta = next(reader)
-    frames = list(reader)
-    assert meta["codec"] == "h264"
-    assert meta["pix_fmt"].startswith("yuv420p")
-    assert len(frames) == pytest.approx(seconds * meta["fps"], abs=1)
-    assert len(set(frames)) > 1
-    content = path.read_bytes()
-    assert content.index(b"moov") < content.index(b"mdat")
+        returns = [one["return"] for one in policy["episodes"]]
+        assert policy["mean"]["return"] == pytest.approx(np.mean(returns))
+    with (tmp_path / "scores.csv").open() as file:
+        rows = list(csv.DictReader(file))
+    assert [(row["policy"], row["seed"]) for row in rows[:2]] == [("run", "1000"), ("run", "1001")]
+    episodes = [episode for policy in data["policies"].values() for episode in policy["episodes"]]
+    assert [float(row["return"]) for row in rows] == [episode["return"] for episode in episodes]
+    assert cli.main(command) == 2
+    assert "exists already" in capsys.readouterr().err
 
 
 def test_json_has_no_infinity():
@@ -102,18 +118,24 @@ def test_json_has_no_infinity():
     data = to_json([score])
     assert data["policies"]["still"]["mean"]["cost_of_transport"] is None
     json.dumps(data, allow_nan=False)
-    assert table([score]).row_count == 1
+
+
+def test_an_episode_of_a_figure_that_is_missing_has_no_column():
+    head, *_ = text_table([Score("other", [{"return": 1.0}] * 2)]).splitlines()
+    assert head.split() == ["policy", "return"]
 
 
 def test_the_file_of_a_gait_names_the_environment():
-    _, setting = evaluate(Args(policy=("run", str(GAITS / "HorseLegRail-v0-constant.json")), episodes=1))
-    assert setting["env_id"] == "hoof_env/HorseLegRail-v0"
+    found = evaluate(["run", str(GAITS / "HorseLegRail-v0-constant.json")], episodes=1)
+    assert found.env_id == "hoof_env/HorseLegRail-v0"
 
 
 @pytest.mark.parametrize("env_id", [ENV_ID, "hoof_env/HorseLegMO-v0"])
-def test_open_loop_by_its_name(env_id):
-    (score,), _ = evaluate(Args(policy=("open-loop",), env_id=env_id, env_kwargs=SHORT, episodes=1))
-    assert math.isfinite(score.estimates["return"].mean)
+def test_the_open_loop_and_the_shipped_policy_by_their_names(env_id):
+    with warnings.catch_warnings():
+        warnings.filterwarnings("ignore", ".*trained with episode_seconds")
+        found = evaluate(["open-loop", "shipped"], env_id, KWARGS, episodes=1)
+    assert all(math.isfinite(score.estimates["return"].mean) for score in found.scores)
 
 
 def test_model_of_another_environment_is_refused_unopened(trained, monkeypatch):
@@ -129,12 +151,6 @@ def test_model_of_another_environment_is_refused_unopened(trained, monkeypatch):
 
 def test_an_environment_without_summaries(tmp_path):
     folder = train_tiny(tmp_path / "run", env_id="Pendulum-v1", env_kwargs=()).folder
-    (score,), setting = evaluate(Args(policy=(str(folder),), episodes=1))
-    assert setting["env_id"] == "Pendulum-v1"
-    assert set(score.estimates) == {"return"}
-
-
-def test_films_of_two_policies_never_share_a_file():
-    paths = film_paths(Path("gait.mp4"), ["run", "a/ppo", "b/sac/model.zip"])
-    assert [str(path) for path in paths.values()] == ["gait-run.mp4", "gait-ppo.mp4", "gait-sac.mp4"]
-    assert film_paths(Path("gait"), ["run"]) == {"run": Path("gait.mp4")}
+    found = evaluate([str(folder)], episodes=1)
+    assert found.env_id == "Pendulum-v1"
+    assert set(found.scores[0].estimates) == {"return"}

@@ -24,11 +24,11 @@ from agents import export
 from agents.export import main, write_policy
 from agents.ppo_flat import FlatPPO
 from agents.runs import SavedModel, TrainedPolicy, make_env
-from agents.score import play
 from hoof_env.errors import DataFileError
+from hoof_env.evaluation.episodes import play
+from hoof_env.policies.onnx_file import OnnxPolicy
+from hoof_env.policies.record import check_record, describe
 from hoof_env.records import find_policy
-from hoof_env.saved_policy import OnnxPolicy
-from hoof_env.saved_record import check_record, describe
 from tests.agents.conftest import ENV_ID, KWARGS
 
 ROOT = Path(__file__).parents[2]
@@ -119,7 +119,7 @@ def test_other_settings_and_another_version_are_told(env, exported, trained, tmp
     graph.metadata_props.extend(kept)
     onnx.save(graph, old)
     record = OnnxPolicy(exported).record
-    monkeypatch.setattr("hoof_env.saved_record.__version__", record["hoof_env"])
+    monkeypatch.setattr("hoof_env.policies.record.__version__", record["hoof_env"])
     assert record["settings"] == json.loads((trained.folder / "run.json").read_text())["settings"]
     with warnings.catch_warnings():
         warnings.simplefilter("error", UserWarning)
@@ -143,7 +143,7 @@ def test_other_settings_and_another_version_are_told(env, exported, trained, tmp
         pytest.warns(UserWarning, match=r"trained with action_delay=0\.0, here 1\.0$"),
     ):
         check_record(exported, {**record, "settings": newer}, other, ENV_ID)
-    monkeypatch.setattr("hoof_env.saved_record.__version__", "9.9.9")
+    monkeypatch.setattr("hoof_env.policies.record.__version__", "9.9.9")
     with pytest.warns(UserWarning, match=r"trained with hoof-env \d\S*, here 9\.9\.9$"):
         find_policy(str(exported), env, ENV_ID)
 

@@ -11,9 +11,9 @@ import pytest
 from agents import judge, judge_pictures, judges
 from agents.gait_figures import WATCHED, Stance, forces_of, lag_of, play, stances_of, watch
 from agents.judges import read_judges
-from agents.score import make_rows
 from hoof_env.dynamics.layout import Features, stride_sums
 from hoof_env.dynamics.memory import LIFT_OFF
+from hoof_env.evaluation.episodes import make_rows
 from hoof_env.tasks.horse_gaits import reference_gaits
 
 TIME = np.arange(0.0, 6.0, 1e-3)

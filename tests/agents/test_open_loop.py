@@ -10,11 +10,12 @@ import pytest
 from agents import open_loop
 from agents.open_loop import SIZES, Args, decode, encode, main, optimise, search
 from agents.runs import make_env
-from agents.score import find_policy, play, score_vector
 from hoof_env import records
 from hoof_env.envs import policies
 from hoof_env.envs.policies import GAITS, load_open_loop, open_loop_record
 from hoof_env.errors import DataFileError
+from hoof_env.evaluation.episodes import play, score_vector
+from hoof_env.policies.find import find_policy
 from hoof_env.tasks.observation import HIGH, LOW
 from tests.agents.conftest import ENV_ID, KWARGS, SHORT
 

@@ -14,7 +14,7 @@ from agents.perceptrons import CHUNK, tanh
 from agents.ppo_flat import FlatPPO, Gradient, Scale
 from agents.train import Args, train
 from agents.watch import DivergedError
-from hoof_env.saved_policy import find_saved
+from hoof_env.policies.find import find_saved
 from hoof_env.simd import threads
 from hoof_env.simd.compile import kernel
 

@@ -14,13 +14,15 @@ import pytest
 import torch
 from safetensors.torch import load_file, save_file
 
-from agents import export, score
+from agents import export
 from agents.runs import SavedModel, make_env
-from agents.score import find_policy
 from hoof_env.envs.policies import GAITS
 from hoof_env.errors import DataFileError, HoofEnvError, OutputError, ParameterError
-from hoof_env.saved_policy import ABOUT, WEIGHTS, OnnxPolicy
-from tests.agents.conftest import ENV_ID, KWARGS, SHORT, change, save_untrained
+from hoof_env.evaluation import scores
+from hoof_env.policies.find import find_policy
+from hoof_env.policies.onnx_file import OnnxPolicy
+from hoof_env.policies.saved import ABOUT, WEIGHTS
+from tests.agents.conftest import ENV_ID, KWARGS, change, save_untrained
 
 RAIL = "hoof_env/HorseLegRail-v0"
 
@@ -261,7 +263,7 @@ def test_missing_packages(package, call, run, exported, tmp_path, monkeypatch):
     assert not list(tmp_path.iterdir())
 
 
-# What `agents.score` plays: nothing that was found or trained for something else
+# What `hoof-env evaluate --published` plays: nothing that was found or trained for something else
 
 RUN_GAIT = GAITS / "HorseLegRail-v0-constant.json"
 
@@ -299,16 +301,16 @@ def as_it_was(folder, trained):
 
 
 SCORES = [
-    (as_it_was, {"env_id": RAIL, "env_kwargs": SHORT}, "trained for env_id hoof_env/HorseLeg-v0"),
-    (as_it_was, {"env_kwargs": ("episode_seconds=1",)}, "episode_seconds=0.4, here .* another task"),
-    (as_it_was, {"env_kwargs": (*SHORT, "friction=0.1")}, "trained with friction"),
+    (as_it_was, {"env_id": RAIL, "env_kwargs": KWARGS}, "trained for env_id hoof_env/HorseLeg-v0"),
+    (as_it_was, {"env_kwargs": {"episode_seconds": 1}}, "episode_seconds=0.4, here .* another task"),
+    (as_it_was, {"env_kwargs": {**KWARGS, "friction": 0.1}}, "trained with friction"),
     (trained_as("settings", preset="pony.json"), {}, "preset='pony.json', here 'identified'"),
     (trained_as("versions", **{"hoof-env": "0.0.1"}), {}, "hoof-env 0.0.1, here"),
     (found_as(), {"env_id": ENV_ID}, " found for hoof_env/HorseLegRail-v0"),
     (found_as(versions={"hoof-env": "9.9.9"}), {"env_id": RAIL}, " found for hoof-env 9.9.9, here"),
     (
         found_as(env_kwargs={"preset": "first_fit"}),
-        {"env_id": RAIL, "env_kwargs": ("preset=identified",)},
+        {"env_id": RAIL, "env_kwargs": {"preset": "identified"}},
         "preset='first_fit', here",
     ),
     *(
@@ -328,6 +330,6 @@ SCORES = [
 @pytest.mark.parametrize(("policy", "kwargs", "words"), SCORES)
 def test_scores(policy, kwargs, words, trained, tmp_path, monkeypatch):
     if "finite actions" not in words:
-        monkeypatch.setattr(score, "score_vector", lambda *_, **__: pytest.fail("was played"))
+        monkeypatch.setattr(scores, "score_vector", lambda *_, **__: pytest.fail("was played"))
     with pytest.raises(HoofEnvError, match=words):
-        score.score(score.Args((str(policy(tmp_path, trained)),), **kwargs))
+        scores.evaluate([str(policy(tmp_path, trained))], **kwargs, published=True)

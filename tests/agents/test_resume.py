@@ -20,7 +20,7 @@ from agents.runs import CHECKPOINTS, SavedModel, alone
 from agents.train import Args, main, train
 from agents.watch import DivergedError
 from hoof_env.errors import DataFileError, OutputError, ParameterError
-from hoof_env.saved_policy import ABOUT, WEIGHTS
+from hoof_env.policies.saved import ABOUT, WEIGHTS
 from tests.agents.conftest import ENV_ID, SHORT, TINY, train_tiny, training_episodes
 
 KILLS = 2

@@ -10,7 +10,7 @@ import torch
 from stable_baselines3 import PPO
 
 from agents.runs import STATISTICS, SavedModel
-from hoof_env.saved_policy import ABOUT, WEIGHTS
+from hoof_env.policies.saved import ABOUT, WEIGHTS
 from tests.agents.conftest import ENV_ID, change, save_untrained
 
 

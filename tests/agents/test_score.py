@@ -9,13 +9,16 @@ import sys
 import numpy as np
 import pytest
 
-from agents import score
 from agents.open_loop import decode
 from agents.runs import make_env
-from agents.score import Args, find_policy, play, score_vector
+from hoof_env import cli
 from hoof_env.envs.policies import Scripted, open_loop
 from hoof_env.errors import DataFileError
-from hoof_env.saved_record import environment_of
+from hoof_env.evaluation import episodes as played
+from hoof_env.evaluation import scores
+from hoof_env.evaluation.episodes import play, score_vector
+from hoof_env.policies.find import find_policy
+from hoof_env.policies.record import environment_of
 from tests.agents.conftest import ENV_ID, KWARGS, SHORT
 
 SEEDS = [7, 3, 4, 11, 12]
@@ -29,7 +32,7 @@ def one_by_one(name, env_id, seeds, **kwargs):
 
 @pytest.mark.parametrize("name", ["run", "idle", "bang-bang", "drag"])
 def test_a_scripted_policy_to_the_bit(name, monkeypatch):
-    monkeypatch.setattr(score, "ROWS", 3)  # two batches
+    monkeypatch.setattr(played, "ROWS", 3)  # two batches
     kwargs = {"episode_seconds": 0.8}
     assert score_vector(name, ENV_ID, SEEDS, **kwargs) == one_by_one(name, ENV_ID, SEEDS, **kwargs)
 
@@ -74,7 +77,7 @@ def test_episodes_of_a_gait_start_in_it(env):
 
 def test_an_environment_without_rows_is_played_one_by_one(monkeypatch):
     rows = score_vector("run", ENV_ID, SEEDS, **KWARGS)
-    monkeypatch.setattr(score, "make_rows", lambda *_, **__: None)
+    monkeypatch.setattr(played, "make_rows", lambda *_, **__: None)
     assert score_vector("run", ENV_ID, SEEDS, **KWARGS) == rows
 
 
@@ -87,11 +90,11 @@ def act(observations):
 
 
 def test_each_policy_gets_the_line_of_the_table(capsys, tmp_path, monkeypatch, trained):
-    monkeypatch.setattr(score, "FINAL_SEEDS", range(1_000_000, 1_000_005))
+    monkeypatch.setattr(scores, "FINAL_SEEDS", range(1_000_000, 1_000_005))
     other = shutil.copytree(trained.folder, tmp_path / "other")
-    given = ["run", f"{__name__}:act", str(trained.folder), str(other), "--csv", str(tmp_path / "all.csv")]
-    given += ["--env-kwargs", *SHORT]
-    score.main(given)
+    given = ["run", f"{__name__}:act", str(trained.folder), str(other)]
+    options = ["--published", "--out", str(tmp_path / "all.csv"), "--args", *SHORT]
+    assert cli.main(["evaluate", *given, *options]) == 0
     where, _, head, _, *table = capsys.readouterr().out.splitlines()
     assert where == f"{ENV_ID} with {KWARGS}, episodes 1,000,000 to 1,000,004"
     assert [cell.strip() for cell in head.split("|")[1:4]] == ["policy", "return", "speed m/s"]
@@ -106,10 +109,10 @@ def test_each_policy_gets_the_line_of_the_table(capsys, tmp_path, monkeypatch, t
 
 
 def test_a_model_without_a_record_is_told(trained, tmp_path, monkeypatch):
-    monkeypatch.setattr(score, "score_vector", lambda *_, **__: [])
+    monkeypatch.setattr(scores, "score_vector", lambda *_, **__: [])
     bare = shutil.copy(trained.folder / "model.zip", tmp_path / "bare.zip")
     with pytest.warns(UserWarning, match=r"bare.zip: nothing says what it was trained for"):
-        score.score(Args((str(bare),), env_kwargs=SHORT))
+        scores.evaluate([str(bare)], env_kwargs=KWARGS, published=True)
 
 
 class TestIdsOfFiles:

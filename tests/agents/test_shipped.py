@@ -16,17 +16,23 @@ if not os.environ.get("CI"):  # which installs it, so that nothing may be left o
 
 from agents import ship
 from agents.runs import SavedModel, make_env
-from agents.score import score_vector
+from hoof_env.envs.shipped import SHIPPED as DATA
 from hoof_env.errors import DataFileError, ParameterError
-from hoof_env.saved_policy import OnnxPolicy
+from hoof_env.evaluation.episodes import score_vector
+from hoof_env.policies.onnx_file import OnnxPolicy
 from tests.agents.conftest import train_tiny
 
-FOLDERS = sorted(path.parent for path in ship.POLICIES.glob("*/score.json"))
+FOLDERS = sorted(path.parent for path in ship.POLICIES.glob("*/card.md"))
 SHIPPED = pytest.mark.parametrize("folder", FOLDERS, ids=lambda path: path.name)
 
 
 def read(path: Path) -> dict:
     return json.loads(path.read_text())
+
+
+def data_of(folder: Path) -> Path:
+    """The folder with what plays: in the package, where the policy ships."""
+    return DATA / folder.name if folder.parent == ship.POLICIES else folder
 
 
 def checked_mean(policy, score: dict) -> float:
@@ -47,14 +53,14 @@ def test_the_index_is_what_the_command_writes(tmp_path):
     for folder in FOLDERS:
         (tmp_path / folder.name).mkdir()
         for name in ("score.json", "run.json"):
-            shutil.copy(folder / name, tmp_path / folder.name)
-    ship.write_index(tmp_path)
+            shutil.copy(data_of(folder) / name, tmp_path / folder.name)
+    ship.write_index(tmp_path, tmp_path)
     assert (tmp_path / "README.md").read_text() == (ship.POLICIES / "README.md").read_text()
 
 
 @SHIPPED
 def test_score(folder):
-    score = read(folder / "score.json")
+    score = read(data_of(folder) / "score.json")
     with make_env(score["env_id"]) as env, warnings.catch_warnings():
         # No word of settings that are newer than the policy; one that was trained elsewhere says so
         is_trained = score["env_id"] not in ship.UNTRAINED
@@ -72,9 +78,9 @@ def test_score(folder):
 
 @SHIPPED
 def test_weights_act_as_the_exported_policy(folder):
-    saved = SavedModel.find(folder)
+    saved = SavedModel.find(data_of(folder))
     assert saved.is_plain
-    env_id = read(folder / "score.json")["env_id"]
+    env_id = read(data_of(folder) / "score.json")["env_id"]
     with make_env(env_id) as env:
         weights, onnx = saved.load(env, env_id), OnnxPolicy(folder).load(env, env_id)
         env.observation_space.seed(1)
@@ -86,10 +92,10 @@ def test_weights_act_as_the_exported_policy(folder):
 
 @SHIPPED
 def test_folder(folder):
-    files = {path.name: path.stat().st_size for path in folder.iterdir()}
+    files = {path.name: path.stat().st_size for each in (folder, data_of(folder)) for path in each.iterdir()}
     assert {"policy.onnx", "run.json", "config.yml", "score.json", "card.md", "curve.png"} <= {*files}
     assert sum(files.values()) <= ship.LIMIT
-    score, card = read(folder / "score.json"), (folder / "card.md").read_text()
+    score, card = read(data_of(folder) / "score.json"), (folder / "card.md").read_text()
     assert score["env_id"].endswith(f"/{folder.name}")
     assert np.mean(score["returns"]) == pytest.approx(score["policies"]["policy"]["mean"]["return"], abs=1e-3)
     assert f"value: {np.mean(score['returns']):.2f} +/-" in card
@@ -98,12 +104,13 @@ def test_folder(folder):
     assert (folder / film).is_file()
     assert ("film.gif" in files) == (film == "film.gif")
     for name in ("card.md", "run.json", "score.json", "policy.onnx"):
-        assert not re.search(rb"/(home|work|root|tmp|Users)/", (folder / name).read_bytes()), name
+        path = next(each / name for each in (folder, data_of(folder)) if (each / name).is_file())
+        assert not re.search(rb"/(home|work|root|tmp|Users)/", path.read_bytes()), name
 
 
 def test_the_multi_objective_policy_returns_the_same_in_sum():
     folder = ship.POLICIES / "HorseLegMO-v0"
-    score, total, done = read(folder / "score.json"), 0.0, False
+    score, total, done = read(data_of(folder) / "score.json"), 0.0, False
     seed, policy = score["seeds"][0], OnnxPolicy(folder)
     with make_env(score["env_id"]) as env:
         observation, _ = env.reset(seed=seed)
@@ -133,7 +140,7 @@ def test_a_run_is_shipped_by_one_command(tmp_path, monkeypatch, capsys):
     for folder in folders:
         test_folder(folder)
     folder = folders[0]
-    score = read(folder / "score.json")
+    score = read(data_of(folder) / "score.json")
     assert checked_mean(OnnxPolicy(folder), {**score, "check": {"episodes": 3}}) == pytest.approx(
         np.mean(score["returns"]), abs=1
     )

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from agents import stock, stock_page
-from agents.score import FINAL_SEEDS
 from agents.stock import Args
 from agents.stock_plan import COLUMNS, LEG, OTHERS, PLAN, RAIL, TUNED, read_curves
+from hoof_env.evaluation.episodes import FINAL_SEEDS
 
 
 def curve(env_id, algo, seed, returns, every=100):

@@ -16,7 +16,7 @@ import pytest
 from family import HORSE, OTHER, scaled
 
 from hoof_env import cli
-from hoof_env.envs import manual, manual_bodies, manual_words
+from hoof_env.envs import manual, manual_bodies, manual_words, shipped
 from hoof_env.envs.manual import TABLES
 from hoof_env.envs.vector import HorseLegVectorEnv
 from hoof_env.errors import ParameterError
@@ -116,9 +116,10 @@ def test_every_page_says_which_returns_are_good(page):
     assert stock == (f"{others['stock']:.3g}" if "stock" in others else None)
 
 
-def test_a_policy_without_scores_is_named(tmp_path, capsys):
+def test_a_policy_without_scores_is_named(tmp_path, capsys, monkeypatch):
     shutil.copytree(POLICIES / "HorseLeg-v0", tmp_path / "HorseLeg-v0")
     (tmp_path / "HorseLeg-v0" / "score.json").write_text("{}")
+    monkeypatch.setattr(shipped, "SHIPPED", tmp_path)
     assert cli.main(["manual", "--out", str(tmp_path / "out"), "--films", str(tmp_path)]) == 2
     assert "score.json: expected those that agents.ship writes" in capsys.readouterr().err
     assert not (tmp_path / "out").exists()

@@ -14,7 +14,7 @@ from hoof_env import ActionMap, Constant, Entry, Kept, Scale, Term
 from hoof_env.dynamics.layout import TRUNK_STATE
 from hoof_env.envs.manual import page_of
 from hoof_env.errors import ParameterError
-from hoof_env.saved_record import describe_actions
+from hoof_env.policies.record import describe_actions
 from hoof_env.tasks import registry as tasks
 
 ID = "my_lab/Steps-v0"

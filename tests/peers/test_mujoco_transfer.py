@@ -5,9 +5,9 @@ import pytest
 
 pytest.importorskip("mujoco")
 
-from agents.score import find_policy
 from benchmarks import mujoco_transfer as transfer
 from hoof_env import make_policy
+from hoof_env.policies.find import find_policy
 
 pytestmark = pytest.mark.peers
 

@@ -1,10 +1,10 @@
 """Trained policies in files of `agents.train`, `agents.export` and `agents.ship`: finding, reading, playing.
 
     policy.onnx         the policy alone, played by onnxruntime (extra "onnx"); its metadata are its record
-    policy.safetensors  the weights, played by Stable-Baselines3 (extra "train")
+    policy.safetensors  the weights, played by Stable-Baselines3 (extra "train"), or by NumPy (see `plain`)
     policy.json         algorithm, kind of policy, its arguments, both spaces, statistics of the observations
     model.zip           the policy and the state of its training: optimiser, exploration and counters
-    run.json            the record of the training: env_id, settings, spaces, versions (see `saved_record`)
+    run.json            the record of the training: env_id, settings, spaces, versions (see `record`)
 
 Reading the first three, which are plain data, runs no code from a file, although a file may ask for a large
 network, and so for memory. A .zip or .pkl is a pickle and can run any code: load only files that you trust.
@@ -21,43 +21,30 @@ from pathlib import Path
 from typing import Any
 
 import gymnasium as gym
-import numpy as np
-from gymnasium import spaces
-from numpy.typing import NDArray
 
-from hoof_env.envs.shown import line_of
 from hoof_env.errors import (
     DataFileError,
-    HoofEnvError,
     MissingExtraError,
     ParameterError,
     check_choice,
     parse_json,
 )
-from hoof_env.saved_record import check_record as check_record
-from hoof_env.saved_record import describe as describe
-from hoof_env.saved_record import describe_actions as describe_actions
-from hoof_env.saved_record import describe_env as describe_env
-from hoof_env.saved_record import describe_spaces, refuse_misfit
-from hoof_env.saved_record import environment_of as environment_of
-from hoof_env.saved_record import own_id as own_id
-from hoof_env.saved_record import read_record as read_record
-from hoof_env.saved_record import settings_of as settings_of
+from hoof_env.policies.plain import ABOUT as ABOUT
+from hoof_env.policies.plain import FORMAT, Normalizer, built_box
+from hoof_env.policies.plain import WEIGHTS as WEIGHTS
+from hoof_env.policies.record import check_record as check_record
+from hoof_env.policies.record import describe as describe
+from hoof_env.policies.record import describe_actions as describe_actions
+from hoof_env.policies.record import describe_env as describe_env
+from hoof_env.policies.record import describe_spaces, refuse_misfit
+from hoof_env.policies.record import environment_of as environment_of
+from hoof_env.policies.record import own_id as own_id
+from hoof_env.policies.record import read_record as read_record
+from hoof_env.policies.record import settings_of as settings_of
 
 FILE = "policy.onnx"
-WEIGHTS = "policy.safetensors"
-ABOUT = "policy.json"
 STATISTICS = "vecnormalize.pkl"
 CHECKPOINTS = "checkpoints"
-FORMAT = 1  # version of the layout of policy.json
-
-INPUT = "observation"
-OUTPUT = "action"
-"""Names of the graph's input, shape (batch, k), and its output, shape (batch, n), both float32."""
-
-OBJECTS = ("env_kwargs", "settings")
-LISTS = (*OBJECTS, "observation_names", "action_names")
-"""Metadata of an .onnx file that are JSON; the others are text."""
 
 ALGORITHMS = {
     "ppo": "stable_baselines3",
@@ -77,85 +64,6 @@ def algorithm_class(name: str) -> Any:
         raise ParameterError(
             f"algo {name}: expected {module} to be installed (pip install 'hoof-env[train]'): {error}"
         ) from None
-
-
-def find_saved(path: Path) -> OnnxPolicy | SavedModel:
-    """Return the policy in a file or a folder: the .onnx if there is one, else the model of agents.train.
-
-    Raises:
-        DataFileError: there is no policy, or its file or record cannot be read.
-        HoofEnvError: the .onnx needs onnxruntime, which is not installed.
-    """
-    is_onnx = path.suffix.lower() == ".onnx" or (path / FILE).is_file()
-    return OnnxPolicy(path) if is_onnx else SavedModel.find(path)
-
-
-# -- policies in ONNX --------------------------------------------------------------------------
-
-
-class OnnxPolicy:
-    """Policy in an ONNX file, with Stable-Baselines3's `predict`.
-
-    Attributes:
-        path: the file.
-        record: the file's metadata: env_id, env_kwargs, settings, both spaces, names of observations and
-            actions, algo, and the version of hoof_env in which it was trained.
-
-    Args:
-        path: a file of `agents.export`, or a folder that holds one.
-
-    Raises:
-        DataFileError: the file is not one of `agents.export`, or cannot be read.
-        HoofEnvError: onnxruntime is not installed.
-    """
-
-    def __init__(self, path: Path) -> None:
-        try:
-            import onnxruntime
-        except ImportError:
-            raise HoofEnvError(
-                f'policy {path}: reading it needs onnxruntime: pip install "hoof-env[onnx]"'
-            ) from None
-        self.path = path / FILE if path.is_dir() else path
-        options = onnxruntime.SessionOptions()
-        # One thread: in a small network, waiting for other threads takes longer than the arithmetic.
-        options.intra_op_num_threads = 1
-        options.inter_op_num_threads = 1
-        options.log_severity_level = 3  # errors only
-        try:
-            content = self.path.read_bytes()
-            self._session = onnxruntime.InferenceSession(content, options, ["CPUExecutionProvider"])
-            metadata = self._session.get_modelmeta().custom_metadata_map
-            self.record = {key: parse_json(text) if key in LISTS else text for key, text in metadata.items()}
-            names = [node.name for node in (*self._session.get_inputs(), *self._session.get_outputs())]
-            objects = all(isinstance(self.record.get(key, {}), dict) for key in OBJECTS)
-            if names != [INPUT, OUTPUT] or "env_id" not in self.record or not objects:
-                raise ValueError(f"tensors {names}, metadata {self.record}")
-        # Exceptions of onnxruntime have no common base.
-        except Exception as error:
-            reason = (getattr(error, "strerror", None) or str(error) or type(error).__name__).splitlines()[0]
-            raise DataFileError(
-                f"policy {self.path}: expected an ONNX file of agents.export, cannot read it ({reason})"
-            ) from None
-
-    def __repr__(self) -> str:
-        return line_of(
-            "OnnxPolicy", path=self.path, env_id=self.record["env_id"], algo=self.record.get("algo")
-        )
-
-    def load(self, env: Any, env_id: str) -> OnnxPolicy:
-        """Return this policy; raise `DataFileError` if it does not fit `env`, and warn if it was trained with
-        other settings or another version of hoof-env."""
-        check_record(self.path, self.record, env, env_id)
-        return self
-
-    def predict(
-        self, observation: Any, state: Any = None, episode_start: Any = None, deterministic: bool = True
-    ) -> tuple[NDArray[np.float32], Any]:
-        """Return deterministic actions, shape (..., n), for observations of shape (..., k), and `state`."""
-        rows = np.asarray(observation, np.float32)
-        (actions,) = self._session.run([OUTPUT], {INPUT: rows.reshape(-1, rows.shape[-1])})
-        return actions.reshape(*rows.shape[:-1], actions.shape[-1]), state
 
 
 # -- policies of Stable-Baselines3 -------------------------------------------------------------
@@ -322,8 +230,8 @@ def read_plain(folder: Path) -> TrainedPolicy:
         raise ValueError(f"format {about['format']!r}, expected {FORMAT}")
     # Without set-up, which needs an environment and makes a replay buffer; only the policy is built.
     model = algorithm_class(about["algo"])(about["policy"], None, device="cpu", _init_setup_model=False)
-    model.observation_space = _built_box(**about["observation_space"])
-    model.action_space = _built_box(**about["action_space"])
+    model.observation_space = built_box(**about["observation_space"])
+    model.action_space = built_box(**about["action_space"])
     model.policy_kwargs = _built(about["policy_kwargs"])
     model.policy = model.policy_class(
         model.observation_space, model.action_space, lambda _: 0.0, **model.policy_kwargs
@@ -334,37 +242,7 @@ def read_plain(folder: Path) -> TrainedPolicy:
     model.policy.load_state_dict(weights)
     model.policy.set_training_mode(False)
     shape = model.observation_space.shape
-    return TrainedPolicy(model, _Normalizer(shape, **about["normalize"]) if about["normalize"] else None)
-
-
-class _Normalizer:
-    """Normalisation of observations by the formula of Stable-Baselines3's `VecNormalize`.
-
-    Args:
-        shape: shape of an observation.
-        mean, var: running mean and variance of the observations, of that shape.
-        epsilon: constant added to the variance.
-        clip: largest absolute value of a normalised observation.
-
-    Raises:
-        ValueError: the statistics have another shape, or are not finite or not positive.
-    """
-
-    def __init__(
-        self, shape: tuple[int, ...], mean: list[float], var: list[float], epsilon: float, clip: float
-    ) -> None:
-        self.mean = np.array(mean, np.float64)
-        self.var = np.array(var, np.float64)
-        self.epsilon = float(epsilon)
-        self.clip = float(clip)
-        statistics = (self.mean, self.var)
-        sound = all(array.shape == shape and np.isfinite(array).all() for array in statistics)
-        if not sound or not (self.var + self.epsilon > 0).all() or not self.clip > 0:
-            raise ValueError(f"expected statistics of observations of shape {shape}")
-
-    def __call__(self, observation: Any) -> Any:
-        scaled = (observation - self.mean) / np.sqrt(self.var + self.epsilon)
-        return np.clip(scaled, -self.clip, self.clip).astype(np.float32)
+    return TrainedPolicy(model, Normalizer(shape, **about["normalize"]) if about["normalize"] else None)
 
 
 def _plain_box(space: Any) -> dict[str, Any]:
@@ -373,16 +251,6 @@ def _plain_box(space: Any) -> dict[str, Any]:
         [float(x) if math.isfinite(x) else None for x in bound.ravel()] for bound in (space.low, space.high)
     )
     return {"low": low, "high": high, "shape": list(space.shape), "dtype": str(space.dtype)}
-
-
-def _built_box(low: list[Any], high: list[Any], shape: list[int], dtype: str) -> spaces.Box:
-    """Build the box that `_plain_box` has written."""
-    kind: Any = np.dtype(dtype).type
-    least, most = (
-        np.array([default if x is None else x for x in bound], kind).reshape(shape)
-        for bound, default in ((low, -np.inf), (high, np.inf))
-    )
-    return spaces.Box(least, most, dtype=kind)
 
 
 def _plain(value: Any) -> Any:

@@ -1,7 +1,7 @@
 """Record of a saved policy: for which environment it was trained, and whether it fits the one at hand.
 
-A record is the content of run.json in a run folder, or the metadata of an .onnx file. `saved_policy` finds
-and plays the policies themselves.
+A record is the content of run.json in a run folder, or the metadata of an .onnx file. The other
+modules of this package find and play the policies themselves.
 """
 
 from __future__ import annotations
@@ -74,6 +74,16 @@ def default_settings_of(env: Any) -> dict[str, Any]:
     found = {name: value for name, value in defaults.items() if value is not MISSING}
     plain: dict[str, Any] = json.loads(json.dumps(found, default=str))
     return plain
+
+
+def about(env: Any, env_id: str, env_kwargs: dict[str, Any], record: dict[str, Any]) -> dict[str, Any]:
+    """Return the metadata of a policy for an environment; `record` is the run.json of its training, or
+    empty."""
+    known = {key: str(record[key]) for key in ("algo", "seed") if key in record}
+    settings = record.get("settings") or settings_of(env)
+    made_with = record.get("versions", {}).get("hoof-env", __version__)
+    environment = {"env_id": env_id, "env_kwargs": env_kwargs, "settings": settings, "hoof_env": made_with}
+    return environment | describe(env) | known
 
 
 def environment_of(

@@ -1,0 +1,1 @@
+"""Sub-commands of `hoof-env`, see `hoof_env.cli`."""

@@ -1,0 +1,1 @@
+"""Scores of policies: episodes, statistics over them, and tables."""

@@ -1,0 +1,216 @@
+"""Trained policies in ONNX: reading and playing them, and marking those of other exporters.
+
+A policy's graph has one input, observations of shape (batch, k), and gives actions of shape (batch, n). Its
+metadata are the policy's record (see `record`): without them a file does not say for which environment it is,
+nor what its actions mean.
+"""
+
+from __future__ import annotations
+
+import json
+from copy import deepcopy
+from pathlib import Path
+from typing import Any
+
+import gymnasium as gym
+import numpy as np
+from numpy.typing import NDArray
+
+from hoof_env._output import staged
+from hoof_env.envs.shown import line_of
+from hoof_env.errors import DataFileError, HoofEnvError, MissingExtraError, ParameterError, parse_json
+from hoof_env.policies.record import about, check_record
+
+FILE = "policy.onnx"
+
+INPUT = "observation"
+OUTPUT = "action"
+"""Names of input and output in files of `agents.export`. In others the input may have any name, and the
+actions are the output of this name or the first one."""
+
+OBJECTS = ("env_kwargs", "settings")
+LISTS = (*OBJECTS, "observation_names", "action_names")
+"""Metadata of an .onnx file that are JSON; the others are text."""
+
+NUMBERS = {"tensor(float)": np.float32, "tensor(double)": np.float64}
+"""Types of numbers that a graph may take."""
+
+TRIED = 16  # random observations that a stamped policy must answer
+
+
+class OnnxPolicy:
+    """Policy in an ONNX file, with Stable-Baselines3's `predict`.
+
+    Attributes:
+        path: the file.
+        record: the file's metadata: env_id, env_kwargs, settings, both spaces, names of observations and
+            actions, algo, and the version of hoof_env in which it was trained.
+
+    Args:
+        path: a file of `agents.export` or `stamp_onnx`, or a folder that holds one as policy.onnx.
+        content: the bytes of the file if they are known; otherwise they are read.
+
+    Raises:
+        DataFileError: the file is not one of these, or cannot be read.
+        HoofEnvError: onnxruntime is not installed.
+    """
+
+    def __init__(self, path: Path, content: bytes | None = None) -> None:
+        try:
+            import onnxruntime
+        except ImportError:
+            raise HoofEnvError(
+                f'policy {path}: reading it needs onnxruntime: pip install "hoof-env[onnx]"'
+            ) from None
+        self.path = path / FILE if path.is_dir() else path
+        options = onnxruntime.SessionOptions()
+        # One thread: in a small network, waiting for other threads takes longer than the arithmetic.
+        options.intra_op_num_threads = 1
+        options.inter_op_num_threads = 1
+        options.log_severity_level = 3  # errors only
+        try:
+            read = self.path.read_bytes() if content is None else content
+            self._session = onnxruntime.InferenceSession(read, options, ["CPUExecutionProvider"])
+            metadata = self._session.get_modelmeta().custom_metadata_map
+            self.record = {key: parse_json(text) if key in LISTS else text for key, text in metadata.items()}
+            self._read_graph()
+        # Exceptions of onnxruntime have no common base.
+        except Exception as error:
+            reason = (getattr(error, "strerror", None) or str(error) or type(error).__name__).splitlines()[0]
+            raise DataFileError(
+                f"policy {self.path}: expected an ONNX file of agents.export or hoof_env.stamp_onnx, cannot"
+                f" read it ({reason})"
+            ) from None
+
+    def _read_graph(self) -> None:
+        """Read the names and the types of input and output; raise ValueError where they, or the metadata, are
+        none of a policy."""
+        if "env_id" not in self.record:
+            raise ValueError("its metadata name no environment; hoof_env.stamp_onnx(path, env) adds them")
+        if not all(isinstance(self.record.get(key, {}), dict) for key in OBJECTS):
+            raise ValueError(f"metadata {self.record}")
+        inputs = self._session.get_inputs()
+        names = [node.name for node in self._session.get_outputs()]
+        if len(inputs) != 1 or len(inputs[0].shape) != 2 or inputs[0].type not in NUMBERS:
+            given = [(one.name, one.shape) for one in inputs]
+            raise ValueError(f"expected one input of floats, shape (batch, k), got {given}")
+        self._input = inputs[0].name
+        self._numbers = NUMBERS[inputs[0].type]
+        self._batch, self._size = inputs[0].shape
+        self._output = OUTPUT if OUTPUT in names else names[0]
+
+    def __repr__(self) -> str:
+        return line_of(
+            "OnnxPolicy", path=self.path, env_id=self.record["env_id"], algo=self.record.get("algo")
+        )
+
+    def load(self, env: Any, env_id: str) -> OnnxPolicy:
+        """Return this policy; raise `DataFileError` if it does not fit `env`, and warn if it was trained with
+        other settings or another version of hoof-env."""
+        check_record(self.path, self.record, env, env_id)
+        return self
+
+    def predict(
+        self, observation: Any, state: Any = None, episode_start: Any = None, deterministic: bool = True
+    ) -> tuple[NDArray[np.float32], Any]:
+        """Return deterministic actions, shape (..., n), for observations of shape (..., k), and `state`.
+
+        Raises:
+            ParameterError: observations of another size.
+        """
+        numbers = np.asarray(observation, self._numbers)
+        if isinstance(self._size, int) and numbers.shape[-1:] != (self._size,):
+            raise ParameterError(
+                f"observation: expected shape (..., {self._size}) as the policy {self.path.name} takes, got"
+                f" {numbers.shape}"
+            )
+        rows = numbers.reshape(-1, numbers.shape[-1])
+        # An exporter may have fixed the number of rows, as a rule to one.
+        parts = [rows] if not isinstance(self._batch, int) else np.split(rows, len(rows) // self._batch)
+        results = [self._session.run([self._output], {self._input: part})[0] for part in parts]
+        actions = np.concatenate(results).astype(np.float32)
+        return actions.reshape(*numbers.shape[:-1], actions.shape[-1]), state
+
+
+def stamp_onnx(path: str | Path, env: gym.Env[Any, Any], **record: str) -> OnnxPolicy:
+    """Mark an ONNX file of any exporter as a policy for an environment; return the policy.
+
+    The file is changed in place: its metadata get the id, arguments, settings, spaces and names of the
+    environment, the form of its actions, and this version of hoof-env. All commands and `load_policy` take it
+    then, and refuse it where it does not fit. Its graph stays as it is. It must take observations as `env`
+    gives them, (batch, k), and give mean actions, (batch, n), as the output "action" or the first one; with a
+    batch of fixed size that is 1. Actions beyond [-1, 1] are clipped by the environment.
+
+    Args:
+        path: the file.
+        env: the environment for which the policy was trained, made by `gymnasium.make`.
+        **record: more metadata, as algo="ppo" and seed="3".
+
+    Raises:
+        DataFileError: there is no such file, or it does not answer observations of `env` with its actions.
+            The file is as it was.
+        ParameterError: `env` was not made by `gymnasium.make`.
+        MissingExtraError: onnx is not installed (extra "onnx").
+    """
+    try:
+        import onnx
+    except ImportError:
+        raise MissingExtraError('stamping an ONNX file needs onnx: pip install "hoof-env[onnx]"') from None
+    file = Path(path)
+    if env.spec is None:
+        raise ParameterError(f"env: expected an environment made by gymnasium.make, got {env!r}")
+    env_kwargs = arguments_of(env)
+    metadata = about(env, env.spec.id, env_kwargs, {}) | record
+    try:
+        graph = onnx.load(file)
+    # Damaged files raise exceptions of any type.
+    except Exception as error:
+        raise DataFileError(f"policy {file}: expected an ONNX file, cannot read it ({error})") from None
+    kept = {entry.key: entry.value for entry in graph.metadata_props}
+    texts = {key: json.dumps(value) if key in LISTS else str(value) for key, value in metadata.items()}
+    onnx.helper.set_model_props(graph, kept | texts)
+    content = graph.SerializeToString()
+    policy = OnnxPolicy(file, content)
+    check_answers(policy, env)
+    with staged(file.parent) as stage:
+        (stage / file.name).write_bytes(content)
+    return policy
+
+
+def arguments_of(env: gym.Env[Any, Any]) -> dict[str, Any]:
+    """Return the arguments with which an environment was made beyond those of its id, as JSON has them; what
+    JSON cannot hold is left out."""
+    assert env.spec is not None
+    of_id = gym.registry[env.spec.id].kwargs if env.spec.id in gym.registry else {}
+    arguments = {}
+    for key, value in env.spec.kwargs.items():
+        if key == "render_mode" or (key in of_id and of_id[key] == value):
+            continue
+        try:
+            arguments[key] = json.loads(json.dumps(value))
+        except TypeError:
+            continue
+    return arguments
+
+
+def check_answers(policy: OnnxPolicy, env: gym.Env[Any, Any]) -> None:
+    """Raise `DataFileError` unless a policy answers random observations of an environment, several at once
+    and one alone, with finite actions of the right number."""
+    space = deepcopy(env.observation_space)  # its generator is the environment's
+    space.seed(0)
+    seen = np.stack([space.sample() for _ in range(TRIED)])
+    expected = (TRIED, *(env.action_space.shape or ()))
+    try:
+        actions, _ = policy.predict(seen)
+        alone, _ = policy.predict(seen[0])
+        if actions.shape != expected or alone.shape != expected[1:]:
+            raise ValueError(f"shape {actions.shape}")
+        if not np.isfinite(actions).all():
+            raise ValueError("numbers that are not finite")
+    # Exceptions of onnxruntime have no common base.
+    except Exception as error:
+        reason = str(error).splitlines()[0]
+        raise DataFileError(
+            f"policy {policy.path}: expected actions of shape {expected} for observations of shape"
+            f" {seen.shape}, got {reason}; export the mean action, with a batch of any size"
+        ) from None

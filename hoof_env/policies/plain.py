@@ -1,0 +1,195 @@
+"""Trained policies as plain data, played by NumPy alone.
+
+    policy.json         algorithm, kind of policy, its arguments, both spaces, statistics of the observations
+    policy.safetensors  the weights, in the format of the library safetensors: the length of a JSON header,
+                        the header, and the numbers of all tensors
+
+`saved` writes both, and plays with Stable-Baselines3 the kinds of policy that this module does not know.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from gymnasium import spaces
+from numpy.typing import NDArray
+
+from hoof_env.envs.shown import line_of
+from hoof_env.errors import DataFileError, ParameterError, parse_json
+from hoof_env.policies.record import check_record, read_record
+
+WEIGHTS = "policy.safetensors"
+ABOUT = "policy.json"
+FORMAT = 1  # version of the layout of policy.json
+
+Floats = NDArray[np.float64]
+ACTIVATIONS: Mapping[str, Callable[[Floats], Floats]] = {
+    "Tanh": np.tanh,
+    "ReLU": lambda x: np.maximum(x, 0.0),
+    "ELU": lambda x: np.where(x > 0, x, np.expm1(np.minimum(x, 0.0))),
+}
+"""Functions of the hidden layers by their names in torch.nn; Tanh is Stable-Baselines3's default."""
+
+KNOWN = ("activation_fn", "net_arch", "log_std_init", "ortho_init")
+"""Arguments of a policy of PPO with which NumPy plays it; others may change what its weights mean."""
+
+
+class NumpyPolicy:
+    """Deterministic policy of PPO whose weights are plain data, with Stable-Baselines3's `predict`.
+
+    Attributes:
+        path: the folder of its files.
+        record: content of run.json in the folder, empty if the file is missing.
+        observation_space, action_space: its spaces.
+
+    Args:
+        path: a folder with `ABOUT` and `WEIGHTS`.
+
+    Raises:
+        DataFileError: the files cannot be read, or are of a policy that `is_known` does not know.
+    """
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+        self.record = read_record(path)
+        try:
+            about = parse_json((path / ABOUT).read_text(encoding="utf-8"))
+            if not is_known(about):
+                raise ValueError(f"a policy that NumPy does not play: {about.get('algo')} {about['policy']}")
+            self.observation_space = built_box(**about["observation_space"])
+            self.action_space = built_box(**about["action_space"])
+            arguments = about["normalize"]
+            self._normalize = (
+                Normalizer(self.observation_space.shape, **arguments) if arguments else lambda x: x
+            )
+            hidden = about["policy_kwargs"].get("activation_fn", {"torch.nn": "Tanh"})
+            self._activation = ACTIVATIONS[hidden["torch.nn"]]
+            self._layers = layers_of(read_tensors(path / WEIGHTS))
+            first, _ = self._layers[0]
+            last, _ = self._layers[-1]
+            if (first.shape[1:], last.shape[:1]) != (self.observation_space.shape, self.action_space.shape):
+                raise ValueError(f"weights of shapes {first.shape} to {last.shape}")
+        except (OSError, ValueError, TypeError, KeyError, AttributeError) as error:
+            raise DataFileError(
+                f"policy {path}: expected {ABOUT} and {WEIGHTS} of agents.train, cannot read them ({error})"
+            ) from None
+
+    def __repr__(self) -> str:
+        record = self.record
+        return line_of("NumpyPolicy", path=self.path, env_id=record.get("env_id"), algo=record.get("algo"))
+
+    def load(self, env: Any, env_id: str) -> NumpyPolicy:
+        """Return this policy; raise `DataFileError` if it does not fit `env`, and warn if it was trained with
+        other settings or another version of hoof-env."""
+        check_record(self.path, self.record, env, env_id)
+        return self
+
+    def predict(
+        self, observation: Any, state: Any = None, episode_start: Any = None, deterministic: bool = True
+    ) -> tuple[NDArray[np.float32], Any]:
+        """Return deterministic actions, shape (..., n), for observations of shape (..., k), and `state`.
+
+        Raises:
+            ParameterError: observations of another size.
+        """
+        numbers = np.asarray(observation, np.float32)
+        size = self.observation_space.shape
+        if numbers.shape[-1:] != size:
+            raise ParameterError(
+                f"observation: expected shape (..., {size[0]}) as the policy {self.path.name} was trained"
+                f" with, got {numbers.shape}"
+            )
+        *hidden, (matrix, bias) = self._layers
+        # In double precision, so that a row of many is rounded to the same action as the row alone.
+        x = self._normalize(numbers).astype(np.float64)
+        for weights, offset in hidden:
+            x = self._activation(x @ weights.T + offset)
+        actions = np.clip(x @ matrix.T + bias, self.action_space.low, self.action_space.high)
+        return actions.astype(np.float32), state
+
+
+def is_known(about: Mapping[str, Any]) -> bool:
+    """Return True if `NumpyPolicy` plays the policy that a content of policy.json describes."""
+    arguments = about.get("policy_kwargs", {})
+    kind = arguments.get("activation_fn", {"torch.nn": "Tanh"})
+    is_kind = (about.get("format"), about.get("algo"), about.get("policy")) == (FORMAT, "ppo", "MlpPolicy")
+    return is_kind and set(arguments) <= set(KNOWN) and kind.get("torch.nn") in ACTIVATIONS
+
+
+def read_tensors(path: Path) -> dict[str, Floats]:
+    """Read a file of safetensors with numbers of float32, by name.
+
+    Raises:
+        OSError, ValueError, TypeError, KeyError: there is no such file, it is damaged, or its numbers are of
+            another type or not finite.
+    """
+    content = path.read_bytes()
+    start = 8 + int.from_bytes(content[:8], "little")
+    tensors = {}
+    for name, entry in parse_json(content[8:start]).items():
+        if name == "__metadata__":
+            continue
+        begin, end = entry["data_offsets"]
+        if entry["dtype"] != "F32":
+            raise ValueError(f"{path.name}: numbers of type {entry['dtype']}, expected F32")
+        numbers = np.frombuffer(content[start + begin : start + end], "<f4").reshape(entry["shape"])
+        if not np.isfinite(numbers).all():
+            raise ValueError(f"{path.name} holds numbers that are not finite")
+        tensors[name] = numbers.astype(np.float64)
+    return tensors
+
+
+def layers_of(tensors: Mapping[str, Floats]) -> list[tuple[Floats, Floats]]:
+    """Return matrix and bias of each layer from the observation to the mean action, by the names that PPO of
+    Stable-Baselines3 gives them."""
+    prefix = "mlp_extractor.policy_net."
+    numbers = sorted(
+        int(name.removeprefix(prefix).removesuffix(".weight"))
+        for name in tensors
+        if name.startswith(prefix) and name.endswith(".weight")
+    )
+    names = [*(f"{prefix}{number}" for number in numbers), "action_net"]
+    return [(tensors[f"{name}.weight"], tensors[f"{name}.bias"]) for name in names]
+
+
+class Normalizer:
+    """Normalisation of observations by the formula of Stable-Baselines3's `VecNormalize`.
+
+    Args:
+        shape: shape of an observation.
+        mean, var: running mean and variance of the observations, of that shape.
+        epsilon: constant added to the variance.
+        clip: largest absolute value of a normalised observation.
+
+    Raises:
+        ValueError: the statistics have another shape, or are not finite or not positive.
+    """
+
+    def __init__(
+        self, shape: tuple[int, ...], mean: list[float], var: list[float], epsilon: float, clip: float
+    ) -> None:
+        self.mean = np.array(mean, np.float64)
+        self.var = np.array(var, np.float64)
+        self.epsilon = float(epsilon)
+        self.clip = float(clip)
+        statistics = (self.mean, self.var)
+        sound = all(array.shape == shape and np.isfinite(array).all() for array in statistics)
+        if not sound or not (self.var + self.epsilon > 0).all() or not self.clip > 0:
+            raise ValueError(f"expected statistics of observations of shape {shape}")
+
+    def __call__(self, observation: Any) -> Any:
+        scaled = (observation - self.mean) / np.sqrt(self.var + self.epsilon)
+        return np.clip(scaled, -self.clip, self.clip).astype(np.float32)
+
+
+def built_box(low: list[Any], high: list[Any], shape: list[int], dtype: str) -> spaces.Box:
+    """Build the box that `saved.save_policy` has written."""
+    kind: Any = np.dtype(dtype).type
+    least, most = (
+        np.array([default if x is None else x for x in bound], kind).reshape(shape)
+        for bound, default in ((low, -np.inf), (high, np.inf))
+    )
+    return spaces.Box(least, most, dtype=kind)

@@ -1,0 +1,55 @@
+"""The list of what there is to play, and refusals of commands before anything is played."""
+
+import re
+
+import gymnasium as gym
+import pytest
+
+from hoof_env import cli
+from hoof_env.commands.policies import EXTRAS
+from hoof_env.envs.shipped import SHOWN, shipped_returns
+
+
+def test_every_id_has_its_lines_with_the_returns_of_its_policies(capsys):
+    assert cli.main(["list"]) == 0
+    said = capsys.readouterr().out
+    for env_id in (name for name in gym.registry if name.startswith("hoof_env/")):
+        scored = shipped_returns(env_id.removeprefix("hoof_env/"))
+        returns = {policy: scored[policy] for policy in SHOWN if policy in scored}
+        line = said.partition(f"{env_id}: ")[2].splitlines()[1]
+        assert f"shipped {returns['policy']:.3g}" in line
+        assert line.count(", ") == len(returns)
+    extras = "".join(line for line in said.splitlines() if line.startswith(("extras", "others")))
+    assert all(extra in extras for extra in EXTRAS)
+
+
+def test_one_id_has_the_names_of_its_policies(capsys):
+    assert cli.main(["list", "--id", "hoof_env/HorseLegRail-v0"]) == 0
+    head, _, policies = capsys.readouterr().out.splitlines()
+    assert head.startswith("hoof_env/HorseLegRail-v0: ")
+    assert {"run", "walk", "open-loop", "shipped"} <= set(
+        policies.strip().removeprefix("policies: ").split(", ")
+    )
+    assert cli.main(["list", "--id", "hoof_env/Horse-v0"]) == 0
+    assert "open-loop" not in capsys.readouterr().out
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (["list", "--id", "Horse"], "id: expected one of hoof_env/HorseLeg-v0, .*, got 'Horse'"),
+        (["evaluate"], "policy: expected a name or the path of a trained model, got none"),
+        (["evaluate", "run", "--episodes", "0"], "episodes: expected"),
+        (["evaluate", "run", "--published", "--seed", "3"], "neither episodes nor seed with it"),
+        (["evaluate", "run", "--out", "scores.txt"], r"ends in \.csv, \.json, got 'scores\.txt'"),
+        (["evaluate", "gallop"], "expected a name .* got 'gallop'"),
+    ],
+)  # fmt: skip
+def test_a_refusal_is_one_line(arguments, words, capsys, monkeypatch, tmp_path):
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr("hoof_env.evaluation.scores.play", lambda *_: pytest.fail("was played"))
+    assert cli.main(arguments) == 2
+    said = capsys.readouterr().err
+    assert re.search(words, said), said
+    assert said.count("\n") == 1
+    assert not [*tmp_path.iterdir()]

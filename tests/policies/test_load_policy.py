@@ -1,0 +1,161 @@
+"""Policies by whatever names them: each plays as it should, and what does not fit says why."""
+
+import warnings
+
+import gymnasium as gym
+import numpy as np
+import pytest
+
+import hoof_env
+from hoof_env.envs.policies import STANDS_FOR, make_policy
+from hoof_env.errors import DataFileError, ParameterError
+from hoof_env.policies.find import find_policy, shipped_ids
+from hoof_env.policies.plain import read_tensors
+
+ENV_ID = "hoof_env/HorseLeg-v0"
+PLAIN = ("policy.json", "policy.safetensors", "run.json")
+
+
+@pytest.fixture(scope="module")
+def env():
+    with gym.make(ENV_ID) as env:
+        yield env
+
+
+def act(observations):
+    return -0.1 * observations[:, :4]
+
+
+def test_a_policy_ships_for_every_id():
+    assert shipped_ids() == sorted(name for name in gym.registry if name.startswith("hoof_env/"))
+
+
+@pytest.mark.parametrize("env_id", shipped_ids())
+def test_numpy_plays_what_ships_as_onnx_does(env_id):
+    pytest.importorskip("onnxruntime")
+    from agents.ship import POLICIES
+
+    policy = hoof_env.load_policy(env_id)
+    exported = hoof_env.load_policy(POLICIES / env_id.removeprefix("hoof_env/") / "policy.onnx")
+    space = policy.observation_space
+    space.seed(0)
+    seen = np.stack([space.sample() for _ in range(500)])
+    actions, state = policy.predict(seen)
+    assert state is None
+    assert actions.dtype == np.float32
+    np.testing.assert_allclose(actions, exported.predict(seen)[0], rtol=0, atol=1e-6)
+    np.testing.assert_array_equal([policy.predict(row)[0] for row in seen], actions)
+    assert np.ptp(actions, axis=0).min() > 0.1
+    assert np.abs(policy.predict(100 * seen)[0]).max() == 1.0
+
+
+def test_a_layer_is_what_its_name_says(tmp_path):
+    """Against the library of the format, with more than one tensor and an odd shape."""
+    save_file = pytest.importorskip("safetensors.numpy").save_file
+    tensors = {"b": np.arange(6, dtype=np.float32).reshape(2, 3), "a": np.float32([[0.5]])}
+    save_file(tensors, tmp_path / "w.safetensors", metadata={"made": "here"})
+    found = read_tensors(tmp_path / "w.safetensors")
+    assert found.keys() == tensors.keys()
+    for name, numbers in tensors.items():
+        np.testing.assert_array_equal(found[name], numbers)
+    save_file({"a": np.float64([1.0])}, tmp_path / "w.safetensors")
+    with pytest.raises(ValueError, match="F64, expected F32"):
+        read_tensors(tmp_path / "w.safetensors")
+
+
+def test_names_gaits_and_functions(env):
+    observation, _ = env.reset(seed=0)
+    gait = hoof_env.GaitParameters(6.28, 0.7, -0.2, -0.3)
+    texts = {policy: hoof_env.load_policy(policy, env) for policy in ("run", "shipped", "6.28,0.7,-0.2,-0.3")}
+    np.testing.assert_array_equal(
+        texts["run"].predict(observation, episode_start=True)[0],
+        make_policy("run", env).predict(observation, episode_start=True)[0],
+    )
+    wanted = texts["6.28,0.7,-0.2,-0.3"]
+    for same in (gait, tuple(gait.to_array()), gait.to_array()):
+        policy = hoof_env.load_policy(same, env)
+        assert policy.start == wanted.start
+        np.testing.assert_array_equal(policy.predict(observation)[0], wanted.predict(observation)[0])
+    by_id = hoof_env.load_policy(ENV_ID, env)
+    np.testing.assert_array_equal(by_id.predict(observation)[0], texts["shipped"].predict(observation)[0])
+    for own in (act, f"{__name__}:act"):
+        np.testing.assert_allclose(
+            hoof_env.load_policy(own, env).predict(observation)[0], act(observation[None])[0]
+        )
+    assert not np.array_equal(
+        *(hoof_env.load_policy("random", env, seed=seed).predict(observation)[0] for seed in (0, 1))
+    )
+
+
+def test_settings_that_differ_are_told_and_the_default_ones_are_not():
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        with gym.make(ENV_ID) as env:
+            hoof_env.load_policy("shipped", env)
+    with gym.make(ENV_ID, friction=0.1) as env, pytest.warns(UserWarning, match=r"friction=0\.4, here 0\.1"):
+        hoof_env.load_policy("shipped", env)
+
+
+@pytest.mark.parametrize(
+    ("policy", "words"),
+    [
+        ("hoof_env/HorseLegRail-v0", "HorseLegRail-v0, expected hoof_env/HorseLeg-v0"),
+        ("gallop", r"expected a name \(.*run.*open-loop, shipped\).*got 'gallop'"),
+        ((1.0, 2.0), r"expected four gait parameters, got \(1\.0, 2\.0\)"),
+        ((1e3, 0.0, 0.0, 0.0), "crank_speed"),
+        (3, "expected a name, a path, a gait or a function, got 3"),
+        ("none.zip", r"none\.zip"),
+        ("none.onnx", r"none\.onnx"),
+        ("nothing:act", "expected MODULE:NAME, got 'nothing:act'"),
+    ],
+)  # fmt: skip
+def test_what_does_not_fit_is_refused(policy, words, env):
+    with pytest.raises((ParameterError, DataFileError), match=words):
+        hoof_env.load_policy(policy, env)
+
+
+def test_what_needs_an_environment_says_so():
+    for policy in ("run", "shipped", act, (6.28, 0.7, -0.2, -0.3)):
+        with pytest.raises(
+            ParameterError, match=r"expected the environment, too, load_policy\(policy, env\)"
+        ):
+            hoof_env.load_policy(policy)
+
+
+def test_an_observation_of_another_size_is_refused():
+    with pytest.raises(ParameterError, match=r"expected shape \(\.\.\., 22\) .* got \(19,\)"):
+        hoof_env.load_policy(ENV_ID).predict(np.zeros(19))
+
+
+def test_damaged_weights_are_one_error(tmp_path, env):
+    for name in PLAIN:
+        (tmp_path / name).write_bytes((hoof_env.load_policy(ENV_ID).path / name).read_bytes())
+    hoof_env.load_policy(tmp_path, env)
+    whole = (tmp_path / "policy.safetensors").read_bytes()
+    from hoof_env.policies.plain import NumpyPolicy
+
+    for damaged in (b"", whole[:4], whole[:200], whole[:-8], whole[:-4] + np.float32(np.nan).tobytes()):
+        (tmp_path / "policy.safetensors").write_bytes(damaged)
+        with pytest.raises(DataFileError, match=r"policy\.json and policy\.safetensors"):
+            NumpyPolicy(tmp_path)
+
+
+def test_a_leg_made_without_gymnasium_takes_what_ships():
+    with hoof_env.HorseLegEnv() as env:
+        policy = hoof_env.load_policy(ENV_ID, env)
+    assert policy.record["env_id"] == ENV_ID
+
+
+def test_the_multi_objective_leg_has_the_policy_of_the_leg():
+    (one, other) = next(iter(STANDS_FOR.items()))
+    seen = np.linspace(-1, 1, 22)
+    actions = [hoof_env.load_policy(env_id).predict(seen)[0] for env_id in (one, other)]
+    np.testing.assert_array_equal(*actions)
+
+
+def test_an_environment_of_another_package_has_no_scripted_policies():
+    with (
+        gym.make("Pendulum-v1") as env,
+        pytest.raises(ParameterError, match="none is scripted for Pendulum-v1"),
+    ):
+        find_policy("run", env, "Pendulum-v1")
