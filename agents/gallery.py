@@ -18,14 +18,14 @@ import numpy as np
 
 from agents import runs
 from agents.command import run
-from agents.score import FINAL_SEEDS, score_vector
 from agents.ship import FILM, POLICIES
-from agents.statistics import iqm
 from agents.stock import OUT as CURVES
 from agents.stock_page import at
 from agents.stock_plan import read_curves
 from hoof_env.envs.manual import RETURNS, STILL
 from hoof_env.envs.policies import STANDS_FOR
+from hoof_env.evaluation.episodes import FINAL_SEEDS, score_vector
+from hoof_env.evaluation.statistics import iqm
 
 CUT = (20, 60, 310, 270)
 """Part of a film's frame that shows the animal: left, top, right, bottom [pixels]."""
@@ -81,7 +81,7 @@ def main(argv: list[str] | None = None) -> None:
     path = args.out / RETURNS
     known = json.loads(path.read_text(encoding="utf-8")) if path.is_file() and not args.again else {}
     returns = {}
-    for folder in sorted(score.parent for score in args.out.glob("*/score.json")):
+    for folder in sorted(card.parent for card in args.out.glob("*/card.md")):
         if (folder / FILM).is_file() and (args.again or not (folder / STILL).is_file()):
             write_still(folder)
         env_id = f"hoof_env/{folder.name}"
