@@ -7,7 +7,6 @@ import importlib.util
 import os
 import sys
 from dataclasses import replace
-from pathlib import Path
 
 import pytest
 import torch
@@ -20,12 +19,10 @@ from agents import (
     dataset,
     demo,
     distribute,
-    evaluate,
     falls,
     judge,
     legs,
     open_loop,
-    score,
     ship,
     stock,
     train,
@@ -34,6 +31,8 @@ from agents import (
 from agents.settings import ALGORITHMS, algorithm_class, load_settings, model_arguments
 from agents.ship import POLICIES
 from hoof_env.errors import DataFileError, HoofEnvError, MissingExtraError, OutputError, ParameterError
+from hoof_env.evaluation import scores
+from hoof_env.evaluation.episodes import score_vector
 from tests.agents.conftest import ENV_ID, SHORT, TINY, train_tiny
 
 GPU = torch.cuda.is_available()
@@ -57,7 +56,7 @@ def trains_flat(words, **changes):
 
 
 def evaluates(words, error=ParameterError, **changes):
-    return case(lambda _: evaluate.evaluate(evaluate.Args(**{"policy": ("run",), **changes})), words, error)
+    return case(lambda _: scores.evaluate(**{"policies": ("run",), **changes}), words, error)
 
 
 def optimises(words, **changes):
@@ -150,19 +149,12 @@ CASES = [
     *([] if GPU else [trains_flat("device: expected .* got 'cuda'", device="cuda")]),
     trains_flat("Discrete", env_id="CartPole-v1"),
     # evaluate and score
-    evaluates("expected a file, got a folder", OutputError, json=Path()),
-    evaluates("expected a file, got a folder", OutputError, video=Path()),
-    evaluates(r"ends in \.mp4, got .*film\.xyz", video=Path("film.xyz")),
-    evaluates("policy: expected a name .* got none", policy=()),
+    evaluates("policy: expected a name .* got none", policies=()),
     evaluates("episodes: expected .* got 0", episodes=0),
     evaluates("seed: expected .* got -1", seed=-1),
     evaluates("Cow", env_id="hoof_env/Cow-v0"),
-    case(
-        lambda _: evaluate.film_paths(Path("gait.mp4"), ["a/ppo", "b/ppo"]),
-        r"two films gait-ppo\.mp4",
-    ),
     *(
-        case(lambda _, policy=policy: score.score_vector(policy, ENV_ID, [7]), f"policy: expected .*{given}")
+        case(lambda _, policy=policy: score_vector(policy, ENV_ID, [7]), f"policy: expected .*{given}")
         for policy, given in ((0.5, "got 0.5"), (None, "got None"), ("gallop", "got 'gallop'"))
     ),
     # open loop
@@ -337,7 +329,7 @@ def content_of(folder):
 )
 def test_commands(files, call, error, words, tmp_path, monkeypatch):
     """Nothing is played, and the folder is left as it was."""
-    for module, name in ((evaluate, "play"), (dataset, "_collect")):
+    for module, name in ((scores, "play"), (dataset, "_collect")):
         monkeypatch.setattr(module, name, lambda *_, **__: pytest.fail("was played"))
     if "full.yml" in files:
         monkeypatch.setattr(baselines_run, "PLANS", tmp_path)

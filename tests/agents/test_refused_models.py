@@ -1,6 +1,6 @@
 """Models on disk that do not fit or are damaged, by the words of each error: runs, plain or as a zip
-(`RUNS`), ONNX files (`EXPORTS`), requests to `agents.export` (`REQUESTS`), policies that `agents.score` does
-not play (`SCORES`)."""
+(`RUNS`), ONNX files (`EXPORTS`), requests to `agents.export` (`REQUESTS`), policies that are not scored
+(`SCORES`)."""
 
 import json
 import os
