@@ -162,7 +162,7 @@ def take_sheets(browser: Browser, root: str, out: Path) -> None:
         for k, shot in enumerate(shots):
             place = (k % 4 * (narrow + 10), k // 4 * (tall + 10))
             sheet.paste(shot.resize((narrow, tall), Image.Resampling.LANCZOS), place)
-        sheet.save(out / f"{width}-{scheme}.webp", quality=60, method=6)
+        sheet.save(out / f"{width}-{scheme}.webp", quality=55, method=6)
 
 
 def main() -> int:
