@@ -12,6 +12,7 @@ from pathlib import Path
 import pytest
 
 import hoof_env
+from hoof_env.envs.shipped import summaries
 
 ROOT = Path(__file__).resolve().parent.parent
 HEAVY = {"numba", "torch", "pygame", "matplotlib", "tyro", "stable_baselines3", "scipy", "importlib.metadata"}
@@ -54,7 +55,7 @@ def test_the_page_on_an_index_leads_nowhere_that_is_not_there(wheel):
     assert "[docs" not in text
     assert "](" not in text.partition("# hoof-env")[2].replace("](https://", "")
     assert "<!--" not in text
-    assert "Read on\n\nGetting started | which environment for what |" in text
+    assert "Read on\n\nGetting started | from your own project: shipped policies" in text
     assert "\n\n\n" not in text.partition("# hoof-env")[2]
 
 
@@ -89,6 +90,26 @@ def test_every_dependency_has_a_tested_version():
         asked += extra
     for requirement in map(Requirement, asked):
         assert requirement.specifier.contains(tested[canonicalize_name(requirement.name)]), requirement
+
+
+def test_the_wheel_alone_lists_and_plays_what_ships(wheel, tmp_path):
+    """Without a checkout and without a learning library."""
+    wheel.extractall(tmp_path / "site")
+    program = (
+        "import sys, hoof_env; from hoof_env import cli; assert cli.main(['list']) == 0;"
+        "policy = hoof_env.load_policy('hoof_env/Horse-v0');"
+        "print(policy.path, policy.predict([[0.0] * 66] * 2)[0].shape);"
+        "print(sorted({'agents', 'torch', 'stable_baselines3', 'onnxruntime'} & {*sys.modules}))"
+    )
+    env = os.environ | {"PYTHONPATH": str(tmp_path / "site")}
+    run = subprocess.run(
+        [sys.executable, "-c", program], cwd=tmp_path, env=env, capture_output=True, text=True
+    )
+    assert run.returncode == 0, run.stderr
+    *listed, shape, loaded = run.stdout.splitlines()
+    assert [line.partition(":")[0] for line in listed if line.startswith("hoof_env/")] == list(summaries())
+    assert shape == f"{tmp_path / 'site/hoof_env/data/policies/Horse-v0'} (2, 16)"
+    assert loaded == "[]"
 
 
 def test_a_task_of_ones_own_runs_with_the_package_from_the_wheel(wheel, tmp_path):

@@ -89,7 +89,8 @@ class Evaluation:
     """Scores of several policies in the episodes of one environment.
 
     Attributes:
-        env_id, env_kwargs: the environment and its arguments.
+        env_id: id of the environment.
+        env_kwargs: its arguments.
         seeds: seeds of the episodes.
         scores: a score for each policy, in the order in which they were named.
     """

@@ -43,7 +43,8 @@ class NumpyPolicy:
     Attributes:
         path: the folder of its files.
         record: content of run.json in the folder, empty if the file is missing.
-        observation_space, action_space: its spaces.
+        observation_space: space of the observations that it takes.
+        action_space: space of its actions.
 
     Args:
         path: a folder with `ABOUT` and `WEIGHTS`.

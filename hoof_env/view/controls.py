@@ -4,17 +4,18 @@ from __future__ import annotations
 
 import json
 import math
-from pathlib import Path
 from typing import Any, NamedTuple
 from urllib.parse import quote
 
 import gymnasium as gym
 
-from hoof_env.envs.policies import STANDS_FOR, policy_names
+from hoof_env.envs.policies import policy_names
 from hoof_env.errors import HoofEnvError
 from hoof_env.gait import PARAMETERS
 from hoof_env.leg.geometry import preset_names
 from hoof_env.paper.rows import load_published
+from hoof_env.policies.find import shipped_ids
+from hoof_env.policies.record import own_id
 from hoof_env.tasks.effects import check_effect
 from hoof_env.tasks.settings import ABOUT, PER_EPISODE
 from hoof_env.view.simulation import Simulation, unit_of
@@ -146,13 +147,11 @@ def known_ids() -> list[str]:
 
 
 def known_policies(simulation: Simulation) -> list[str]:
-    """Return the policies that the page offers: scripted ones, the open loop, and those of a checkout."""
+    """Return the policies that the page offers: scripted ones, the open loop, and the one that ships."""
     names = policy_names(simulation.env)
-    name = STANDS_FOR.get(simulation.env_id, simulation.env_id).rpartition("/")[2]
     if simulation.is_driven:
         names = [*names, "open-loop"]
-    shipped = Path("agents/policies") / name
-    return [*names, *([shipped.as_posix()] if (shipped / "policy.onnx").is_file() else [])]
+    return [*names, *(["shipped"] if own_id(simulation.env_id) in shipped_ids() else [])]
 
 
 def known_presets() -> list[str]:
