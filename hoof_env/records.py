@@ -10,7 +10,7 @@ from __future__ import annotations
 import json
 import sys
 import time
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
@@ -204,11 +204,15 @@ def record_episode(
     joints = JointReactions(env) if reactions else None
     played = episode(env, policy, seed, seconds, options, joints)
     parts = list(_with_progress(played, longest) if tell else played)
-    moments = [name for name in units if name.endswith("free_moment")]
-    # Columns in the order of `units`; the free moment is no column of an episode.
+    return onto_surface(joined(parts, units), surroundings(env).terrain)
+
+
+def joined(parts: Sequence[Columns], units: Collection[str]) -> Columns:
+    """Return the parts of an episode as one record with the columns of `units_of`, in their order; the free
+    moment, which is no column of an episode, comes last."""
     record = {name: np.concatenate([part[name] for part in parts]) for name in units if name in parts[0]}
-    record |= {name: np.zeros(len(record["time"])) for name in moments}
-    return onto_surface(record, surroundings(env).terrain)
+    moments = [name for name in units if name.endswith("free_moment")]
+    return record | {name: np.zeros(len(record["time"])) for name in moments}
 
 
 def units_of(env: gym.Env[Any, Any], reactions: bool = False) -> dict[str, str]:

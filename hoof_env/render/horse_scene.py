@@ -18,8 +18,8 @@ from hoof_env.render.brush import FINE, Brush, arrow, bar
 from hoof_env.render.colours import COAT, COAT_EDGE, CRANK, FORCE, GREY, HEEL, TOE
 from hoof_env.render.ground import GroundPainter
 from hoof_env.render.instant import HorseInstant
-from hoof_env.render.outline import BODY, EAR, HORSE_HIP_M, TAIL, LegOutline
-from hoof_env.render.scene import AROUND_M, ARROW_M, Scene
+from hoof_env.render.outline import AROUND_M, ARROW_M, BODY, EAR, HORSE_HIP_M, TAIL, LegOutline
+from hoof_env.render.scene import Scene
 
 NEAR = (0, 2)  # the left legs
 FAR_COAT = 0.45  # how far the colour of far legs is from the sky's [-]

@@ -15,6 +15,12 @@ from hoof_env.leg.kinematics import pose
 from hoof_env.render.instant import Instant
 
 TRUNK_M = (1.05, 0.42, 0.16)  # the trunk about O: half its length, its height above and below [m]
+USUAL_HIP_M = 1.5
+"""Least height of a hip around which all is drawn in full size [m]; below, in proportion to the height."""
+
+AROUND_M = np.linspace(-1.5, 1.5, 31)  # where, from O, the ground is looked at for the camera's level [m]
+ARROW_M = 1.3  # length of an arrow of the full scale, drawn in full size [m]
+LEAST_FORCE = 0.004  # part of the full scale below which a force is not drawn [-]
 HOLD_M = 0.1  # height above the trunk of the rail or plate that holds it [m]
 HORN_SHARE = 0.45  # part of the hoof triangle, from the sole up, that is horn; above it is the pastern [-]
 

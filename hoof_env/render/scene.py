@@ -40,7 +40,17 @@ from hoof_env.render.colours import (
 )
 from hoof_env.render.ground import GroundPainter
 from hoof_env.render.instant import Instant
-from hoof_env.render.outline import HOLD_M, HORN_SHARE, TRUNK_M, LegOutline, reach
+from hoof_env.render.outline import (
+    AROUND_M,
+    ARROW_M,
+    HOLD_M,
+    HORN_SHARE,
+    LEAST_FORCE,
+    TRUNK_M,
+    USUAL_HIP_M,
+    LegOutline,
+    reach,
+)
 from hoof_env.render.panel import KILONEWTONS, Unit
 
 HEIGHT_SLACK_M = 0.2  # how far O may rise or sink from the paper's hip height before the camera follows [m]
@@ -48,12 +58,6 @@ SOIL_M = 0.4  # least depth of soil in the picture [m]
 MARGIN_M = 0.1  # room around the leg at its furthest reach [m]
 PATH_SECONDS = 1.0  # length of the paths of toe and heel [s]
 PATH_STEP = 0.01  # time between two places of a path [s]
-ARROW_M = 1.3  # length in the scene of an arrow for the panel's full scale [m]
-LEAST_FORCE = 0.004  # part of the full scale below which a force is not drawn [-]
-USUAL_HIP_M = 1.5
-"""Least height of a hip around which all is drawn in full size [m]; below, in proportion to the height."""
-
-AROUND_M = np.linspace(-1.5, 1.5, 31)  # where, from O, the ground is looked at for the camera's level [m]
 
 
 class Scene:

@@ -5,40 +5,41 @@ from __future__ import annotations
 import json
 import math
 from typing import Any, NamedTuple
-from urllib.parse import quote
 
 import gymnasium as gym
 
 from hoof_env.envs.policies import policy_names
 from hoof_env.errors import HoofEnvError
 from hoof_env.gait import PARAMETERS
-from hoof_env.leg.geometry import preset_names
 from hoof_env.paper.rows import load_published
 from hoof_env.policies.find import shipped_ids
 from hoof_env.policies.record import own_id
 from hoof_env.tasks.effects import check_effect
-from hoof_env.tasks.settings import ABOUT, PER_EPISODE
+from hoof_env.tasks.settings import ABOUT
 from hoof_env.view.simulation import Simulation, unit_of
 
-LABELS = {
-    "stiffness": "stiffness K",
-    "exponent": "exponent n",
-    "restitution": "restitution",
-    "friction": "friction",
-    "trunk_mass": "trunk mass",
-    "trunk_share": "share of the weight",
-    "motor_gain": "motor gain",
-    "motor_torque": "largest torque",
-    "motor_inertia": "rotor inertia",
-    "target_speed": "commanded speed",
-}
-"""Names of the settings that have sliders, in their order."""
-
 GROUPS = {
-    "Ground": ("stiffness", "exponent", "restitution", "friction"),
-    "Trunk and speed": ("trunk_mass", "trunk_share", "target_speed"),
-    "Motor": ("motor_torque", "motor_gain", "motor_inertia"),
+    "Ground": {
+        "stiffness": "stiffness K",
+        "exponent": "exponent n",
+        "restitution": "restitution",
+        "friction": "friction",
+    },
+    "Trunk and speed": {
+        "trunk_mass": "trunk mass",
+        "trunk_share": "share of the weight",
+        "target_speed": "commanded speed",
+    },
+    "Motor": {
+        "motor_torque": "largest torque",
+        "motor_gain": "motor gain",
+        "motor_inertia": "rotor inertia",
+    },
 }
+"""Names of the settings that have sliders, by group, with their names on the page."""
+
+GAIT = dict(zip(PARAMETERS, ("crank speed", "swing offset", "swing sine", "swing cosine"), strict=True))
+"""Names of the gait's parameters on the page."""
 
 CONDITIONS = {
     f"{gait}, {condition}": {"gait": gait, "restitution": restitution}
@@ -110,8 +111,8 @@ def setting_sliders(simulation: Simulation) -> dict[str, list[Slider]]:
     """Return the sliders of the settings that have an effect, by group."""
     settings = simulation.env.unwrapped.settings  # type: ignore[attr-defined]
     found: dict[str, list[Slider]] = {}
-    for group, names in GROUPS.items():
-        for name in names:
+    for group, labels in GROUPS.items():
+        for name, label in labels.items():
             value = simulation.commanded_speed if name == "target_speed" else simulation.value_of(name)
             span = ABOUT[name].span
             try:
@@ -121,23 +122,15 @@ def setting_sliders(simulation: Simulation) -> dict[str, list[Slider]]:
             if value is None or span is None or not math.isfinite(value):
                 continue
             step = 0.125 if name == "exponent" else None
-            found.setdefault(group, []).append(slider("touch", name, LABELS[name], value, span, step))
+            found.setdefault(group, []).append(slider("touch", name, label, value, span, step))
     return found
 
 
 def gait_sliders(simulation: Simulation) -> list[Slider]:
     """Return the sliders that drive one leg by hand."""
     now = simulation.gait_now()
-    labels = dict(zip(PARAMETERS, ("crank speed", "swing offset", "swing sine", "swing cosine"), strict=True))
-    return [
-        slider("drive", name, labels[name], now[name], limits)
-        for name, limits in simulation.gait_limits.items()
-    ]
-
-
-def needs_new_environment(name: str) -> bool:
-    """True if a setting is an argument of the environment alone."""
-    return name not in PER_EPISODE and name != "target_speed"
+    limits = simulation.gait_limits
+    return [slider("drive", name, GAIT[name], now[name], span) for name, span in limits.items()]
 
 
 def known_ids() -> list[str]:
@@ -154,16 +147,6 @@ def known_policies(simulation: Simulation) -> list[str]:
     return [*names, *(["shipped"] if own_id(simulation.env_id) in shipped_ids() else [])]
 
 
-def known_presets() -> list[str]:
-    """Return the presets that the page offers."""
-    return preset_names()
-
-
 def as_text(arguments: Any) -> str:
     """Return arguments of an environment as key=value pairs."""
     return " ".join(f"{key}={json.dumps(value, separators=(',', ':'))}" for key, value in arguments.items())
-
-
-def address_of(token: str) -> str:
-    """Return the address of a set-up that the server keeps."""
-    return f"?setup={quote(token)}"

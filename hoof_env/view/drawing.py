@@ -15,12 +15,16 @@ from numpy.typing import NDArray
 from hoof_env.leg.mechanism_list import flesh_of
 from hoof_env.render.instant import HorseInstant, Instant, Surroundings
 from hoof_env.render.outline import (
+    AROUND_M,
+    ARROW_M,
     BODY,
     EAR,
     HORN_SHARE,
     HORSE_HIP_M,
+    LEAST_FORCE,
     TAIL,
     TRUNK_M,
+    USUAL_HIP_M,
     LegOutline,
     reach,
 )
@@ -33,12 +37,8 @@ HEAD = 3
 
 FAR = (1, 3)  # the right legs of a horse, which are drawn behind its trunk
 ARC = 9  # vertices of the round end of a part
-ARROW_M = 1.3  # length of an arrow for the full scale [m]
 ARROW_WIDTH_M = 0.035  # of the arrow of a whole hoof [m]; those of toe and heel are half as wide
-LEAST_FORCE = 0.004  # part of the full scale below which a force is not drawn [-]
-AROUND_M = np.linspace(-1.5, 1.5, 31)  # where the ground is looked at for the camera's level [m]
 COIL = np.linspace(0.0, 1.0, 17)
-USUAL_HIP_M = 1.5  # height of a hip with which a leg is drawn in full size [m]
 
 
 class Place(NamedTuple):

@@ -98,26 +98,13 @@ class Scene:
     def _frame(self, name: str) -> Any:
         """Make the empty figure."""
         drawing = self.drawing
-        low = drawing.low
-        high = drawing.high
         wide = drawing.half_width
-        f = figure(
-            name=name,
-            x_range=Range1d(-wide, wide),
-            y_range=Range1d(low, high),
-            sizing_mode="stretch_both",
-            min_height=200,
-            toolbar_location=None,
-            tools="",
-            background_fill_color=hex_of(colours.SKY_BOTTOM),
-            border_fill_color=None,
-            outline_line_color=None,
-            lod_threshold=None,
-        )
+        ranges = {"x_range": Range1d(-wide, wide), "y_range": Range1d(drawing.low, drawing.high)}
+        f = empty_figure(name, sizing_mode="stretch_both", **ranges)
+        f.background_fill_color = hex_of(colours.SKY_BOTTOM)
         f.grid.visible = False
         f.yaxis.visible = False
         f.xaxis.axis_label = "way forward [m]"
-        dress(f)
         f.min_border_left = 0
         return f
 
@@ -218,8 +205,10 @@ def add_glyph(f: Any, source: ColumnDataSource, glyph: Any, **more: Any) -> None
     f.add_glyph(source, glyph, view=views.get(source.id) or CDSView(), **more)
 
 
-def dress(f: Any) -> None:
-    """Give a figure the lettering and lines of all figures."""
+def empty_figure(name: str, **more: Any) -> Any:
+    """Return an empty figure with the lettering and lines of all figures; `more` are arguments of Bokeh's."""
+    usual = {"height": 200, "sizing_mode": "stretch_width", "toolbar_location": None, "tools": ""}
+    f = figure(name=name, border_fill_color=None, lod_threshold=None, **(usual | more))
     f.axis.axis_label_text_font_style = "normal"
     f.axis.axis_label_text_font_size = "12px"
     f.axis.major_label_text_font_size = "12px"
@@ -231,6 +220,7 @@ def dress(f: Any) -> None:
     f.grid.grid_line_color = "#eef1f4"
     f.outline_line_color = None
     f.min_border_left = 58
+    return f
 
 
 class Curves(NamedTuple):
@@ -253,31 +243,12 @@ class Curves(NamedTuple):
     master: str
 
 
-def curve_figure(
-    name: str, title: str, lines: Sequence[Trace], master: str = "curves", height: int = 200
-) -> Curves:
-    """Return a figure of curves against time.
-
-    Args:
-        name, title: name in the page, and title with the unit.
-        lines: curves.
-        master: see `Curves`.
-        height: height [pixels].
-    """
+def curve_figure(name: str, title: str, lines: Sequence[Trace], master: str = "curves") -> Curves:
+    """Return a figure of curves against time; `title` has the unit, for `master` see `Curves`."""
     # Not empty: a browser warns of axes without data.
     source = ColumnDataSource({column: [0.0] for column in ("time", *(line.column for line in lines))})
     window = Range1d(0.0, SECONDS)
-    f = figure(
-        name=name,
-        x_range=window,
-        height=height,
-        sizing_mode="stretch_width",
-        toolbar_location=None,
-        tools="",
-        border_fill_color=None,
-        lod_threshold=None,
-    )
-    dress(f)
+    f = empty_figure(name, x_range=window)
     f.xaxis.axis_label = "time [s]"
     f.yaxis.formatter = CustomJSTickFormatter(code=TICKS)
     for line in lines:
@@ -301,25 +272,24 @@ def footfall_figure(legs: Sequence[str]) -> Curves:
     return made
 
 
-def bars_figure(source: ColumnDataSource, terms: Sequence[str]) -> Any:
-    """Return bars of the reward's terms, summed over the episode."""
-    names = [name.removeprefix("reward_") for name in terms]
-    f = figure(
-        name="terms",
-        y_range=names[::-1],
-        height=200,
-        sizing_mode="stretch_width",
-        toolbar_location=None,
-        tools="",
-        border_fill_color=None,
-    )
-    dress(f)
+def reward_lines(terms: Sequence[str]) -> list[Trace]:
+    """Return the curves of the reward's terms."""
+    shades = [REWARDS[k % len(REWARDS)] for k in range(len(terms))]
+    return [Trace(n, n.removeprefix("reward_"), shade) for n, shade in zip(terms, shades, strict=True)]
+
+
+def bars_figure(lines: Sequence[Trace]) -> tuple[ColumnDataSource, Any]:
+    """Return the source and the figure of bars of the reward's terms, summed over the episode."""
+    names = [line.label for line in lines]
+    colours_of_bars = [hex_of(line.colour) for line in lines]
+    source = ColumnDataSource({"term": names, "total": [0.0] * len(names), "colour": colours_of_bars})
+    f = empty_figure("terms", y_range=names[::-1])
     f.min_border_left = 78
     bar = HBar(y="term", right="total", left=0, height=0.7, fill_color="colour", line_color=None)
     add_glyph(f, source, bar)
     f.add_layout(Span(location=0, dimension="height", line_color=GREY, line_width=1))
     f.ygrid.visible = False
-    return f
+    return source, f
 
 
 def line_sets(legs: Sequence[str], columns: Collection[str]) -> Mapping[str, tuple[str, list[Trace]]]:
@@ -333,16 +303,17 @@ def line_sets(legs: Sequence[str], columns: Collection[str]) -> Mapping[str, tup
 
     def each(column: str) -> list[Trace]:
         if len(legs) == 1:
-            return [Trace(column, column, colours.INK)]
+            shade = colours.FORCE if column == "normal" else colours.INK
+            return [Trace(column, "this ground", shade)]
         return [Trace(f"{leg}{column}", leg_name(leg), colours.OF_LEGS[k]) for k, leg in enumerate(legs)]
 
-    normal = each("normal")
-    if "elastic" in columns:
-        normal = [
-            Trace("elastic", "elastic ground", colours.TOE, "dashed"),
-            Trace("inelastic", "inelastic ground", colours.CRANK, "dotted"),
-            Trace("normal", "this ground", colours.FORCE),
-        ]
+    others = [
+        Trace(f"{leg}{name}", f"{name} ground", shade, dash)
+        for name, shade, dash in (("elastic", colours.CRANK, "dashed"), ("inelastic", colours.INK, "dotted"))
+        for leg in legs
+        if f"{leg}{name}" in columns
+    ]
+    normal = [*others, *each("normal")]
     sets = {"normal": ("normal force [N]", normal)}
     if len(legs) == 1:
         forces = [Trace("grf", "resultant", colours.FORCE), Trace("friction", "friction", colours.TOE)]
@@ -356,4 +327,4 @@ def line_sets(legs: Sequence[str], columns: Collection[str]) -> Mapping[str, tup
         "torque": ("crank torque [N m]", each("torque")),
         "power": ("crank power [W]", each("power")),
     }
-    return {name: found for name, found in sets.items() if found[1][0].column in columns}
+    return {name: found for name, found in sets.items() if found[1][-1].column in columns}

@@ -169,22 +169,12 @@ class History:
         """Return the row nearest to a time [s]."""
         return min(self._rows, key=lambda row: abs(row[0] - time), default=None)
 
-    def curves_between(self, first: float, last: float) -> Columns:
-        """Return the curves from one time to another [s]."""
-        return between(self._curves, first, last)
-
-    def steps_between(self, first: float, last: float) -> Columns:
-        """Return the terms of the reward from one time to another [s]."""
-        return between(self._steps, first, last)
-
-    @property
-    def size(self) -> int:
-        """Numbers in memory."""
-        columns = sum(len(part) * len(part["time"]) for part in (*self._curves, *self._steps))
-        return columns + sum(len(row) for row in self._rows)
+    def between(self, first: float, last: float) -> tuple[Columns, Columns]:
+        """Return the curves and the terms of the reward from one time to another [s]."""
+        return joined(self._curves, first, last), joined(self._steps, first, last)
 
 
-def between(parts: Iterable[Columns], first: float, last: float) -> Columns:
+def joined(parts: Iterable[Columns], first: float, last: float) -> Columns:
     """Return the rows of parts from one time to another [s], {} if there is none."""
     near = [part for part in parts if part["time"][-1] >= first and part["time"][0] <= last]
     if not near:

@@ -1,19 +1,24 @@
-"""Document of a tab: figures, controls and script."""
+"""Document of a tab: figures, controls and script, and what page and server tell each other."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
+import numpy as np
+from bokeh.core import properties
+from bokeh.model import DataModel
 from bokeh.models import ColumnDataSource, CustomJS
 from jinja2 import Environment, FileSystemLoader, Template
+from numpy.typing import NDArray
 
+from hoof_env.leg.geometry import preset_names
 from hoof_env.records import default_policy
+from hoof_env.render.instant import Columns
+from hoof_env.render.outline import ARROW_M
 from hoof_env.view import controls, figures
-from hoof_env.view.drawing import ARROW_M, HEAD
+from hoof_env.view.drawing import HEAD
 from hoof_env.view.history import RESOLUTION, STANCE
-from hoof_env.view.news import News, names_of
 from hoof_env.view.player import Player
 from hoof_env.view.recording import FORMATS
 
@@ -23,36 +28,35 @@ POINTS = round(1.15 * figures.SECONDS / RESOLUTION)  # of a curve that the brows
 STEPS = 500  # of the reward that the browser keeps
 
 
-class Look(NamedTuple):
-    """Player of a page, sources of messages from the page and to it, and the names of the numbers in `news`.
+class Wire(DataModel):
+    """Messages between page and server.
 
     Attributes:
-        player: player.
+        news: numbers of the present state, see `packed`.
         told, asked: words to the page, and requests from it.
-        news: numbers of the present state, see `News.packed`.
-        names: see `news.names_of`.
     """
 
-    player: Player
-    told: ColumnDataSource
-    asked: ColumnDataSource
-    news: ColumnDataSource
-    names: Mapping[str, Any]
+    news = properties.Any()
+    told = properties.Dict(properties.String, properties.Any)
+    asked = properties.Dict(properties.String, properties.Any)
 
 
-def new_look(player: Player) -> Look:
-    """Return the sources of a player, with what it shows at present."""
-    first = News(player.row(), player.curves(), player.steps(), player.totals.values(), anew=True)
-    told = ColumnDataSource({"message": ["{}"]})
-    asked = ColumnDataSource({"message": ["{}"]})
-    return Look(player, told, asked, ColumnDataSource({"numbers": first.packed()}), names_of(first))
+def packed(row: NDArray[Any], curves: Columns, steps: Columns, is_anew: bool = False) -> NDArray[np.float64]:
+    """Return news of a page as one list of numbers.
 
+    Bokeh sends a header and a part of its own for each column of a source. A horse has forty columns, which
+    are news many times a second: one list for all of them costs the server and the browser much less.
 
-def bars_source(terms: tuple[str, ...]) -> ColumnDataSource:
-    """Return the source of bars of the reward's terms."""
-    names = [name.removeprefix("reward_") for name in terms]
-    shades = [figures.hex_of(line.colour) for line in reward_lines(terms)]
-    return ColumnDataSource({"term": names, "total": [0.0] * len(terms), "colour": shades})
+    Args:
+        row: row of the scene, see `drawing.Drawing`.
+        curves, steps: new rows of curves and of the reward's terms, by name; {} for none.
+        is_anew: True if they replace those that the page has.
+
+    Returns:
+        1 for `is_anew`, the numbers of rows of curves and steps, the row, and all columns in a line.
+    """
+    counts = [len(columns.get("time", ())) for columns in (curves, steps)]
+    return np.concatenate([[is_anew, *counts], row, *curves.values(), *steps.values()])
 
 
 def template(name: str) -> Template:
@@ -84,54 +88,53 @@ def scene_arguments(scene: figures.Scene, player: Player) -> dict[str, Any]:
 
 def legend_of(curves: figures.Curves) -> dict[str, Any]:
     """Return what a page writes above a figure of curves: its name, title, and the names of its lines."""
-    keys = [(line.label, figures.hex_of(line.colour), line.dash) for line in curves.lines]
+    keys = dict.fromkeys((line.label, figures.hex_of(line.colour), line.dash) for line in curves.lines)
     is_plain = len(keys) == 1 or curves.figure.name == "footfall"
-    return {"name": curves.figure.name, "title": curves.title, "keys": [] if is_plain else keys}
+    return {"name": curves.figure.name, "title": curves.title, "keys": [] if is_plain else [*keys]}
 
 
-def reward_lines(terms: tuple[str, ...]) -> list[figures.Trace]:
-    """Return the curves of the reward's terms."""
-    shades = figures.REWARDS
-    return [
-        figures.Trace(name, name.removeprefix("reward_"), shades[k % len(shades)])
-        for k, name in enumerate(terms)
-    ]
-
-
-def fill(doc: Any, look: Look) -> None:
-    """Fill the document of a tab."""
-    player = look.player
+def fill(doc: Any, player: Player) -> Wire:
+    """Fill the document of a tab with what its player shows at present; return the messages."""
     simulation = player.simulation
+    curves = player.curves()
+    steps = player.steps()
+    row = player.row()
+    wire = Wire(news=packed(row, curves, steps, is_anew=True))
     scene = figures.Scene(player.drawing, simulation.setting.terrain)
-    sets = figures.line_sets(player.legs, look.names["curves"])
-    curves = [figures.curve_figure(name, title, lines) for name, (title, lines) in sets.items()]
+    sets = figures.line_sets(player.legs, curves)
+    shown = [figures.curve_figure(name, title, lines) for name, (title, lines) in sets.items()]
     if len(player.legs) > 1:
-        curves.append(figures.footfall_figure(player.legs))
-    lines = reward_lines(simulation.terms)
-    curves.append(figures.curve_figure("rewards", "reward of a step, by term [-]", lines, "steps"))
-    bars = bars_source(simulation.terms)
-    shown = [scene.figure, *(each.figure for each in curves)]
-    shown.append(figures.bars_figure(bars, simulation.terms))
+        shown.append(figures.footfall_figure(player.legs))
+    lines = figures.reward_lines(simulation.terms)
+    shown.append(figures.curve_figure("rewards", "reward of a step, by term [-]", lines, "steps"))
+    bars, bars_figure = figures.bars_figure(lines)
     # Models that only the script knows belong to the document by this list alone.
-    scene.figure.tags = [look.news, look.told, look.asked]
-    for each in shown:
+    scene.figure.tags = [wire]
+    for each in (scene.figure, *(one.figure for one in shown), bars_figure):
         doc.add_root(each)
     doc.title = f"{simulation.env_id.rpartition('/')[2]} - hoof-env view"
     doc.template = template("live.html")
-    doc.template_variables.update(variables(player, curves))
+    doc.template_variables.update(variables(player, shown))
+    masters = {
+        "curves": {"source": empty_source(curves), "most": POINTS},
+        "steps": {"source": empty_source(steps), "most": STEPS},
+    }
     arguments = {
         "parts": scene_arguments(scene, player),
-        "news": look.news,
-        "names": look.names,
-        "most": {"curves": POINTS, "steps": STEPS},
+        "wire": wire,
+        "row_length": len(row),
+        "masters": masters,
         "bars": bars,
-        "shown": [{"source": c.source, "window": c.window, "master": c.master} for c in curves],
-        "told": look.told,
-        "asked": look.asked,
+        "shown": [{"source": c.source, "window": c.window, "master": c.master} for c in shown],
         "seconds": figures.SECONDS,
     }
-    code = script("scene.js", "columns.js", "live.js")
-    doc.js_on_event("document_ready", CustomJS(args=arguments, code=code))
+    doc.js_on_event("document_ready", CustomJS(args=arguments, code=script("scene.js", "live.js")))
+    return wire
+
+
+def empty_source(columns: Columns) -> ColumnDataSource:
+    """Return a source of these columns, in which the browser keeps what it was sent."""
+    return ColumnDataSource({name: np.zeros(0) for name in columns})
 
 
 def variables(player: Player, shown: list[figures.Curves]) -> dict[str, Any]:
@@ -145,11 +148,12 @@ def variables(player: Player, shown: list[figures.Curves]) -> dict[str, Any]:
         "simulation": simulation,
         "summary": env.task.summary,
         "figures": [legend_of(each) for each in shown],
+        "refusal": simulation.same_motion.refusal,
         "has_heel": drawing.has_heel,
         "legs": [figures.leg_name(leg) for leg in player.legs],
         "stance": STANCE,
         "ids": controls.known_ids(),
-        "presets": controls.known_presets(),
+        "presets": preset_names(),
         "preset": env.settings.preset,
         "policies": controls.known_policies(simulation),
         "policy": simulation.policy_name or "",

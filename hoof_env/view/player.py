@@ -18,6 +18,8 @@ FIRST_NUMBERS = {"time": 2, "speed": 2, "target": 2, "return": 2}
 """Digits of the numbers of a page that belong to the whole body."""
 LEG_NUMBERS = {"grf": 0, **dict(zip(STANCE, (0, 0, 1, 2, 1), strict=True))}
 """Digits of the numbers of each leg."""
+TERM_DIGITS = 2
+"""Digits of the terms of the reward."""
 
 
 class Player:
@@ -31,9 +33,10 @@ class Player:
 
     Attributes:
         history: what was shown.
+        numbers: names and digits of the numbers in a row: those of the body, those of each leg with its index
+            behind them, and the terms of the reward, summed over the episode.
         drawing: drawing data.
         clock, shown: time up to which the page may show and shows substeps [s].
-        totals: terms of the reward, summed over the episode.
         recording: recording that runs, or None.
     """
 
@@ -41,6 +44,9 @@ class Player:
         self.simulation = simulation
         self.history = History()
         self.legs = simulation.legs
+        of_legs = [(f"{name} {k}", n) for k in range(len(self.legs)) for name, n in LEG_NUMBERS.items()]
+        terms = [(name, TERM_DIGITS) for name in simulation.terms]
+        self.numbers = [*FIRST_NUMBERS.items(), *of_legs, *terms]
         self.drawing = drawing_of(simulation.setting, len(self.numbers))
         self.recording: Recording | None = None
         self.clock = 0.0
@@ -54,17 +60,13 @@ class Player:
             self._take(chunk)
         self._reveal(math.inf)
 
-    @property
-    def numbers(self) -> list[tuple[str, int]]:
-        """Names and digits of the numbers in a row, those of a leg with its index behind them."""
-        of_legs = [(f"{name} {k}", n) for k in range(len(self.legs)) for name, n in LEG_NUMBERS.items()]
-        return [*FIRST_NUMBERS.items(), *of_legs]
-
     def reset(self, chunk: Chunk) -> None:
         """Show the start of an episode that was asked for: the page begins anew."""
         self.history.clear()
         self.clock = 0.0
         self.shown = 0.0
+        self._fresh: list[Columns] = []
+        self._steps: list[dict[str, float]] = []
         self._begin(chunk)
 
     def _begin(self, chunk: Chunk) -> None:
@@ -72,10 +74,8 @@ class Player:
         self._base = self.shown
         lift_off = self.simulation.setting.lift_off_n
         self._stances = [StanceNumbers(lift_off) for _ in self.legs]
-        self.totals = dict.fromkeys(self.simulation.terms, 0.0)
+        self._totals = dict.fromkeys(self.simulation.terms, 0.0)
         self._waiting: list[tuple[Columns, Columns]] = []
-        self._fresh: list[Columns] = []
-        self._steps: list[dict[str, float]] = []
         if self.recording is not None:
             self.recording.is_over = True
         self._take(chunk)
@@ -99,16 +99,11 @@ class Player:
             chunk = simulation.step()
             if chunk is not None:
                 self._take(chunk)
-        self.clock = until
         self._reveal(until)
-        ended = simulation.ended
-        if not ended or self._waiting:
-            return ""
-        kept = self._fresh
-        steps = self._steps
-        self._begin(simulation.reset(simulation.seed + 1))
-        self._fresh = kept + self._fresh
-        self._steps = steps + self._steps
+        ended = "" if self._waiting else simulation.ended
+        if ended:
+            self._begin(simulation.reset(simulation.seed + 1))
+        self.clock = until
         return ended
 
     def step(self) -> str:
@@ -134,7 +129,7 @@ class Player:
             self.recording.add(chunk)
         if chunk.terms:
             for name, value in chunk.terms.items():
-                self.totals[name] += value
+                self._totals[name] += value
             self._steps.append({"time": float(curves["time"][-1])} | chunk.terms)
 
     def _reveal(self, until: float) -> None:
@@ -185,9 +180,10 @@ class Player:
         simulation = self.simulation
         (now,) = records.instants_of(simulation.env, self._now)
         target = simulation.commanded_speed
-        numbers = [now.time, now.vx, np.nan if target is None else target, sum(self.totals.values())]
+        numbers = [now.time, now.vx, np.nan if target is None else target, sum(self._totals.values())]
         for leg, stance in zip(legs_of(now), self._stances, strict=True):
             numbers += [leg.grf, *stance.numbers.values()]
+        numbers += self._totals.values()
         row = self.drawing.row(now, numbers)
         row[0] = self.shown
         self.history.add_row(row)

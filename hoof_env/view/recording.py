@@ -10,12 +10,11 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
-
 from hoof_env import film, records
-from hoof_env.errors import HoofEnvError, check_choice
+from hoof_env.errors import check_choice
 from hoof_env.lab.forces import THRESHOLD
 from hoof_env.render.instant import Columns
+from hoof_env.view.words import words_of
 
 if TYPE_CHECKING:
     from hoof_env.view.simulation import Chunk, Simulation
@@ -65,7 +64,7 @@ class Recording:
         # Those of the recorded episode: the next one may have begun when the file is written.
         self._played = {"policy": simulation.policy_name, "seed": simulation.seed}
         self._parameters = simulation.parameters
-        self.tell = tell
+        self._tell = tell
         self._chunks: list[Chunk] = []
         self._seconds = 0.0
         self.is_over = False
@@ -82,14 +81,6 @@ class Recording:
         """True if nothing more is taken."""
         return self._seconds > LONGEST
 
-    def columns(self) -> Columns:
-        """Return the record, with the columns of `hoof-env export`."""
-        units = records.units_of(self._simulation.env)
-        parts = [chunk.columns for chunk in self._chunks]
-        # In the order of `records.record_episode`: free moments, which no episode has, come last.
-        whole = {name: np.concatenate([part[name] for part in parts]) for name in units if name in parts[0]}
-        return whole | {name: np.zeros(len(whole["time"])) for name in units if name not in whole}
-
     def write(self) -> threading.Thread:
         """Write the file in a thread of its own, and tell; return the thread."""
         thread = threading.Thread(target=self._write_and_tell)
@@ -97,16 +88,17 @@ class Recording:
         return thread
 
     def _write_and_tell(self) -> None:
+        """Write the file and tell, also of whatever is raised: nothing else hears of it in this thread."""
+        if not self._chunks:
+            self._tell("Nothing was recorded: the page was paused.", "error")
+            return
         try:
-            if not self._chunks:
-                self.tell("Nothing was recorded: the page was paused.", "error")
-                return
             self._write()
-        except HoofEnvError as error:
-            self.tell(f"{self.path}: {error}", "error")
+        except Exception as error:
+            self._tell(f"{self.path}: {words_of(error)}", "error")
             return
         seconds = self._chunks[-1].columns["time"][-1] - self._chunks[0].columns["time"][0]
-        self.tell(f"Wrote {self.path}: {seconds:.2f} s.", "note")
+        self._tell(f"Wrote {self.path}: {seconds:.2f} s.", "note")
 
     def _write(self) -> None:
         simulation = self._simulation
@@ -126,7 +118,8 @@ class Recording:
             about = simulation.about(
                 **self._played, threshold_n=THRESHOLD, bodies={}, reactions=[], parameters=self._parameters
             )
-            records.write(self.columns(), about, self.path)
+            record = records.joined([c.columns for c in self._chunks], records.units_of(simulation.env))
+            records.write(record, about, self.path)
 
 
 def _from_zero(columns: Columns, begin: Any) -> Columns:

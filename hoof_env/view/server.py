@@ -16,7 +16,8 @@ from pathlib import Path
 from typing import Any
 
 from hoof_env._output import check_folder
-from hoof_env.errors import HoofEnvError, MissingExtraError, ParameterError, count, parse_pairs
+from hoof_env.errors import MissingExtraError, ParameterError, count, parse_pairs
+from hoof_env.view.words import words_of
 
 MOST_TABS = 8
 """Largest number of tabs, each with a simulation of its own."""
@@ -46,41 +47,43 @@ class Pages:
         self._first = setup
         self._out = out
         self._kept: OrderedDict[str, dict[str, Any]] = OrderedDict()
-        self.server: Any = None
+        self._tabs: list[Any] = []
 
     def keep(self, setup: dict[str, Any]) -> str:
         """Keep a set-up; return the address of its page, which cannot be guessed: a set-up may name files."""
-        from hoof_env.view.controls import address_of
-
         token = secrets.token_urlsafe(16)
         self._kept[token] = setup
         while len(self._kept) > KEPT_SETUPS:
             self._kept.popitem(last=False)
-        return address_of(token)
-
-    @property
-    def tabs(self) -> int:
-        """Number of tabs that are open; a page that was refused has no figures and does not count."""
-        open_ones = [session for session in self.server.get_sessions() if session.connection_count > 0]
-        return sum(bool(session.document.roots) for session in open_ones)
+        return f"?setup={token}"
 
     def open(self, doc: Any) -> None:
-        """Fill the document of a new tab."""
+        """Fill the document of a new tab.
+
+        A tab counts from here on, before its browser is connected, until Bokeh lets its session go: the
+        server's one thread does nothing else between the count and the new tab.
+        """
         from hoof_env.view.layout import template
         from hoof_env.view.tab import Tab
 
+        wait = False
         asked = doc.session_context.request.arguments.get("setup", [b""])[0].decode("ascii", "replace")
         try:
-            if self.tabs >= MOST_TABS:
-                raise ParameterError(f"{MOST_TABS} tabs are open, each with a simulation; close one first")
+            self._tabs = [tab for tab in self._tabs if tab.is_open]
+            if len(self._tabs) >= MOST_TABS:
+                # A page that is loaded again is here before the old one has gone.
+                wait = True
+                raise ParameterError(
+                    f"{MOST_TABS} tabs are open, each with a simulation; this one waits until one is closed"
+                )
             if asked and asked not in self._kept:
                 raise ParameterError("this page is too old; open the first one again")
-            Tab(doc, self._kept.get(asked, self._first), self.keep, self._out)
-        except HoofEnvError as error:
+            self._tabs.append(Tab(doc, self._kept.get(asked, self._first), self.keep, self._out))
+        except Exception as error:
             doc.clear()
             doc.title = "hoof-env view"
             doc.template = template("refused.html")
-            doc.template_variables["reason"] = str(error)
+            doc.template_variables.update(reason=words_of(error), wait=wait)
 
 
 def start(
@@ -106,15 +109,13 @@ def start(
     from bokeh.application.handlers.function import FunctionHandler
     from bokeh.server.server import Server
 
-    from hoof_env.view.tab import checked_simulation
+    from hoof_env.view.tab import try_out
 
     count("port", port, low=0, most=65535)
     if ":" in address:  # Bokeh's list of origins cannot name it
         raise ParameterError(f"address: expected an IPv4 address or a name, got {address!r}")
     check_folder(out)
-    simulation, _ = checked_simulation(setup)
-    simulation.reset()
-    simulation.env.close()
+    try_out(setup)
     pages = Pages(setup, out)
     try:
         port = port or free_port(address)
@@ -130,7 +131,6 @@ def start(
         if error.errno == errno.EADDRINUSE:
             raise ParameterError(f"port: expected a free one, {port} is taken; 0 takes any") from None
         raise ParameterError(f"address: expected one of this machine, got {address!r} ({error})") from None
-    pages.server = server
     server.start()
     return server, f"http://{address}:{server.port}/"
 

@@ -11,12 +11,12 @@ from hoof_env import records
 from hoof_env.envs.batch_build import substeps_under
 from hoof_env.envs.batch_starts import vary
 from hoof_env.envs.policies import constant_gait, start_of
-from hoof_env.errors import ParameterError, check_number, count
+from hoof_env.errors import ParameterError, check_choice, check_number, count
 from hoof_env.gait import PARAMETERS, GaitParameters, limits_of
 from hoof_env.lab.forces import THRESHOLD, above_threshold, onto_surface
 from hoof_env.render.instant import Columns
 from hoof_env.tasks.settings import ABOUT, PER_EPISODE
-from hoof_env.view.same_motion import elastic_and_inelastic
+from hoof_env.view.same_motion import SameMotion
 
 DRIVES = {"crank_torque": "N m", "crank_power": "W"}
 """Unit of each measurement of a leg's drive that a page shows next to the columns of a record."""
@@ -29,7 +29,8 @@ class Chunk(NamedTuple):
         columns: what `hoof-env export` writes at each substep, with all fields of instants; shape (n,).
         drives: measurements of `DRIVES` by column, behind the names of a horse's legs, shape (n,).
         normals: normal force of elastic and of inelastic ground for the same motion, by "elastic" and
-            "inelastic", shape (n,) [N]; empty where the contact has none, see `elastic_and_inelastic`.
+            "inelastic" behind the names of a horse's legs, shape (n,) [N]; empty where there is none, see
+            `SameMotion.refusal`.
         terms: terms of the reward of this step by name; empty at a start.
     """
 
@@ -56,6 +57,7 @@ class Simulation:
         setting: its surroundings, see `instant.Surroundings`.
         parameters: physical parameters that were touched, by name.
         hand: gait that drives the leg instead of the policy, None for the policy.
+        same_motion: forces that other ground would give.
         ended: how the episode ended, "" while it runs.
 
     Raises:
@@ -79,6 +81,7 @@ class Simulation:
         self._player = self._find(policy, self.seed)
         self.parameters: dict[str, float] = {}
         self.hand: dict[str, float] | None = None
+        self.same_motion = SameMotion(self._leg.batch)  # type: ignore[attr-defined]
         self.ended = ""
         self._observation: Any = None
         self._starts = True
@@ -139,21 +142,14 @@ class Simulation:
             self.hand = None
         self.ended = ""
         self._starts = True
+        self.same_motion.begin(self._leg.record())
         return self._chunk({})
 
     def step(self) -> Chunk | None:
         """Take a control step; return its substeps, None if the episode is over or could not go on."""
         if self.ended:
             return None
-        start = np.full(1, self._starts)
-        if self.hand is not None:
-            action = self._leg.action_for(np.array([*self.hand.values()]))
-        else:
-            action, _ = self._player.predict(self._observation, episode_start=start, deterministic=True)
-        if not np.isfinite(np.asarray(action, float)).all():
-            raise ParameterError(
-                f"policy {self.policy!r}: expected finite actions, got {np.asarray(action).tolist()}"
-            )
+        action = self._action()
         before = self._leg.engine.state["time"][0]
         self._observation, _, failed, truncated, info = self.env.step(action)
         self._starts = False
@@ -163,6 +159,26 @@ class Simulation:
         if self._leg.engine.state["time"][0] <= before:
             return None
         return self._chunk({name: float(info[name]) for name in self.terms})
+
+    def _action(self) -> Any:
+        """Return the next action, of the hand or of the policy.
+
+        Raises:
+            ParameterError: the policy fails, or its action is not finite.
+        """
+        if self.hand is not None:
+            return self._leg.action_for(np.array([*self.hand.values()]))
+        start = np.full(1, self._starts)
+        try:
+            action, _ = self._player.predict(self._observation, episode_start=start, deterministic=True)
+            is_finite = np.isfinite(np.asarray(action, float)).all()
+        except Exception as error:
+            said = f"{type(error).__name__}: {error}"
+            raise ParameterError(f"policy {self.policy_name}: expected actions, it raised {said}") from error
+        if not is_finite:
+            numbers = np.asarray(action).tolist()
+            raise ParameterError(f"policy {self.policy_name}: expected finite actions, got {numbers}")
+        return action
 
     def _chunk(self, terms: dict[str, float]) -> Chunk:
         """Return the last substeps as they are shown and written."""
@@ -175,28 +191,27 @@ class Simulation:
         for i, prefix in enumerate(self.legs):
             for name in DRIVES:
                 drives[prefix + name] = np.array(record[name][:, i, 0], float)
-        normals = elastic_and_inelastic(record, leg.batch, self.value_of("stiffness"))
-        return Chunk(shown, drives, normals, terms)
+        return Chunk(shown, drives, self.same_motion.columns(record, self.legs), terms)
 
     # Touching
 
     def touch(self, name: str, value: Any) -> bool:
-        """Give a physical parameter another value at once.
+        """Give a setting another value at once.
 
         Args:
-            name: one of `settings.PER_EPISODE`.
+            name: name of a setting.
             value: the value, in the setting's unit.
 
         Returns:
-            False if the parameter needs shorter substeps than the environment has: nothing has changed then,
-            and an environment with this argument takes it.
+            False if a running episode cannot take it, as the exponent, or stiffness that needs shorter
+            substeps: nothing has changed then, and an environment with this argument takes it.
 
         Raises:
-            ParameterError: the parameter is unknown, has no effect, or is out of range.
+            ParameterError: the setting is unknown, has no effect, or is out of range.
         """
-        number = check_number(name, value)
+        number = check_number(check_choice("setting", name, ABOUT), value)
         if name not in PER_EPISODE:
-            raise ParameterError(f"{name}: expected one of {', '.join(PER_EPISODE)}")
+            return False
         changed = self.parameters | {name: number}
         batch = self._leg.batch
         batch.body.check_options({"parameters": changed}, batch.engine.trunk, batch.settings)
@@ -205,6 +220,7 @@ class Simulation:
         vary(batch, 0, changed)
         batch.has_overrides[0] = True
         self.parameters = changed
+        self.same_motion.set_ground(changed)
         if self._observation is not None:
             # The last instant with the new parameters: from it the next substeps are recorded.
             self._leg.set_state(self._leg.get_state())
@@ -231,10 +247,8 @@ class Simulation:
     def gait_now(self) -> dict[str, float]:
         """Return the present gait parameters of one leg, within the limits."""
         state = self._leg.engine.state
-        now = {}
-        for name, (low, high) in self.gait_limits.items():
-            now[name] = float(np.clip(state[name][0, 0], low, high))
-        return now
+        limits = self.gait_limits.items()
+        return {name: float(np.clip(state[name][0, 0], low, high)) for name, (low, high) in limits}
 
     def command_speed(self, value: Any) -> None:
         """Command a speed [m/s] from now on.

@@ -2,25 +2,26 @@
 
 from __future__ import annotations
 
-import json
 import math
 import time
 import warnings
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
-from hoof_env.errors import HoofEnvError, ParameterError, check_number, parse_pairs
+from hoof_env.errors import ParameterError, check_choice, check_number, parse_pairs
 from hoof_env.view import controls, figures, layout
 from hoof_env.view.layout import SPEEDS
-from hoof_env.view.news import News
 from hoof_env.view.player import Player
 from hoof_env.view.recording import Recording
 from hoof_env.view.simulation import Simulation
+from hoof_env.view.words import words_of
 
 TICK = 1 / 30  # time between two states that are sent [s]
 CURVES_EVERY = 2  # states between two pieces of the curves
 LONGEST_TICK = 0.1  # time of which a late tick makes up [s]
+MOST_SUBSTEPS = 10_000  # of a control step: during one, no tab is served
 
 Setup = dict[str, Any]
 """Arguments of `Simulation`, by name."""
@@ -37,7 +38,9 @@ class Tab:
 
     Attributes:
         player: simulation and clock.
+        wire: messages between page and server.
         playing, speed: True while the clock goes on, and its speed over real time.
+        is_open: False when the page was closed.
 
     Raises:
         HoofEnvError: the set-up is refused.
@@ -47,36 +50,62 @@ class Tab:
         self._doc = doc
         self._keep = keep
         self._out = out
-        simulation, self._warned = checked_simulation(setup)
+        with heard() as self._warned:
+            simulation = Simulation(**setup)
         self.player = Player(simulation)
         self.player.reset(simulation.reset())
         self.playing = True
         self.speed = 1.0
+        self.is_open = True
         self._ticks = 0
         self._last = time.monotonic()
-        self.look = layout.new_look(self.player)
-        layout.fill(doc, self.look)
-        self.look.asked.on_change("data", self._on_asked)
+        self.wire = layout.fill(doc, self.player)
+        self.wire.on_change("asked", self._on_asked)
         doc.on_session_destroyed(lambda _: self.close())
         doc.add_periodic_callback(self._tick, round(1000 * TICK))
 
-    # Playing
+    # Callbacks of Bokeh, which nothing may leave that is raised in them
 
     def _tick(self) -> None:
-        """Send the next state."""
+        """Send the next state; pause where there is none."""
         now = time.monotonic()
         passed = min(now - self._last, LONGEST_TICK)
         self._last = now
         if not self.playing:
             return
         try:
-            ended = self.player.go(self.speed * passed)
-        except HoofEnvError as error:
+            self._say_end(self.player.go(self.speed * passed))
+            self._send()
+        except Exception as error:
             self.playing = False
             self._refuse(error)
-            return
-        self._say_end(ended)
-        self._send()
+
+    def _on_asked(self, attr: str, old: Any, new: Any) -> None:
+        """Do what the page asks; a refusal is told and changes nothing."""
+        try:
+            request = dict(new)
+            request.pop("count", None)  # two requests in a row are never equal
+            handler = HANDLERS[check_choice("request", request.pop("name", None), HANDLERS)]
+            handler(self, **request)
+        except Exception as error:
+            self._refuse(error)
+
+    def _said(self, text: str, kind: str) -> None:
+        """Tell the end of a recording from its own thread, in the terminal where the page is closed."""
+        if self.is_open:
+            self._doc.add_next_tick_callback(lambda: self._tell(status=text, kind=kind))
+        else:
+            print(f"hoof-env view: {text}", flush=True)
+
+    def close(self) -> None:
+        """Write an unfinished recording, and let the simulation go."""
+        self.is_open = False
+        self.playing = False
+        self._stop_recording()
+        self.player.simulation.env.close()
+        self.player.history.clear()
+
+    # News
 
     def _say_end(self, ended: str) -> None:
         """Say that an episode ended."""
@@ -84,23 +113,18 @@ class Tab:
             seed = self.player.simulation.seed
             text = f"The episode ended: {ended}. The next one has seed {seed}."
             self._tell(status=text, kind="end")
-            if self.player.recording is not None:
-                self._stop_recording()
+            self._stop_recording()
 
     def _send(self) -> None:
-        """Send row and totals of the present instant, and curves with every other state."""
+        """Send the row of the present instant, and curves with every other state."""
         self._ticks += 1
         player = self.player
         row = player.row()
         if self._ticks % CURVES_EVERY:
-            self._put(News(row, {}, {}, player.totals.values()))
+            self.wire.news = layout.packed(row, {}, {})
         else:
-            self._put(News(row, player.curves(), player.steps(), player.totals.values()))
-
-    def _put(self, news: News) -> None:
-        """Send news, and end a recording that is full."""
-        self.look.news.data = {"numbers": news.packed()}
-        if self.player.recording is not None and self.player.recording.is_full:
+            self.wire.news = layout.packed(row, player.curves(), player.steps())
+        if player.recording is not None and player.recording.is_full:
             self._stop_recording()
 
     def _send_anew(self, row: Any = None) -> None:
@@ -112,34 +136,17 @@ class Tab:
         end = math.inf if row is None else float(row[0]) + 1e-6
         row = player.row() if row is None else row
         window = (float(row[0]) - figures.SECONDS, end)
-        curves = player.history.curves_between(*window)
-        steps = player.history.steps_between(*window)
-        self._put(News(row, curves, steps, player.totals.values(), anew=True))
-
-    # Requests
-
-    def _on_asked(self, attr: str, old: Any, new: Any) -> None:
-        """Do what the page asks; a refusal is told and changes nothing."""
-        try:
-            request = json.loads(new["message"][0])
-            name = request.pop("name")
-            request.pop("count", None)  # two requests in a row are never equal
-            handler = HANDLERS.get(name)
-            if handler is None:
-                raise ParameterError(f"request: expected one of {', '.join(HANDLERS)}, got {name!r}")
-            handler(self, **request)
-        except HoofEnvError as error:
-            self._refuse(error)
-        except (KeyError, TypeError, ValueError) as error:
-            self._refuse(ParameterError(f"request: {error}"))
+        self.wire.news = layout.packed(row, *player.history.between(*window), is_anew=True)
 
     def _refuse(self, error: Exception) -> None:
-        """Say why something is refused."""
-        self._tell(status=str(error), kind="error", playing=self.playing)
+        """Say why something is refused, or what went wrong."""
+        self._tell(status=words_of(error), kind="error", playing=self.playing)
 
     def _tell(self, **message: Any) -> None:
         """Send a message to the page."""
-        self.look.told.data = {"message": [json.dumps({"kind": "note"} | message | {"at": time.monotonic()})]}
+        self.wire.told = {"kind": "note"} | message | {"at": time.monotonic()}
+
+    # Requests
 
     def show(self) -> None:
         """Send all that is shown, and warnings, as a page asks that has just opened."""
@@ -165,16 +172,12 @@ class Tab:
 
     def reset(self, seed: Any = None, policy: str | None = None) -> None:
         """Start an episode anew."""
-        number = None if seed in (None, "") else seed_of(seed)
-        with warnings.catch_warnings(record=True) as said:
-            warnings.simplefilter("always")
-            chunk = self.player.simulation.reset(number, policy or None)
-        if self.player.recording is not None:
-            self._stop_recording()
+        with heard() as said:
+            chunk = self.player.simulation.reset(seed, policy or None)
+        self._stop_recording()
         self.player.reset(chunk)
         self._send_anew()
-        text = " ".join(str(one.message) for one in said)
-        text = text or f"Seed {self.player.simulation.seed}."
+        text = " ".join(said) or f"Seed {self.player.simulation.seed}."
         is_driven = self.player.simulation.hand is not None
         self._tell(status=text, hand=is_driven, playing=self.playing)
 
@@ -195,7 +198,7 @@ class Tab:
         """Give a setting another value, at once where it can change within an episode."""
         if setting == "target_speed":
             self.player.simulation.command_speed(value)
-        elif controls.needs_new_environment(setting) or not self.player.simulation.touch(setting, value):
+        elif not self.player.simulation.touch(setting, value):
             here = self.player.simulation
             self._go({"arguments": here.arguments | here.parameters | {setting: value}})
 
@@ -225,12 +228,12 @@ class Tab:
         pairs = parse_pairs("arguments", arguments.split())
         if preset:
             pairs["preset"] = preset
-        number = seed_of(seed or 0)
+        seed = seed or 0
         here = self.player.simulation
         if env_id == here.env_id and pairs == here.arguments:
-            self.reset(number, policy or None)
+            self.reset(seed, policy)
             return
-        self._go({"env_id": env_id, "arguments": pairs, "policy": policy or None, "seed": number})
+        self._go({"env_id": env_id, "arguments": pairs, "policy": policy or None, "seed": seed})
 
     def _go(self, changes: Setup) -> None:
         """Lead the tab to the page of another set-up, after the set-up was tried."""
@@ -241,9 +244,7 @@ class Tab:
             "policy": here.policy,
             "seed": here.seed,
         } | changes
-        simulation, _ = checked_simulation(setup)
-        simulation.reset()
-        simulation.env.close()
+        try_out(setup)
         self._tell(go=self._keep(setup))
 
     def record(self, suffix: str = ".csv") -> None:
@@ -261,21 +262,6 @@ class Tab:
         if recording is not None:
             self._tell(recording=False, status="Writing ...")
             recording.write()
-
-    def _said(self, text: str, kind: str) -> None:
-        """Tell the end of a recording from its own thread."""
-        self._doc.add_next_tick_callback(lambda: self._tell(status=text, kind=kind))
-
-    def close(self) -> None:
-        """Write an unfinished recording, and let the simulation go."""
-        self.playing = False
-        recording = self.player.recording
-        if recording is not None:
-            recording.tell = lambda text, kind: print(f"hoof-env view: {text}", flush=True)
-            recording.write()
-            self.player.recording = None
-        self.player.simulation.env.close()
-        self.player.history.clear()
 
 
 HANDLERS: dict[str, Callable[..., None]] = {
@@ -296,20 +282,29 @@ HANDLERS: dict[str, Callable[..., None]] = {
 """Requests of a page by name."""
 
 
-def seed_of(text: Any) -> int:
-    """Return the seed that a field of the page has.
+@contextmanager
+def heard() -> Iterator[list[str]]:
+    """Collect what is warned of; yield the list, which is filled at the end."""
+    said: list[str] = []
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        yield said
+    said += [str(one.message) for one in caught]
+
+
+def try_out(setup: Setup) -> None:
+    """Start an episode of a set-up.
 
     Raises:
-        ParameterError: it is no whole number of 0 or more.
+        HoofEnvError: the set-up is refused, or its control steps are too long to be shown.
     """
-    if not str(text).isdecimal():
-        raise ParameterError(f"seed: expected a whole number, 0 or more, got {text!r}")
-    return int(text)
-
-
-def checked_simulation(setup: Setup) -> tuple[Simulation, list[str]]:
-    """Make a simulation; return it with what was warned of."""
-    with warnings.catch_warnings(record=True) as said:
-        warnings.simplefilter("always")
+    with heard():
         simulation = Simulation(**setup)
-    return simulation, [str(one.message) for one in said]
+    env: Any = simulation.env.unwrapped
+    substeps = env.engine.substeps * env.dt / env.sim_dt
+    if substeps > MOST_SUBSTEPS:
+        raise ParameterError(
+            f"sim_dt, dt: expected at most {MOST_SUBSTEPS} substeps in a control step, got {substeps:.6g}"
+        )
+    simulation.reset()
+    simulation.env.close()

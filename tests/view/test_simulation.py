@@ -14,12 +14,13 @@ from hoof_env.errors import HoofEnvError, ParameterError
 from hoof_env.gait import PARAMETERS
 from hoof_env.ground.laws import FACTORS
 from hoof_env.lab.forces import THRESHOLD, above_threshold
+from hoof_env.render.outline import ARROW_M, LEAST_FORCE
 from hoof_env.view import history
-from hoof_env.view.drawing import ARROW_M, LEAST_FORCE, legs_of
+from hoof_env.view.drawing import legs_of
 from hoof_env.view.history import RESOLUTION, thinned
 from hoof_env.view.player import Player
 from hoof_env.view.recording import Recording
-from hoof_env.view.same_motion import elastic_and_inelastic, normal_for
+from hoof_env.view.same_motion import SameMotion
 from hoof_env.view.simulation import Simulation
 
 LEG, HORSE, TERRAIN = "hoof_env/HorseLeg-v0", "hoof_env/Horse-v0", "hoof_env/HorseLegTerrain-v0"
@@ -79,44 +80,54 @@ def test_a_recording_is_the_file_of_export(env_id, tmp_path):
     assert said[0][1] == "note"
 
 
-@pytest.mark.parametrize("env_id", [LEG, TERRAIN, FIXED])
-def test_the_law_gives_the_simulated_force_for_the_simulated_ground(env_id):
-    """Elastic and inelastic curves are Eq. 14 along the motion: at the ground's own restitution it is the
-    force of the engine."""
-    simulation = Simulation(env_id, {"restitution": 0.4, "normal_law": "hunt-crossley"})
+@pytest.mark.parametrize(
+    ("env_id", "arguments", "tolerance"),
+    [
+        (LEG, {}, 1e-9),
+        (TERRAIN, {}, 1e-9),
+        (FIXED, {"solver": "paper"}, 1e-9),
+        # A sole without mass is followed from the leg's motion; over elastic ground steps of the engine go
+        # beyond its balance.
+        (HORSE, {}, 1e-4),
+        (HORSE, {"restitution": 1.0}, 2e-2),
+        (HORSE, {"restitution": 0.0, "normal_law": "lankarani-nikravesh"}, 1e-4),
+    ],
+)
+def test_the_law_gives_the_simulated_force_for_the_simulated_ground(env_id, arguments, tolerance):
+    """Curves of other ground are Eq. 14 along the motion: at the ground's own restitution it is the force of
+    the engine."""
+    arguments = {"restitution": 0.4, "normal_law": "hunt-crossley"} | arguments
+    simulation = Simulation(env_id, arguments)
     simulation.reset()
     env = simulation.env.unwrapped
-    worst, most = 0.0, 0.0
+    same = SameMotion(env.batch, (arguments["restitution"],))
+    same.begin(env.record())
+    worst, most, seen = 0.0, 0.0, 0
     for _ in range(60):
-        if simulation.step() is None:
+        chunk = simulation.step()
+        if chunk is None:
             break
         record = env.record()
-        normal = (record["toe_normal"] + record["heel_normal"])[:, 0, 0]
-        by_law = normal_for(record, env.batch, simulation.value_of("stiffness"), 0.4)[:, 0]
-        worst, most = max(worst, np.abs(by_law - normal).max()), max(most, normal.max())
-        both = elastic_and_inelastic(record, env.batch, simulation.value_of("stiffness"))
-        if normal.max() > 0:
-            assert not np.array_equal(both["elastic"], both["inelastic"])
+        normal = (record["toe_normal"] + record["heel_normal"])[..., 0]
+        (by_law,) = same.forces(record)
+        known = np.isfinite(by_law)
+        worst = max(worst, np.abs(by_law - normal)[known].max(initial=0.0))
+        most = max(most, normal[known].max(initial=0.0))
+        for k, leg in enumerate(simulation.legs):
+            loaded = (normal[:, k] > 0) & known[:, k]
+            seen += np.any(chunk.normals[f"{leg}elastic"] != chunk.normals[f"{leg}inelastic"], where=loaded)
     assert most > 100
-    assert worst < 1e-9 * most
+    assert worst < tolerance * most
+    assert seen > len(simulation.legs)
     assert FACTORS["hunt-crossley"](1.0) == 0
 
 
-def test_there_is_no_such_curve_where_the_force_is_another():
-    simulation = Simulation(LEG)
-    assert simulation.reset().normals
-    record = simulation.env.unwrapped.record()
-    batch = simulation.env.unwrapped.batch
-    for name, value in (("legs", 4), ("paper", object())):
-        others = {"settings": batch.settings, "task": batch.task, "legs": 1, "paper": None} | {name: value}
-        assert not elastic_and_inelastic(record, SimpleNamespace(**others), 2e4)
-    springs = replace(batch.settings, hoof_stiffness=2e5)
-    others = SimpleNamespace(settings=springs, task=batch.task, legs=1, paper=None)
-    assert not elastic_and_inelastic(record, others, 2e4)
-    law = SimpleNamespace(
-        settings=batch.settings, task=replace(batch.task, contact_law=max), legs=1, paper=None
-    )
-    assert not elastic_and_inelastic(record, law, 2e4)
+def test_a_law_from_outside_has_no_such_curve_and_the_page_says_so():
+    batch = Simulation(LEG).env.unwrapped.batch
+    task = replace(batch.task, contact_law=max)
+    others = SimpleNamespace(task=task, settings=batch.settings, body=batch.body)
+    assert "outside the package" in SameMotion(others).refusal
+    assert SameMotion(batch).refusal == ""
 
 
 def test_a_touch_acts_at_once_as_an_environment_made_so_would():
@@ -144,8 +155,11 @@ def test_a_touch_acts_at_once_as_an_environment_made_so_would():
         changed += np.any(chunk.columns["toe_normal"][same] != before["toe_normal"][rows])
     assert changed
     record = simulation.env.unwrapped.record()
-    by_law = normal_for(record, simulation.env.unwrapped.batch, 30000.0, 0.9)[:, 0]
-    np.testing.assert_allclose(by_law, (record["toe_normal"] + record["heel_normal"])[:, 0, 0], atol=1e-6)
+    same = SameMotion(simulation.env.unwrapped.batch, (0.9,))
+    same.set_ground(simulation.parameters)
+    np.testing.assert_allclose(
+        same.forces(record)[0], (record["toe_normal"] + record["heel_normal"])[..., 0], atol=1e-6
+    )
     # The next episode keeps them.
     simulation.reset()
     made = Simulation(LEG, {"restitution": 0.9, "stiffness": 30000.0}, seed=2)
@@ -159,6 +173,7 @@ def test_ground_that_needs_shorter_steps_is_left_to_a_new_environment():
     simulation = Simulation(LEG)
     simulation.reset()
     assert not simulation.touch("stiffness", 1e9)
+    assert not simulation.touch("exponent", 2.0)
     assert simulation.parameters == {}
 
 
@@ -167,9 +182,8 @@ def test_ground_that_needs_shorter_steps_is_left_to_a_new_environment():
     [
         ("restitution", 1.5),
         ("friction", float("nan")),
-        ("exponent", 2.0),
         ("trunk_mass", "heavy"),
-        ("x", 1.0),
+        ("setting", 1.0),
     ],
 )
 def test_a_refused_touch_changes_nothing(name, value):
@@ -245,14 +259,16 @@ def test_one_episode_follows_the_other_and_memory_is_bounded(monkeypatch):
         player.curves()
         player.steps()
         player.row()
-        sizes.append(player.history.size)
+        kept = player.history
+        columns = sum(len(part) * len(part["time"]) for part in (*kept._curves, *kept._steps))
+        sizes.append(columns + sum(len(row) for row in kept._rows))
     assert ends == pytest.approx(2.2 * KEPT / 0.5, abs=2)
     assert simulation.seed == ends
     assert player.history.span[0] > player.shown - KEPT - 0.5
     assert max(sizes) < 1.15 * sizes[len(sizes) // 2]
     at = player.history.row_at(player.shown - 2.0)
     assert abs(at[0] - player.shown + 2.0) < 0.26
-    shown = player.history.curves_between(player.shown - 3.0, player.shown)
+    shown, _ = player.history.between(player.shown - 3.0, player.shown)
     assert np.all(np.diff(shown["time"]) >= 0)
     assert shown["time"][0] < player.shown - 2.99
 
@@ -299,9 +315,11 @@ def test_the_return_is_the_sum_of_all_terms_of_all_steps():
     steps = player.steps()
     sums = {name: sum(values) for name, values in steps.items() if name != "time"}
     assert len(steps["time"]) >= 25
-    assert player.totals == pytest.approx(sums)
     names = [name for name, _ in player.numbers]
-    assert player.row()[3 + names.index("return")] == pytest.approx(sum(sums.values()))
+    row = player.row()[3:]
+    assert row[names.index("return")] == pytest.approx(sum(sums.values()))
+    for name, total in sums.items():
+        assert row[names.index(name)] == pytest.approx(total)
 
 
 @pytest.mark.parametrize("env_id", [LEG, HORSE])
@@ -349,9 +367,8 @@ def test_elastic_and_inelastic_are_the_forces_of_the_papers_restitutions():
     for _ in range(60):
         chunk = simulation.step()
         env = simulation.env.unwrapped
-        for name, restitution in (("elastic", 1.0), ("inelastic", 0.0)):
-            by_law = normal_for(env.record(), env.batch, simulation.value_of("stiffness"), restitution)
-            np.testing.assert_array_equal(chunk.normals[name], by_law[:, 0])
+        by_law = SameMotion(env.batch, (1.0, 0.0)).forces(env.record())[..., 0]
+        np.testing.assert_array_equal([chunk.normals["elastic"], chunk.normals["inelastic"]], by_law)
         # Elastic ground is a spring: K depth^n, without a loss.
         depth = np.array([chunk.columns[f"{point}_depth"] for point in ("toe", "heel")])
         settings = env.batch.settings

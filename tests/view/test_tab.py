@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-import json
+import asyncio
 import re
 import socket
 import subprocess
 import sys
 import time
+import warnings
 from types import SimpleNamespace
 
 import numpy as np
@@ -22,6 +23,7 @@ from bokeh.document import Document
 from bokeh.embed import file_html
 from bokeh.models import Div
 from bokeh.resources import INLINE
+from tornado.httpclient import AsyncHTTPClient
 
 from hoof_env.view import server
 from hoof_env.view import tab as tab_module
@@ -29,7 +31,7 @@ from hoof_env.view.controls import CONDITIONS, PAPER_ID, paper_values, setting_s
 from hoof_env.view.layout import template
 from hoof_env.view.playback import Playback
 from hoof_env.view.recording import FORMATS
-from hoof_env.view.server import MOST_TABS, Pages, start
+from hoof_env.view.server import Pages, start
 from hoof_env.view.simulation import Simulation
 from hoof_env.view.tab import HANDLERS, Tab
 
@@ -48,8 +50,8 @@ class Page:
     def ask(self, name, **more):
         """Send a request; return what the tab told meanwhile."""
         heard = {}
-        self.tab.look.told.on_change("data", lambda _a, _o, new: heard.update(json.loads(new["message"][0])))
-        self.tab._on_asked("data", None, {"message": [json.dumps({"name": name, "count": 1} | more)]})
+        self.tab.wire.on_change("told", lambda attr, old, new: heard.update(new))
+        self.tab._on_asked("asked", None, {"name": name, "count": 1} | more)
         return heard
 
     def tick(self, seconds):
@@ -60,17 +62,18 @@ class Page:
 
     @property
     def news(self):
-        """What was sent last: row, curves and terms by name, totals, and True if they begin anew."""
-        names = self.tab.look.names
-        numbers = self.tab.look.news.data["numbers"].copy()
-        anew, *counts = numbers[:3]
-        lengths = [names["row"]]
-        for group, count in zip(("curves", "steps"), counts, strict=True):
-            lengths += [int(count)] * len(names[group])
-        row, *columns, totals = np.split(numbers, 3 + np.cumsum([0, *lengths]))[1:]
-        curves = dict(zip(names["curves"], columns, strict=False))
-        steps = dict(zip(names["steps"], columns[len(curves) :], strict=True))
-        return SimpleNamespace(row=row, curves=curves, steps=steps, totals=totals, anew=anew == 1)
+        """What was sent last: row, curves and terms by name, and True if they begin anew."""
+        player = self.tab.player
+        anew, *counts = self.tab.wire.news[:3]
+        names = [[*player.history.between(-1, 1e9)[0]], ["time", *player.simulation.terms]]
+        lengths = [player.drawing.length]
+        for group, count in zip(names, counts, strict=True):
+            lengths += [int(count)] * len(group)
+        row, *columns, rest = np.split(self.tab.wire.news, 3 + np.cumsum([0, *lengths]))[1:]
+        assert len(rest) == 0
+        curves = dict(zip(names[0], columns, strict=False))
+        steps = dict(zip(names[1], columns[len(curves) :], strict=True))
+        return SimpleNamespace(row=row, curves=curves, steps=steps, anew=anew == 1)
 
     @property
     def row(self):
@@ -117,10 +120,10 @@ def test_the_page_goes_back_in_time_and_on_again(page):
 
 def test_a_reset_with_a_seed_begins_the_same_episode(page):
     page.tick(0.3)
-    page.ask("reset", seed="5", policy="walk")
+    page.ask("reset", seed=5, policy="walk")
     first = page.row
     page.tick(0.3)
-    page.ask("reset", seed="5")
+    page.ask("reset", seed=5)
     np.testing.assert_array_equal(page.row, first)
     assert page.tab.player.simulation.policy == "walk"
     assert page.row[0] == 0.0
@@ -137,7 +140,7 @@ def test_a_reset_says_whether_a_hand_still_drives(page):
 def test_another_preset_needs_no_other_policy_where_none_was_named(page):
     policy = page.tab._doc.template_variables["policy"]
     assert policy == ""
-    told = page.ask("setup", env_id=LEG, arguments="", preset="klann", policy=policy, seed="0")
+    told = page.ask("setup", env_id=LEG, arguments="", preset="klann", policy=policy, seed=0)
     assert told["go"]
 
 
@@ -161,19 +164,19 @@ def test_no_state_is_lost_or_doubled_whatever_is_asked_meanwhile(page, seed):
     rng = np.random.default_rng(seed)
     has = {}
 
-    def hear(_attr, _old, _new):
+    def hear(attr, old, new):
         news = page.news
         for group in ("curves", "steps"):
             for name, values in getattr(news, group).items():
                 kept = [] if news.anew else has.get((group, name), [])
                 has[group, name] = [*kept, *values]
 
-    page.tab.look.news.on_change("data", hear)
+    page.tab.wire.on_change("news", hear)
     asks = [
         ("touch", {"setting": "stiffness", "value": 5e4}),
         ("touch", {"setting": "friction", "value": 0.3}),
         ("drive", {"setting": "crank_speed", "value": 5.0}),
-        ("reset", {"seed": "3"}),
+        ("reset", {"seed": 3}),
         ("reset", {"policy": "walk"}),
         ("push", {"value": 20}),
         ("step", {}),
@@ -192,21 +195,22 @@ def test_no_state_is_lost_or_doubled_whatever_is_asked_meanwhile(page, seed):
     page.ask("play", value=True)
     page.tick(0.8)
     history = page.tab.player.history
-    for group, found in (("curves", history.curves_between), ("steps", history.steps_between)):
+    for k, group in enumerate(("curves", "steps")):
         time = np.array(has[group, "time"])
         assert len(time) > 30
         assert np.all(np.diff(time) > 0)
         assert time[-1] > page.tab.player.shown - 0.07
-        whole = found(time[0], time[-1])
+        whole = history.between(time[0], time[-1])[k]
         for name, values in whole.items():
             np.testing.assert_array_equal(has[group, name], values, err_msg=name)
 
 
 def test_a_warning_waits_until_the_page_has_opened(tmp_path, monkeypatch):
-    monkeypatch.setattr(tab_module, "checked_simulation", lambda setup: (Simulation(**setup), ["A zip."]))
+    warned = lambda **setup: warnings.warn("A zip.", stacklevel=1) or Simulation(**setup)  # noqa: E731
+    monkeypatch.setattr(tab_module, "Simulation", warned)
     page = Page(tmp_path)
     page.tick(0.2)
-    assert page.tab.look.told.data["message"] == ["{}"]
+    assert page.tab.wire.told == {}
     told = page.ask("show")
     assert (told["status"], told["kind"]) == ("A zip.", "warning")
     assert page.ask("show") == {}
@@ -229,8 +233,8 @@ def test_a_push_adds_its_impulse_over_the_mass(page):
         ({"name": "drive", "setting": "swing_sin", "value": 7}, "swing_sin"),
         ({"name": "speed", "value": 900}, "speed"),
         ({"name": "back", "value": "soon"}, "time"),
-        ({"name": "reset", "seed": "-3"}, "seed"),
-        ({"name": "reset", "seed": "2.7"}, "seed: expected a whole number"),
+        ({"name": "reset", "seed": -3}, "seed"),
+        ({"name": "reset", "seed": 2.7}, "seed"),
         ({"name": "reset", "policy": "gallop"}, "policy"),
         ({"name": "reset", "policy": "tests/view"}, "tests/view"),
         ({"name": "condition", "value": "fly"}, "fly"),
@@ -238,7 +242,7 @@ def test_a_push_adds_its_impulse_over_the_mass(page):
         ({"name": "push", "value": None}, "push"),
         ({"name": "push", "value": 1e9}, "push"),
         ({"name": "stop everything"}, "request"),
-        ({"name": "touch"}, "request"),
+        ({"name": "touch"}, "TypeError: Tab.touch() missing"),
     ],
 )
 def test_a_refusal_says_why_and_the_page_lives_on(page, request_, words):
@@ -259,12 +263,13 @@ def test_a_refusal_says_why_and_the_page_lives_on(page, request_, words):
         ({"preset": "mule"}, "mule"),
         ({"arguments": "friction=-2"}, "friction"),
         ({"arguments": "friction"}, "key=value"),
+        ({"arguments": "sim_dt=1e-8"}, "at most 10000 substeps in a control step, got 2e+06"),
         ({"policy": "docs"}, "docs"),
         ({"seed": "many"}, "many"),
     ],
 )
 def test_a_refused_set_up_leaves_the_page_as_it_is(page, form, words):
-    asked = {"env_id": LEG, "arguments": "", "preset": "", "policy": "run", "seed": "0"} | form
+    asked = {"env_id": LEG, "arguments": "", "preset": "", "policy": "run", "seed": 0} | form
     told = page.ask("setup", **asked)
     assert told["kind"] == "error"
     assert words in told["status"]
@@ -278,23 +283,99 @@ def test_another_set_up_gets_a_page_of_its_own(page):
         arguments="friction=0.7 trunk_mass=60",
         preset="identified",
         policy="walk",
-        seed="4",
+        seed=4,
     )
     assert told["go"] == "?setup=kept"
     arguments = {"friction": 0.7, "trunk_mass": 60, "preset": "identified"}
     assert page.kept == [{"env_id": LEG, "arguments": arguments, "policy": "walk", "seed": 4}]
 
 
-def test_a_policy_that_fails_pauses_the_page_until_another_drives(page):
+def raising(*given, **more):
+    raise RuntimeError("out of order")
+
+
+@pytest.mark.parametrize(
+    ("predict", "words"),
+    [
+        (lambda *_, **__: (np.full(4, np.nan), None), "expected finite actions"),
+        (lambda *_, **__: (["fast"], None), "could not convert"),
+        (lambda *_, **__: 3.0, "TypeError"),
+        (raising, "policy walk: expected actions, it raised RuntimeError: out of order"),
+    ],
+)
+def test_a_policy_that_fails_pauses_the_page_until_another_drives(tmp_path, predict, words):
+    page = Page(tmp_path, policy="walk")
     page.tick(0.1)
-    broken = type("Broken", (), {"predict": lambda *_, **__: (np.full(4, np.nan), None)})()
-    page.tab.player.simulation._player = broken
+    page.tab.player.simulation._player = SimpleNamespace(predict=predict)
+    told = []
+    page.tab.wire.on_change("told", lambda attr, old, new: told.append(new))
     page.tick(0.1)
+    assert words in told[0]["status"]
+    assert (told[0]["kind"], told[0]["playing"]) == ("error", False)
     assert page.tab.playing is False
+    page.ask("step")  # may show what was simulated before
+    assert words in page.ask("step")["status"]
     page.ask("reset", policy="run")
     page.ask("play", value=True)
     page.tick(0.1)
     assert page.row[0] > 0.05
+    page.tab.close()
+
+
+@pytest.mark.parametrize("part", ["go", "row", "curves"])
+def test_no_error_of_a_tick_stops_the_page_without_words(page, monkeypatch, part, capfd):
+    page.tick(0.1)
+    with monkeypatch.context() as broken:
+        broken.setattr(page.tab.player, part, raising)
+        page.tick(0.1)
+    assert page.tab.playing is False
+    assert page.tab.wire.told["status"] == "RuntimeError: out of order"
+    assert "in raising" in capfd.readouterr().err  # the whole trace, for the author of what is broken
+    page.ask("play", value=True)
+    at = page.row[0]
+    page.tick(0.1)
+    assert page.row[0] > at
+
+
+@pytest.mark.parametrize("name", HANDLERS)
+def test_no_error_of_a_request_leaves_its_callback(page, monkeypatch, name):
+    monkeypatch.setitem(HANDLERS, name, raising)
+    told = page.ask(name)
+    assert (told["status"], told["kind"]) == ("RuntimeError: out of order", "error")
+
+
+def test_an_error_of_the_thread_that_writes_is_told(page, monkeypatch):
+    monkeypatch.setattr(records, "write", raising)
+    page.ask("record", suffix=".csv")
+    page.tick(0.1)
+    told = []
+    recording = page.tab.player.recording
+    recording._tell = lambda *what: told.append(what)
+    page.tab.player.recording = None
+    recording.write().join()
+    assert told == [(f"{recording.path}: RuntimeError: out of order", "error")]
+
+
+def test_an_error_of_a_new_page_is_told_on_it(tmp_path, monkeypatch):
+    monkeypatch.setattr(tab_module, "Simulation", raising)
+    refused = opened(Pages(SETUP, tmp_path))
+    assert refused.template_variables["reason"] == "RuntimeError: out of order"
+
+
+def test_bars_of_the_reward_are_those_of_the_moment_that_is_shown(page):
+    player = page.tab.player
+    names = [name for name, _ in player.numbers]
+    first = 3 + names.index(player.simulation.terms[0])
+    shown = {}
+    for _ in range(20):
+        page.tick(0.04)
+        shown[page.row[0]] = page.row[first : 3 + len(names)]
+    earlier, later = (list(shown)[k] for k in (4, -1))
+    assert not np.allclose(shown[earlier], shown[later], rtol=0.1)
+    page.ask("back", value=earlier)
+    np.testing.assert_allclose(page.row[first : 3 + len(names)], shown[earlier], rtol=1e-6)
+    page.ask("play", value=True)
+    np.testing.assert_allclose(page.row[first : 3 + len(names)], shown[later], rtol=1e-6)
 
 
 def test_the_conditions_of_the_paper_are_the_paper(page):
@@ -314,7 +395,7 @@ def test_a_recording_is_written_in_each_format(page, suffix, tmp_path):
     page.tick(0.2)
     writes = []
     recording = page.tab.player.recording
-    recording.tell = lambda *what: writes.append(what)
+    recording._tell = lambda *what: writes.append(what)
     page.tab.player.recording = None
     recording.write().join()
     assert writes[0][1] == "note", writes
@@ -361,7 +442,7 @@ def test_a_recording_describes_its_own_episode_when_the_next_one_has_begun(end, 
     recording = page.tab.player.recording
     page.tick(0.2)
     if end == "reset":
-        page.ask("reset", seed="9", policy="run")
+        page.ask("reset", seed=9, policy="run")
     else:
         page.tick(0.6)
     page.ask("touch", setting="friction", value=0.7)
@@ -453,33 +534,49 @@ def test_without_bokeh_the_command_says_how_to_get_it(monkeypatch):
         start(SETUP)
 
 
-def test_a_ninth_tab_is_refused_and_an_old_page_too(tmp_path):
-    def opened(pages, arguments):
-        doc = Document()
-        request = type("Request", (), {"arguments": arguments})
-        context = type("Context", (), {"request": request})
-        doc._session_context = lambda: context
-        pages.open(doc)
-        return doc
+def opened(pages, **arguments):
+    """Open a page as Bokeh does; return its document."""
+    doc = Document()
+    request = SimpleNamespace(arguments=arguments)
+    doc._session_context = lambda: SimpleNamespace(request=request)
+    pages.open(doc)
+    return doc
 
+
+def test_a_page_that_is_refused_takes_no_place_and_an_old_one_is_told(tmp_path):
     pages = Pages(SETUP, tmp_path)
-    pages.server = SimpleNamespace(get_sessions=list)
-    playing = SimpleNamespace(connection_count=1, document=opened(pages, {}))
-    sessions = [playing] * MOST_TABS
-    pages.server = SimpleNamespace(get_sessions=lambda: sessions)
-    refused = opened(pages, {})
-    assert "tabs are open" in refused.template_variables["reason"]
-    # A refused page takes no place.
-    sessions[0] = SimpleNamespace(connection_count=1, document=refused)
-    assert "simulation" in opened(pages, {}).template_variables
-    sessions[0] = playing
-    playing.connection_count = 0
-    assert "simulation" in opened(pages, {}).template_variables
-    pages.server = type("Server", (), {"get_sessions": lambda self: []})()
-    assert "too old" in opened(pages, {"setup": [b"guessed"]}).template_variables["reason"]
+    assert "too old" in opened(pages, setup=[b"guessed"]).template_variables["reason"]
     kept = pages.keep(SETUP | {"seed": 7}).partition("=")[2]
-    doc = opened(pages, {"setup": [kept.encode()]})
+    doc = opened(pages, setup=[kept.encode()])
     assert doc.template_variables["simulation"].seed == 7
+    assert len(pages._tabs) == 1
+
+
+def test_no_more_tabs_than_the_limit_however_fast_they_are_opened(tmp_path, monkeypatch):
+    """Requests that come in the same instant, before any browser is connected."""
+    monkeypatch.setattr(server, "MOST_TABS", 2)
+    running, url = start(SETUP, port=0, out=tmp_path)
+    loop = running.io_loop
+    client = AsyncHTTPClient()
+
+    async def load(count):
+        answers = [client.fetch(url, request_timeout=300, connect_timeout=300) for _ in range(count)]
+        return [(await answer).body.decode() for answer in answers]
+
+    async def at_last():
+        # Sessions without a browser are let go after a second.
+        for _ in range(50):
+            (page,) = await load(1)
+            if "Set-up" in page:
+                return page
+            await asyncio.sleep(0.2)
+        return page
+
+    pages = loop.run_sync(lambda: load(4))
+    assert sum("Set-up" in page for page in pages) == 2
+    assert sum('http-equiv="refresh"' in page and "2 tabs are open" in page for page in pages) == 2
+    assert "Set-up" in loop.run_sync(at_last)
+    running.stop()
 
 
 # Pages that stand alone

@@ -1,12 +1,10 @@
 // A page that stands alone: plays records that it has.
 
-const scenes = views.map(({parts}, k) => new SceneView(parts, document.querySelector(`[data-record="${k}"]`)))
+const scenes = views.map(({parts}, k) => new SceneView(parts, find(`[data-record="${k}"]`)))
 const counts = views.map(({count}) => count)
 const longest = Math.max(...counts)
-const find = (what) => document.querySelector(what)
 const slider = find("#at")
 const play = find("#play")
-const calm = window.matchMedia("(prefers-reduced-motion: reduce)")
 let at = 0
 let playing = false
 let last = 0
@@ -39,16 +37,14 @@ function set_playing(value) {
   }
 }
 
-// With reduced motion the record goes on in four pictures a second instead of moving.
 function go(now) {
   if (!playing) {
     return
   }
-  const passed = ((now - last) / 1000) * Number(find("#speed").value)
-  const least = calm.matches ? 0.25 * Number(find("#speed").value) : 0.03 * Number(find("#speed").value)
-  if (passed >= least) {
+  const passed = now - last
+  if (passed >= (calm.matches ? CALM : 30)) {
     last = now
-    at += Math.min(passed, 0.5) / step
+    at += (Math.min(passed, 500) / 1000) * Number(find("#speed").value) / step
     if (at > longest - 1) {
       at = 0
     }
@@ -70,20 +66,11 @@ slider.addEventListener("input", () => {
   show()
 })
 bind_camera(scenes)
-document.addEventListener("keydown", (event) => {
-  if (types(event.target) || event.ctrlKey || event.metaKey || event.altKey) {
-    return
-  }
-  const {key, target} = event
-  if (key == " " && target.tagName != "BUTTON") {
-    event.preventDefault()
-    set_playing(!playing)
-  } else if ((key == "ArrowRight" || key == "ArrowLeft") && target.type != "range") {
-    event.preventDefault()
-    move(key == "ArrowRight" ? 1 : -1)
-  } else if (key == "Home") {
-    move(-longest)
-  }
+bind_keys({
+  " ": () => set_playing(!playing),
+  "ArrowRight": () => move(1),
+  "ArrowLeft": () => move(-1),
+  "Home": () => move(-longest),
 })
 show()
 document.body.dataset.ready = "true"

@@ -7,49 +7,43 @@ let going = true
 
 function ask(name, more = {}) {
   asks += 1
-  asked.data = {message: [JSON.stringify({name, ...more, count: asks})]}
+  wire.asked = {name, ...more, count: asks}
 }
-
-const find = (what) => document.querySelector(what)
-const all = (what) => [...document.querySelectorAll(what)]
 
 // States
 
-const masters = {
-  curves: new GrowingColumns(names.curves, most.curves),
-  steps: new GrowingColumns(names.steps, most.steps),
-}
-let row = new Float64Array(names.row)
-let totals = []
-let is_longer = false
-
-// The order of numbers is that of `News.packed`.
+// The first news of a page and those after a jump in time replace what it has.
 function take() {
-  const numbers = Float64Array.from(news.data.numbers)
-  const [anew, ...counts] = numbers.subarray(0, 3)
+  const numbers = Float64Array.from(wire.news)
+  const [anew, ...counts] = numbers
   let at = 3
   const next = (length) => {
     at += length
     return numbers.subarray(at - length, at)
   }
-  row = next(names.row)
-  Object.values(masters).forEach((master, k) => {
+  row = next(row_length)
+  Object.values(masters).forEach(({source, most}, k) => {
+    const names = Object.keys(source.data)
+    const columns = Object.fromEntries(names.map((name) => [name, next(counts[k])]))
     if (anew) {
-      master.clear()
+      source.setv({data: columns}, hidden)
+    } else if (counts[k] > 0) {
+      source.stream(columns, most, hidden)
     }
-    master.add(next(master.names.length * counts[k]), counts[k])
   })
-  totals = numbers.subarray(at)
   if (anew || counts[0] > 0) {
     is_longer = true
     queue_curves()
   }
 }
 
+let row = []
+let is_longer = false
+
 function show_frame() {
   if (is_longer) {
     is_longer = false
-    view.trace(masters.curves.data)
+    view.trace(masters.curves.source.data)
   }
   view.show(row)
   const scrub = find("[data-ask=back]")
@@ -64,7 +58,7 @@ function show_frame() {
 // States that come faster than the browser paints are not drawn: the last one is.
 let is_new = false
 
-news.connect(news.properties.data.change, () => {
+wire.connect(wire.properties.news.change, () => {
   is_new = true
   take()
   document.body.dataset.states = String(Number(document.body.dataset.states ?? 0) + 1)
@@ -74,17 +68,22 @@ news.connect(news.properties.data.change, () => {
 const turns = []
 
 function refresh({source, window: range, master}) {
-  const {data} = masters[master]
-  const end = Math.max(masters.curves.last_time ?? 0, seconds)
+  const {data} = masters[master].source
+  const end = Math.max(masters.curves.source.data.time.at(-1) ?? 0, seconds)
   // Bokeh warns of axes without data, as after the start of an episode.
   const columns = Object.keys(source.data).map((name) => [name, data[name].length > 0 ? data[name] : [0]])
-  // Columns are views of numbers that change in place, which would look the same.
+  // Columns may be the same arrays, in which other numbers stand.
   source.setv({data: Object.fromEntries(columns)}, {sync: false, check_eq: false})
   range.setv({start: end - seconds, end}, hidden)
 }
 
-const refreshes = shown.map((figure) => () => refresh(figure))
-refreshes.push(() => bars.setv({data: {...bars.data, total: [...totals]}}, hidden))
+function refresh_bars() {
+  const end = parts.head + parts.numbers.length
+  const total = [...row.slice(end - bars.data.term.length, end)]
+  bars.setv({data: {...bars.data, total}}, hidden)
+}
+
+const refreshes = [...shown.map((figure) => () => refresh(figure)), refresh_bars]
 
 function queue_curves() {
   for (const act of refreshes) {
@@ -100,7 +99,7 @@ const READING = 10_000 // time for which an error stands [ms]
 let said = 0
 
 function hear() {
-  const message = JSON.parse(told.data.message[0])
+  const message = wire.told
   if (message.go != null) {
     window.location.assign(message.go)
     return
@@ -134,10 +133,11 @@ function hear() {
   }
 }
 
-told.connect(told.properties.data.change, hear)
+wire.connect(wire.properties.told.change, hear)
 
 // Controls
 
+const number_of = (text) => (text == "" ? null : Number(text))
 const value_of = (input) => (input.dataset.log != null ? 10 ** Number(input.value) : Number(input.value))
 
 function write_output(input) {
@@ -189,10 +189,9 @@ for (const button of all("button[data-ask]")) {
     if (name == "record") {
       ask(name, {suffix: find("#format").value})
     } else if (name == "reset") {
-      ask(name, {seed: find("#seed").value, policy: find("#policy").value})
+      ask(name, {seed: number_of(find("#seed").value), policy: find("#policy").value})
     } else if (name == "push") {
-      const given = find("#impulse").value
-      ask(name, {value: given == "" ? null : Number(given)})
+      ask(name, {value: number_of(find("#impulse").value)})
     } else {
       ask(name, button.dataset.value != null ? {value: button.dataset.value} : {})
     }
@@ -202,25 +201,12 @@ for (const button of all("button[data-ask]")) {
 find("#setup").addEventListener("submit", (event) => {
   event.preventDefault()
   const given = Object.fromEntries(new FormData(event.target).entries())
-  ask("setup", given)
+  ask("setup", {...given, seed: number_of(given.seed)})
 })
 
 bind_camera([view])
 
-document.addEventListener("keydown", (event) => {
-  if (types(event.target) || event.ctrlKey || event.metaKey || event.altKey) {
-    return
-  }
-  const on_button = event.target.tagName == "BUTTON" || event.target.tagName == "SUMMARY"
-  if (event.key == " " && !on_button && event.target.type != "range") {
-    event.preventDefault()
-    ask("play")
-  } else if (event.key == ".") {
-    ask("step")
-  } else if (event.key == "r") {
-    ask("reset")
-  }
-})
+bind_keys({" ": () => ask("play"), ".": () => ask("step"), "r": () => ask("reset")})
 
 if (window.matchMedia("(max-width: 760px)").matches) {
   for (const group of all("aside details")) {
@@ -228,15 +214,19 @@ if (window.matchMedia("(max-width: 760px)").matches) {
   }
 }
 
-// Frames of the browser; their number is there to be measured.
+// Frames of the browser; their number is there to be measured. With reduced motion there are four pictures a
+// second while it plays.
 let is_turn = false
+let painted = 0
 
-const count = () => {
+const count = (now) => {
   document.body.dataset.frames = String(Number(document.body.dataset.frames ?? 0) + 1)
   // A figure has its turn in a frame without a new scene, or where each has one, in every other.
   is_turn = !is_turn || !is_new
-  if (is_new) {
+  const is_due = !(calm.matches && going) || now - painted > CALM
+  if (is_new && is_due) {
     is_new = false
+    painted = now
     show_frame()
   }
   if (is_turn && turns.length > 0) {

@@ -1,5 +1,10 @@
 // Draws rows of numbers into the glyphs of a scene, and writes the numbers of a page.
 
+const find = (what) => document.querySelector(what)
+const all = (what) => [...document.querySelectorAll(what)]
+const calm = window.matchMedia("(prefers-reduced-motion: reduce)")
+const CALM = 250 // time between two pictures with reduced motion [ms]
+
 const show_number = (value, digits) =>
   Number.isFinite(value) ? (Object.is(value, -0) ? 0 : value).toFixed(digits).replace(/^-(0(\.0*)?)$/, "$1") : "–"
 
@@ -86,21 +91,34 @@ class SceneView {
   }
 }
 
-// Buttons, check boxes and keys that only change how the scene is seen.
-function bind_camera(views, root = document) {
+// Buttons and the check box that only change how the scene is seen.
+function bind_camera(views) {
   const change = (factor) => {
     for (const view of views) {
       view.zoom = Math.min(Math.max(view.zoom * factor, 0.4), 8)
       view.aim()
     }
   }
-  root.querySelector("[data-zoom=in]")?.addEventListener("click", () => change(1.25))
-  root.querySelector("[data-zoom=out]")?.addEventListener("click", () => change(0.8))
-  root.querySelector("[data-follow]")?.addEventListener("change", (event) => {
+  find("[data-zoom=in]").addEventListener("click", () => change(1.25))
+  find("[data-zoom=out]").addEventListener("click", () => change(0.8))
+  find("[data-follow]")?.addEventListener("change", (event) => {
     for (const view of views) {
       view.follows = event.target.checked
     }
   })
 }
 
-const types = (element) => element != null && /^(INPUT|SELECT|TEXTAREA)$/.test(element.tagName) && element.type != "range"
+// Keys of a page, except in fields, and those that a focused control takes itself: space on buttons, arrows on
+// sliders.
+function bind_keys(acts) {
+  document.addEventListener("keydown", (event) => {
+    const {key, target} = event
+    const is_slider = target.type == "range"
+    const is_field = /^(INPUT|SELECT|TEXTAREA)$/.test(target.tagName) && !is_slider
+    const is_taken = key == " " ? /^(BUTTON|SUMMARY)$/.test(target.tagName) : key.startsWith("Arrow") && is_slider
+    if (key in acts && !is_field && !is_taken && !event.ctrlKey && !event.metaKey && !event.altKey) {
+      event.preventDefault()
+      acts[key]()
+    }
+  })
+}
