@@ -78,7 +78,8 @@ class SameMotion:
         stiffness = self._ground.stiffness * np.interp(_points(record, "x"), terrain.x, terrain.stiffness)
         if self._spring is None:
             elastic = stiffness * np.maximum(depth, 0.0) ** self._ground.exponent
-            chi, dashpot = self._chi[:, None], self._dashpot[:, None]
+            chi = self._chi[:, None]
+            dashpot = self._dashpot[:, None]
             force = elastic * (1.0 + chi * rate * inverse_speed) + dashpot * rate  # Eq. 14
             return np.where(depth > 0.0, np.maximum(force, 0.0), 0.0).sum(axis=2)
         deflection = _points(record, "deflection_normal")
