@@ -11,7 +11,7 @@ from hoof_env import records
 from hoof_env.envs.batch_build import substeps_under
 from hoof_env.envs.batch_starts import vary
 from hoof_env.envs.policies import constant_gait, start_of
-from hoof_env.errors import ParameterError, check_choice, check_number, count
+from hoof_env.errors import HoofEnvError, ParameterError, check_choice, check_number, count
 from hoof_env.gait import PARAMETERS, GaitParameters, limits_of
 from hoof_env.lab.forces import THRESHOLD, above_threshold, onto_surface
 from hoof_env.render.instant import Columns
@@ -172,6 +172,8 @@ class Simulation:
         try:
             action, _ = self._player.predict(self._observation, episode_start=start, deterministic=True)
             is_finite = np.isfinite(np.asarray(action, float)).all()
+        except HoofEnvError:
+            raise
         except Exception as error:
             said = f"{type(error).__name__}: {error}"
             raise ParameterError(f"policy {self.policy_name}: expected actions, it raised {said}") from error

@@ -378,6 +378,14 @@ def test_bars_of_the_reward_are_those_of_the_moment_that_is_shown(page):
     np.testing.assert_allclose(page.row[first : 3 + len(names)], shown[later], rtol=1e-6)
 
 
+def test_the_policies_that_the_page_offers_can_be_chosen(page):
+    offered = page.tab._doc.template_variables["policies"]
+    assert {"walk", "run", "open-loop", "shipped"} <= set(offered)
+    assert page.ask("reset", policy="shipped")["kind"] == "note"
+    page.tick(0.1)
+    assert page.tab.playing
+
+
 def test_the_conditions_of_the_paper_are_the_paper(page):
     page.ask("condition", value="run, inelastic")
     (setup,) = page.kept
