@@ -108,9 +108,7 @@ class Simulation:
 
     def value_of(self, name: str) -> Any:
         """Return the present value of a setting."""
-        if name in self.parameters:
-            return self.parameters[name]
-        return getattr(self._leg.batch.settings, name)
+        return self.parameters.get(name, getattr(self._leg.batch.settings, name))
 
     def _find(self, policy: Any, seed: int) -> Any:
         """Return a policy by its name, or the policy that is given."""
