@@ -15,7 +15,7 @@ import pytest
 import yaml
 
 import hoof_env  # noqa: F401  registers the ids
-from agents import baselines, baselines_report, baselines_run, statistics
+from agents import baselines, baselines_report, baselines_run
 from agents.baselines_report import following, settled_speeds
 from agents.baselines_run import (
     CURVE,
@@ -37,6 +37,7 @@ from agents.settings import FOLDER, load_settings
 from agents.statistics import LOWER, compare, dominates, dominates_with_confidence
 from hoof_env.envs.policies import open_loop
 from hoof_env.errors import DataFileError
+from hoof_env.evaluation import statistics
 from hoof_env.evaluation.episodes import CURVE_SEEDS, FINAL_SEEDS, score_vector
 from hoof_env.evaluation.statistics import Interval, Scored, iqm, mean_figures, over_episodes
 from tests.agents.conftest import SHORT, TINY

@@ -138,12 +138,12 @@ def test_a_failed_run_leaves_the_older_report(folder, monkeypatch, failure):
     before = {path.name: path.read_bytes() for path in folder.iterdir()}
     assert not [name for name in before if name.startswith(".")]
 
-    def fail(*_, **__):
+    def fail(reproduction, stage, **_):
+        (stage / "walk.mp4").touch()
         raise failure
 
     monkeypatch.setattr(shared, "reproduce", lambda say: None)
-    monkeypatch.setattr(shared, "write_reproduction", lambda r, stage, **_: (stage / "walk.mp4").touch())
-    monkeypatch.setattr(shared, "counted", fail)
+    monkeypatch.setattr(shared, "write_reproduction", fail)
     with pytest.raises(type(failure)):
         demo.demo(demo.Args(out=folder, quick=True))
     assert {path.name: path.read_bytes() for path in folder.iterdir()} == before
