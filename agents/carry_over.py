@@ -24,7 +24,7 @@ from tyro.conf import Positional
 
 from agents import runs
 from agents.command import run
-from agents.ship import POLICIES, UNTRAINED
+from agents.ship import POLICIES
 from hoof_env._output import check_folder, markdown_table
 from hoof_env.envs.policies import STANDS_FOR
 from hoof_env.errors import DataFileError, ParameterError, check_number, count
@@ -221,8 +221,7 @@ def play(policy: str, name: str, strength: float, episodes: int) -> Found | None
 def shipped() -> tuple[str, ...]:
     """Return the paths of the policies that ship, but those that are another id's."""
     folders = sorted(path.parent for path in POLICIES.glob(f"*/{FILE}"))
-    others = {**STANDS_FOR, **UNTRAINED}
-    return tuple(str(folder) for folder in folders if f"hoof_env/{folder.name}" not in others)
+    return tuple(str(folder) for folder in folders if f"hoof_env/{folder.name}" not in STANDS_FOR)
 
 
 def read_found(path: Path) -> list[Found]:

@@ -83,11 +83,6 @@ class Args:
     """folder for the policies' folders; in another one than this they have all files"""
 
 
-UNTRAINED = {"hoof_env/HorseRough-v0": "hoof_env/Horse-v0"}
-"""Ids whose policy was trained on another id, by their own, until there is a training on them; the spaces are
-the same, and the policy plays and is scored on its own id."""
-
-
 @dataclass(frozen=True)
 class Choice:
     """Run that is shipped, and the number of runs of which it is the best."""
@@ -138,8 +133,8 @@ def choose(saved: Sequence[runs.SavedModel], env_id: str) -> Choice:
 
 
 def ship(choice: Choice, env_id: str, out: Path) -> dict[str, Any]:
-    """Write the folder of one policy beneath `out`, for its own id, or for one of `STANDS_FOR` or `UNTRAINED`
-    that takes its policy; return its score.json.
+    """Write the folder of one policy beneath `out`, for its own id, or for one of `STANDS_FOR` that takes
+    its policy; return its score.json.
 
     Raises:
         DataFileError: the model does not fit.
@@ -347,7 +342,7 @@ def main(argv: list[str] | None = None) -> None:
     # An id without a training of its own may be played by another's policy
     sources |= {
         env_id: trained_on
-        for env_id, trained_on in {**STANDS_FOR, **UNTRAINED}.items()
+        for env_id, trained_on in STANDS_FOR.items()
         if env_id not in models and trained_on in models
     }
     ids = [check_choice("ids", env_id, sources) for env_id in args.ids] or list(sources)

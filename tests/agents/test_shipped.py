@@ -62,9 +62,8 @@ def test_the_index_is_what_the_command_writes(tmp_path):
 def test_score(folder):
     score = read(data_of(folder) / "score.json")
     with make_env(score["env_id"]) as env, warnings.catch_warnings():
-        # No word of settings that are newer than the policy; one that was trained elsewhere says so
-        is_trained = score["env_id"] not in ship.UNTRAINED
-        warnings.simplefilter("error" if is_trained else "ignore", UserWarning)
+        # No word of settings that are newer than the policy
+        warnings.simplefilter("error", UserWarning)
         policy = OnnxPolicy(folder).load(env, score["env_id"])
     recorded = np.mean(score["returns"][: score["check"]["episodes"]])
     allowed = score["check"]["tolerance"]
