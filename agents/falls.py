@@ -37,8 +37,8 @@ from hoof_env.tasks.horse import MASS
 ENV_ID = "hoof_env/Horse-v0"
 FIRST_SEED = 2_000_000  # on which nothing else is played
 
-FILMED = 3.0  # time before a fall that a film shows [s]
-FPS = 20.0
+FILMED = 1.6  # time before a fall that a film shows [s]
+FPS = 10.0
 SIZE = (480, 270)
 
 
