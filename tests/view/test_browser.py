@@ -210,6 +210,8 @@ def test_the_page_plays_and_says_what_the_engine_says(tab):
     assert tab.page.evaluate(NAMES) == []
     assert tab.page.evaluate(TOO_WIDE) <= 0
     assert "HorseLeg-v0" in tab.page.title()
+    # Sliders say the value itself, whatever notch is nearest.
+    assert tab.page.locator("output[for=touch-stiffness]").text_content() == "20000 N/m^n"
     # A figure of curves is painted: it has more than its background.
     assert tab.page.locator(".curve canvas").first.evaluate(PAINTED) > 10
     tab.pause()

@@ -140,10 +140,10 @@ wire.connect(wire.properties.told.change, hear)
 const number_of = (text) => (text == "" ? null : Number(text))
 const value_of = (input) => (input.dataset.log != null ? 10 ** Number(input.value) : Number(input.value))
 
-function write_output(input) {
+function write_output(input, value = value_of(input)) {
   const output = input.closest(".slider")?.querySelector("output")
   if (output != null) {
-    const text = String(Number(value_of(input).toPrecision(4)))
+    const text = String(Number(value.toPrecision(4)))
     output.textContent = `${text} ${input.dataset.unit ?? ""}`.trim()
     input.setAttribute("aria-valuetext", output.textContent)
   }
@@ -180,7 +180,8 @@ for (const input of all("input[type=range][data-ask]")) {
     }
   })
   input.addEventListener("change", send)
-  write_output(input)
+  // Its place is at the nearest notch, which the present value need not be.
+  write_output(input, Number(input.dataset.now ?? input.value))
 }
 
 for (const button of all("button[data-ask]")) {
