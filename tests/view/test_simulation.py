@@ -236,7 +236,7 @@ def test_a_policy_that_returns_nan_is_refused_and_the_episode_goes_on():
     ("arguments", "message"),
     [
         (("CartPole-v1",), "of this package"),
-        (("hoof_env/HorseLeg-v0", {}, "no_such_folder/"), "policy"),
+        (("hoof_env/HorseLeg-v0", {}, "no_such_folder/"), "model no_such_folder"),
         (("hoof_env/HorseLeg-v0", {}, "tests"), "model"),
         (("hoof_env/HorseLeg-v0", {"preset": "mule"}), "preset"),
         (("hoof_env/HorseLeg-v0", {"friction": -1}), "friction"),
