@@ -134,8 +134,8 @@ def strip(policy: str, strength: float, seed: int, end: float) -> list[NDArray[n
         player = find_policy(policy, env, env_id)
         renderer = new_renderer(records.surroundings(env), FPS, SIZE)
         episode = records.episode(env, player, seed, end + 0.5)
-        pictures = frames(renderer, episode, FPS, read=partial(records.instants_of, env))
-        return list(pictures)[round((end - FILMED) * FPS) :]
+        pictures = list(frames(renderer, episode, FPS, read=partial(records.instants_of, env)))
+    return pictures[round((end - FILMED) * FPS) :]
 
 
 def main(argv: list[str] | None = None) -> None:
