@@ -17,7 +17,7 @@ from hoof_env.view.playback import Playback
 
 FOLDER = Path("_static") / "view"
 LIBRARY = "bokeh.min.js"
-SECONDS = {"hoof_env/Horse-v0": 2.0, "hoof_env/HorseLegFixed-v0": 1.0}
+SECONDS = {"hoof_env/Horse-v0": 2.0, "hoof_env/HorseRough-v0": 2.0, "hoof_env/HorseLegFixed-v0": 1.0}
 USUAL = 3.0  # [s]
 SKIP = 2.0  # an agent needs a second or two to find its gait [s]
 
