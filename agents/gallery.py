@@ -4,12 +4,15 @@
     python -m agents.gallery --again    everything anew, as after new policies
 
 Stills are cut out of the films of the policies. Returns are those of random actions, and of stock PPO where
-docs/evidence/stock has its curves, in the episodes of the published scores.
+docs/evidence/stock has its curves, in the episodes of the published scores. Ids with curves also have
+the steps and seconds that the best stock learner takes to pass the best gait that needs no learning.
 """
 
 from __future__ import annotations
 
 import json
+import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -21,9 +24,10 @@ from agents.command import run
 from agents.ship import FILM, POLICIES
 from agents.stock import OUT as CURVES
 from agents.stock_page import at
-from agents.stock_plan import read_curves
+from agents.stock_plan import TUNED, read_curves
 from hoof_env.envs.manual import RETURNS, STILL
 from hoof_env.envs.policies import STANDS_FOR
+from hoof_env.envs.shipped import shipped_returns
 from hoof_env.evaluation.episodes import FINAL_SEEDS, score_vector
 from hoof_env.evaluation.statistics import iqm
 
@@ -32,6 +36,9 @@ CUT = (20, 60, 310, 270)
 
 PLACE = 2 / 3
 """Place of the frame in the film, over its length: agents have found their gait there."""
+
+UNLEARNT = ("open-loop", "reference")
+"""Best gaits that need no learning, of a leg and of a horse, as score.json names them."""
 
 
 @dataclass(frozen=True)
@@ -64,13 +71,58 @@ def stock_return(env_id: str) -> dict[str, float]:
     return {"stock": float(iqm(at(rows, steps))[0]), "stock_steps": steps}
 
 
-def returns_of(env_id: str, known: dict[str, Any]) -> dict[str, float]:
-    """Return the returns that the page of an id compares with; `known` are those of before."""
+def passed(curve: Sequence[dict[str, Any]], bar: float) -> tuple[float, float]:
+    """Return the steps and the seconds from which on all scores of one training are above a bar; infinite if
+    the last one is not."""
+    first = (math.inf, math.inf)
+    for row in sorted(curve, key=lambda row: -row["steps"]):
+        if row["return"] <= bar:
+            break
+        first = (row["steps"], row["train_seconds"])
+    return first
+
+
+def learning_of(rows: Sequence[dict[str, Any]], bar: float) -> dict[str, Any]:
+    """Return how fast the best stock learner of an id learns, with medians over its seeds.
+
+    Args:
+        rows: rows of curves.csv of one id.
+        bar: return of the best gait that needs no learning.
+
+    Returns:
+        "algo", "seeds", and "steps" and "seconds" from which on it stays above the bar, of the algorithm with
+        the fewest seconds. If none stays above it, the algorithm with the highest return at the end: its
+        steps and seconds in all, and "return", an interquartile mean. {} without rows of a stock learner.
+    """
+    found = []
+    for algo in sorted({row["algo"] for row in rows} - {TUNED}):
+        own = [row for row in rows if row["algo"] == algo]
+        curves = [[row for row in own if row["seed"] == seed] for seed in sorted({r["seed"] for r in own})]
+        steps, seconds = np.median([passed(curve, bar) for curve in curves], axis=0)
+        one = {"algo": algo, "seeds": len(curves)}
+        last = max(row["steps"] for row in own)
+        reached = float(iqm(at(own, last))[0])
+        if math.isinf(seconds):
+            one |= {"return": round(reached, 4)}
+            steps = last
+            seconds = np.median([max(row["train_seconds"] for row in curve) for curve in curves])
+        rank = (seconds if "return" not in one else math.inf, -reached)
+        found.append((rank, one | {"steps": round(float(steps)), "seconds": round(float(seconds), 1)}))
+    return min(found, key=lambda pair: pair[0])[1] if found else {}
+
+
+def returns_of(env_id: str, known: dict[str, Any]) -> dict[str, Any]:
+    """Return the returns that the page of an id compares with, and how fast it is learnt; `known` are those
+    of before."""
     played = STANDS_FOR.get(env_id, env_id)
     random = known.get("random")
     if random is None:
         random = float(np.mean([one["return"] for one in score_vector("random", played, FINAL_SEEDS)]))
-    return {"random": round(random, 4), **{k: round(v, 4) for k, v in stock_return(played).items()}}
+    found = {"random": round(random, 4), **{k: round(v, 4) for k, v in stock_return(played).items()}}
+    scored = shipped_returns(env_id.rpartition("/")[2])
+    bar = max(scored[name] for name in UNLEARNT if name in scored)
+    learnt = learning_of([row for row in read_curves(CURVES) if row["env_id"] == env_id], bar)
+    return found | ({"learnt": learnt} if learnt else {})
 
 
 def main(argv: list[str] | None = None) -> None:

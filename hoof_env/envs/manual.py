@@ -185,12 +185,13 @@ def page_of(id: str) -> str:
 
 
 def index(
-    scores: Mapping[str, Mapping[str, float]] | None = None, stills: Mapping[str, str] | None = None
+    scores: Mapping[str, Mapping[str, Any]] | None = None, stills: Mapping[str, str] | None = None
 ) -> str:
     """Write the page that says which id is for what, in Markdown.
 
     Args:
-        scores: mean returns of policies by name of the page, with the names of `SCORED`; None for no returns.
+        scores: by name of the page mean returns of policies, with the names of `SCORED`, and "learnt", as
+            agents.gallery writes it; None for no returns.
         stills: paths of pictures by name of the page, relative to the index; None for no pictures.
     """
     rows = []
@@ -205,8 +206,9 @@ def index(
         found = (scores or {}).get(name, {})
         gaits = [key for key in SCORED if key in found]
         returns = "<br>".join(f"{SCORED[key]} {found[key]:.3g}" for key in gaits)
-        rows.append((link, use, f"{len(actions)}, {len(_observed(definition))}", returns))
-    head = ("id", "what it asks, and what it is for", "actions, observations", "returns")
+        numbers = f"{len(actions)}, {len(_observed(definition))}"
+        rows.append((link, use, numbers, returns, _learnt(found.get("learnt", {}))))
+    head = ("id", "what it asks, and what it is for", "actions, observations", "returns", "to learn it")
     return Template(WORDS["index"].lstrip()).substitute(table=markdown_table(head, rows))
 
 
@@ -309,8 +311,19 @@ def _find_policy(films: Path, name: str) -> Path:
     raise DataFileError(f"films {films}: expected {name}-v0/film.gif, as agents.ship writes it, found none")
 
 
-def _returns(policy: Path, films: Path, name: str) -> dict[str, float]:
-    """Read the mean returns of a policy that ships and of others in the same episodes.
+def _learnt(learnt: Mapping[str, Any]) -> str:
+    """Write what the best stock learner of an id takes to learn it; "" without one."""
+    if not learnt:
+        return ""
+    seeds = f"{learnt['seeds']} seeds" if learnt["seeds"] > 1 else "1 seed"
+    reached = f"reaches {learnt['return']:.3g} in " if "return" in learnt else ""
+    spent = f"{learnt['steps']:,} steps, {learnt['seconds']:.0f} s"
+    return f"{reached}{spent}<br>({learnt['algo'].upper()}, {seeds})"
+
+
+def _returns(policy: Path, films: Path, name: str) -> dict[str, Any]:
+    """Read the mean returns of a policy that ships and of others in the same episodes, and how fast a stock
+    learner learns.
 
     Raises:
         DataFileError: the policy has no scores, or the file of returns cannot be read.
@@ -325,7 +338,7 @@ def _returns(policy: Path, films: Path, name: str) -> dict[str, float]:
         raise DataFileError(f"returns {path}: expected those that agents.gallery writes: {error!r}") from None
 
 
-def _score(returns: Mapping[str, float]) -> str:
+def _score(returns: Mapping[str, Any]) -> str:
     """Write the table that says which returns are good."""
     titles = dict(SCORED)
     if "stock_steps" in returns:
