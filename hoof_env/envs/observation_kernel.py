@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import operator
 from collections.abc import Callable
-from functools import lru_cache
+from functools import lru_cache, partial
 from typing import Any
+
+from numba.core import types
 
 from hoof_env.dynamics.advance import LANES, MODEL
 from hoof_env.dynamics.layout import Features
@@ -17,6 +20,7 @@ from hoof_env.simd.math import clip, tanh
 from hoof_env.simd.memory import address, doubles, matrix_at, offset, record_at, singles_at
 from hoof_env.simd.noise import uniform
 from hoof_env.simd.reach import fingerprint
+from hoof_env.simd.unrolled import Traced, call, unrolled, when
 from hoof_env.simd.user_functions import number_of
 from hoof_env.tasks.body import BodyKernels
 from hoof_env.tasks.episode import Memories, memories_of, task_type
@@ -50,57 +54,54 @@ def constants_reader(places: tuple[int, ...]) -> Callable[..., Any]:
     return inline_llvm(lambda task: (task.constants[first], *rest(task)))
 
 
-def _with_entries(
-    entries: tuple[Entry, ...], layouts: Memories, scaled: bool, constants: tuple[str, ...]
-) -> Callable[..., Any]:
-    """Return a function that puts the observed entries into their slots: scaled except for tanh, or as
-    measured. Entries of this package are compiled once for all tasks that have them in these slots."""
-    placed = tuple(zip(entries, slots_of(entries)[0], strict=True))
-    built_in = tuple(each for each in placed if not from_outside(functions_of(each[0])))
-    foreign = tuple(each for each in placed if each not in built_in)
-    if not foreign:
-        return _put_ours(placed, layouts, scaled)
-    theirs = _put_all(foreign, layouts, scaled, constants)
-    return _one_and_other(_put_ours(built_in, layouts, scaled), theirs) if built_in else theirs
+def _put_all(entries: tuple[Entry, ...], layouts: Memories, scaled: bool, constants: tuple[str, ...]) -> Any:
+    """Return a part of kernels that puts the observed entries into their slots: scaled except for tanh, or as
+    measured. It takes a tuple of `addresses, lanes, scene, numbers, n`."""
+    puts = [
+        (
+            _put_foreign(entry, slot, layouts, scaled, constants)
+            if is_foreign(entry)
+            else _put(entry, slot, scaled)
+        )
+        for entry, slot in zip(entries, slots_of(entries)[0], strict=True)
+    ]
+
+    # numba cannot loop over functions.
+    @unrolled(lambda *kinds: types.void)
+    def put_all(*arguments: Traced) -> None:
+        for put in puts:
+            put(*arguments)
+
+    return put_all
 
 
-def _put_all(
-    placed: tuple[tuple[Entry, int], ...], layouts: Memories, scaled: bool, constants: tuple[str, ...] = ()
-) -> Callable[..., Any]:
-    """Return a function that puts each entry into its slot. numba cannot loop over functions, so each half of
-    the entries is a function of its own."""
-    if len(placed) == 1:
-        return _with_entry(*placed[0], layouts, scaled, constants)
-    middle = len(placed) // 2
-    halves = (_put_all(half, layouts, scaled, constants) for half in (placed[:middle], placed[middle:]))
-    return _one_and_other(*halves)
+shared_part = lru_cache(maxsize=256)(inline_llvm)
+"""Part of kernels made of a function of this package, compiled once for all tasks."""
 
 
-# Kept for entries of this package only: those of users may change while their names stay.
-_put_ours = lru_cache(maxsize=32)(_put_all)
-"""`_put_all` for entries of this package."""
+def _put(entry: Entry, slot: int, scaled: bool) -> Callable[..., Any]:
+    """Return a function of an unrolled kernel that puts one entry of this package into its slot."""
+    measure = shared_part(entry.measure)
+    scale = shared_part(entry.scale.apply) if scaled and entry.scale.apply is not None else None
+
+    def put(addresses: Traced, lanes: Traced, scene: Traced, numbers: Traced, n: Traced) -> None:
+        column = scene.part("task").part("observation_columns")[slot]
+        with when(call(operator.ge, column, 0)):
+            number = call(measure, scene)
+            numbers[slot] = number if scale is None else call(scale, number, scene)
+
+    return put
 
 
-def _one_and_other(one: Callable[..., Any], other: Callable[..., Any]) -> Callable[..., Any]:
-    """Return a function that calls two others."""
-
-    @inline_llvm
-    def put_both(addresses, lanes, scene, numbers, n):  # type: ignore[no-untyped-def]
-        one(addresses, lanes, scene, numbers, n)
-        other(addresses, lanes, scene, numbers, n)
-
-    return put_both
-
-
-def _with_entry(
+def _put_foreign(
     entry: Entry, slot: int, layouts: Memories, scaled: bool, constants: tuple[str, ...]
 ) -> Callable[..., Any]:
-    """Return a function that puts one entry into its slot, lane by lane if its functions take no lanes."""
+    """Return the same for an entry from outside this package, with checks that its functions return numbers;
+    lane by lane if they take no lanes."""
     measure = inline_llvm(entry.measure)
     given = constants_reader(tuple(constants.index(one.name) for one in entry.constants))
     apply = entry.scale.apply
     scale = inline_llvm(apply) if scaled and apply is not None else inline_llvm(lambda x, scene: x)
-    # Checks, with messages that name the entry, that users' functions return numbers.
     number = number_of(entry.title)
     scaled_number = number_of(f"the scale of {entry.title}")
 
@@ -121,7 +122,7 @@ def _with_entry(
                 measured = number(measure(own, *given(own.task)))
                 set_lane(numbers, slot, lane, scaled_number(scale(measured, own)))
 
-    return put_one_by_one if entry.scalar else put_entry
+    return partial(call, put_one_by_one if entry.scalar else put_entry)
 
 
 class Observers(Kernels):
@@ -144,6 +145,11 @@ class Observers(Kernels):
 def functions_of(entry: Entry) -> list[Callable[..., Any]]:
     """Return the functions of an entry: of its measurement and its scale."""
     return [part for part in (entry.measure, entry.scale.apply) if part]
+
+
+def is_foreign(entry: Entry) -> bool:
+    """True for an entry with a function that is not of this package."""
+    return bool(from_outside(functions_of(entry)))
 
 
 def from_outside(functions: list[Callable[..., Any]]) -> list[Callable[..., Any]]:
@@ -185,9 +191,9 @@ def _made(
     parts = [part for entry in entries for part in functions_of(entry)]
     identity = fingerprint(*parts, flags, layouts.episode.names, str(task_record.descr))
     identity += f" {own}" if any(own) else ""
-    put_measured = _with_entries(entries, layouts, False, own.constants)
+    put_measured = _put_all(entries, layouts, False, own.constants)
     inputs_of = inputs_reader(layouts)
-    put_scaled = _with_entries(entries, layouts, True, own.constants)
+    put_scaled = _put_all(entries, layouts, True, own.constants)
     observe = _observe(slots_of(entries)[1:], layouts, inputs_of, put_scaled)
     task_at = record_at(task_record)
 
@@ -208,7 +214,7 @@ def _made(
         task = task_at(addresses[AT.task])[0]
         numbers = rows(doubles(slots), 1, None)
         for n in range(out.shape[1]):
-            put_measured(addresses, 1, inputs_of(addresses, 1, task, n), numbers, n)
+            put_measured((addresses, 1, inputs_of(addresses, 1, task, n), numbers, n))
             for slot in range(slots):
                 column = task.observation_columns[slot]
                 if column >= 0:
@@ -312,7 +318,7 @@ def _observe(
         # Entries that are not observed, and the slots that fill up vectors, also go through tanh.
         for slot in range(slots):
             numbers[slot] = 0.0
-        put_scaled(addresses, lanes, inputs_of(addresses, lanes, task, n), numbers, n)
+        put_scaled((addresses, lanes, inputs_of(addresses, lanes, task, n), numbers, n))
         if task.has_privileged and within == 0:
             write_true(addresses, lanes, task, n, numbers, offset(memory, room * lanes))
         if task.is_noisy:

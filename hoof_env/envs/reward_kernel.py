@@ -3,19 +3,23 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from functools import lru_cache
+from functools import partial
 from typing import Any
 
 from hoof_env.dynamics.limits import has_moved
 from hoof_env.envs.addresses import AT, memories
-from hoof_env.envs.observation_kernel import constants_reader, from_outside
+from hoof_env.envs.observation_kernel import constants_reader, from_outside, shared_part
 from hoof_env.envs.outcome import outcome_of_one
 from hoof_env.simd import columns, where
 from hoof_env.simd.compile import inline_llvm
 from hoof_env.simd.memory import COLUMNS, doubles_at
+from hoof_env.simd.unrolled import Traced, call, unrolled
 from hoof_env.simd.user_functions import number_of
 from hoof_env.tasks.episode import Memories
 from hoof_env.tasks.reward import Term
+
+EPISODE = 4
+"""Position of the episode's memory in the arguments of a term's part of kernels."""
 
 
 def is_user_term(term: Term) -> bool:
@@ -24,24 +28,51 @@ def is_user_term(term: Term) -> bool:
     return bool(from_outside([term.compute]))
 
 
-def sum_of_terms(
-    terms: tuple[Term, ...], layouts: Memories, constants: tuple[str, ...] = (), k: int = 0
-) -> Callable[..., Any]:
-    """Return a function that computes terms, of which the first is the k-th, keeps them in `episode.terms`
-    and returns their sum.
-
-    Terms of this package behind the last one from outside are compiled once for all tasks with them.
+def sum_of_terms(terms: tuple[Term, ...], layouts: Memories, constants: tuple[str, ...] = ()) -> Any:
+    """Return a part of kernels that computes the terms, keeps them in `episode.terms` and returns their sum.
+    It takes a tuple of `addresses, lanes, task, outcome, episode, n, spare` and the sum of no terms.
 
     Args:
-        terms: terms of the task, from the k-th on.
+        terms: terms of the task.
         layouts: layouts of the memory of a step.
         constants: names of the task's constants.
-        k: number of the first term.
     """
-    if not terms:
-        return inline_llvm(lambda addresses, lanes, task, outcome, episode, n, spare, total: total)
-    is_ours = not from_outside([term.compute for term in terms])
-    return (_our_terms if is_ours else _first_and_rest)(terms, layouts, () if is_ours else constants, k)
+    computes = [
+        _foreign_term(term, k, layouts, constants) if is_user_term(term) else _term(term, k)
+        for k, term in enumerate(terms)
+    ]
+
+    # numba cannot loop over functions.
+    @unrolled(lambda *kinds: kinds[-1])
+    def compute_reward(*arguments: Traced) -> Traced:
+        (*inputs, total) = arguments
+        of_terms = inputs[EPISODE].part("terms")
+        for k, compute in enumerate(computes):
+            compute(*inputs)
+            total = of_terms[k] if k == 0 else total + of_terms[k]
+        return total
+
+    return compute_reward
+
+
+def _term(term: Term, k: int) -> Callable[..., Any]:
+    """Return a function of an unrolled kernel that computes the k-th term, one of this package."""
+    compute = shared_part(term.compute)
+
+    def compute_term(
+        addresses: Traced,
+        lanes: Traced,
+        task: Traced,
+        outcome: Traced,
+        episode: Traced,
+        n: Traced,
+        spare: Traced,
+    ) -> None:
+        value = call(compute, outcome, task.part("weights")[k])
+        # + 0.0 makes 0 of the -0 that a weight of 0 gives.
+        episode.part("terms")[k] = value + 0.0
+
+    return compute_term
 
 
 @inline_llvm
@@ -76,39 +107,28 @@ def _keepers(layouts: Memories) -> tuple[Callable[..., Any], Callable[..., Any]]
     return keep, put_back
 
 
-def _first_and_rest(
-    terms: tuple[Term, ...], layouts: Memories, constants: tuple[str, ...], k: int
-) -> Callable[..., Any]:
-    """Return the function for at least one term. numba has no loop over functions, so each calls the next."""
-    term = terms[0]
-    rest = sum_of_terms(terms[1:], layouts, constants, k + 1)
+def _foreign_term(term: Term, k: int, layouts: Memories, constants: tuple[str, ...]) -> Callable[..., Any]:
+    """Return the same for a term from outside this package, which may have constants and keep rows, with a
+    check that its function returns a number; lane by lane if it takes no lanes."""
     compute = inline_llvm(term.compute)
-    is_first = k == 0
-    is_scalar = term.scalar
-    is_from_outside = is_user_term(term)
     number = number_of(term.title)
     given = constants_reader(tuple(constants.index(one.name) for one in term.constants))
     keep, put_back = _keepers(layouts) if term.keeps else (_do_nothing, _do_nothing)
 
     @inline_llvm
-    def add_term(addresses, lanes, task, outcome, episode, n, spare, total):  # type: ignore[no-untyped-def]
-        # Where the engine failed the reports that a user's term may read are of the point of failure.
-        if is_from_outside:
-            works = has_moved(outcome.trunk.result)
-            episode.terms[k] = where(works, episode.terms[k], 0.0)
-        total = episode.terms[k] if is_first else total + episode.terms[k]
-        return rest(addresses, lanes, task, outcome, episode, n, spare, total)
+    def clear_failed(outcome, episode):  # type: ignore[no-untyped-def]
+        # Where the engine failed the reports that the term may read are of the point of failure.
+        episode.terms[k] = where(has_moved(outcome.trunk.result), episode.terms[k], 0.0)
 
     @inline_llvm
-    def compute_term(addresses, lanes, task, outcome, episode, n, spare, total):  # type: ignore[no-untyped-def]
-        # + 0.0 makes 0 of the -0 that a weight of 0 gives.
+    def compute_term(addresses, lanes, task, outcome, episode, n, spare):  # type: ignore[no-untyped-def]
         keep(addresses, lanes, outcome, n, spare)
         episode.terms[k] = number(compute(outcome, task.weights[k], *given(task))) + 0.0
         put_back(addresses, lanes, outcome, n, spare)
-        return add_term(addresses, lanes, task, outcome, episode, n, spare, total)
+        clear_failed(outcome, episode)
 
     @inline_llvm
-    def compute_one_by_one(addresses, lanes, task, outcome, episode, n, spare, total):  # type: ignore[no-untyped-def]
+    def compute_one_by_one(addresses, lanes, task, outcome, episode, n, spare):  # type: ignore[no-untyped-def]
         sums = columns(spare, 0, layouts.stride_sums, 0, 1, 1)
         keep(addresses, lanes, outcome, n, spare)
         for lane in range(lanes):
@@ -116,10 +136,6 @@ def _first_and_rest(
             one = outcome_of_one(outcome, lane, trunk, leg, own, layouts, sums)
             own.terms[k] = number(compute(one, task.weights[k], *given(task))) + 0.0
         put_back(addresses, lanes, outcome, n, spare)
-        return add_term(addresses, lanes, task, outcome, episode, n, spare, total)
+        clear_failed(outcome, episode)
 
-    return compute_one_by_one if is_scalar else compute_term
-
-
-_our_terms = lru_cache(maxsize=64)(_first_and_rest)
-"""Functions for terms of this package, which tasks share."""
+    return partial(call, compute_one_by_one if term.scalar else compute_term)

@@ -255,7 +255,7 @@ def _finish(compute_reward: Callable[..., Any], layouts: Memories, body: BodyKer
         nothing = full_like(episode, 0.0)
         # Memory behind the sums, for those of one lane.
         spare = offset(sums, layouts.sums * lanes)
-        reward = compute_reward(addresses, lanes, task, outcome, episode, n, spare, nothing)
+        reward = compute_reward((addresses, lanes, task, outcome, episode, n, spare, nothing))
         write(reward, doubles_at(addresses[AT.rewards]), n, 1)
         if any_lane(ended):
             happened |= SOME_ENDED

@@ -8,7 +8,8 @@ in that order, so that a loop of Python over a list becomes straight code withou
 from __future__ import annotations
 
 import operator
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from typing import Any
 
 from numba.core import cgutils, types
@@ -37,6 +38,12 @@ class Traced:
     def __neg__(self) -> Traced:
         return call(operator.neg, self)
 
+    def __getitem__(self, k: int) -> Traced:
+        return call(operator.getitem, self, k)
+
+    def __setitem__(self, k: int, value: Traced) -> None:
+        call(operator.setitem, self, k, value)
+
     def part(self, name: str) -> Traced:
         """Return a field of rows of memory, or of a named tuple."""
         context = self.code.context
@@ -51,7 +58,8 @@ class Traced:
 
 
 def call(function: Any, *arguments: Any) -> Traced:
-    """Write a call of a function for kernels; at least one argument is `Traced`, others are numbers."""
+    """Write a call of a function for kernels; at least one argument is `Traced`, others are numbers, of which
+    whole ones are indices."""
     code = next(each.code for each in arguments if isinstance(each, Traced))
     context = code.context
     traced = [each if isinstance(each, Traced) else _constant(code, each) for each in arguments]
@@ -69,7 +77,15 @@ def call(function: Any, *arguments: Any) -> Traced:
 
 
 def _constant(code: Code, number: float) -> Traced:
-    return Traced(code, types.float64, code.context.get_constant(types.float64, float(number)))
+    kind = types.intp if isinstance(number, int) else types.float64
+    return Traced(code, kind, code.context.get_constant(kind, number))
+
+
+@contextmanager
+def when(truth: Traced) -> Iterator[None]:
+    """Write what follows so that it runs where a truth of the running kernel holds."""
+    with truth.code.builder.if_then(truth.value):
+        yield
 
 
 def store(rows: Traced, first: int, values: list[Traced]) -> None:
@@ -90,7 +106,7 @@ def unrolled(result: Callable[..., Any]) -> Callable[[Callable[..., Any]], Any]:
     """
 
     def decorate(write: Callable[..., Any]) -> Any:
-        @instruction(lambda arguments: result(*arguments.types)(arguments))
+        @instruction(lambda arguments: result(*arguments.types)(arguments), literal=True)
         def written(code: Code, arguments: Any) -> Any:
             kinds = code.args[0].types
             values = cgutils.unpack_tuple(code.builder, arguments, len(kinds))
