@@ -15,12 +15,16 @@ are drawn for each episode. In place of its charges for peak and loading stands 
 * approach: the square of the speed at which a hoof point meets the ground, when a stance begins, as for Olaf
   (arXiv 2512.16705).
 * own: peak and loading rate of every substep, the terms of HorseLeg-v0.
+* loading_2, loading_4, loading_10: these with so many times the weight of the loading rate, for what softer
+  landings cost.
 
-Each weight makes the run pay `PRICE` a second on the usual ground, so that none asks for more than another.
+Each weight of the first three makes the run pay `PRICE` a second on the usual ground, so that none asks for
+more than another.
 """
 
 from __future__ import annotations
 
+import json
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal
@@ -76,12 +80,11 @@ def _training(args: Args, env_id: str, charge: str, seed: int) -> TrainingArgs:
     from agents.settings import FOLDER, load_settings
 
     settings = load_settings(FOLDER / "ppo_flat.yml", "hoof_env/HorseLeg-v0")
-    params = tuple(f"{key}={value!r}" for key, value in settings.items())
     return TrainingArgs(
         env_id=env_id,
         algo="ppo_flat",
         steps=args.steps,
-        params=params,
+        params=(json.dumps(settings),),
         seed=seed,
         out=folder_of(args, charge, seed),
         resume=True,

@@ -7,6 +7,7 @@ from collections.abc import Mapping
 
 import hoof_env
 from hoof_env.simd import maximum, where
+from hoof_env.tasks.reward import TERMS as LEG_TERMS
 
 THRESHOLD = 1.5
 """Running peak from which it is charged [weights of trunk and leg]: between the 1.3 of a soft gait and the 5
@@ -59,7 +60,10 @@ TERMS = {
     ),
 }
 
-CHARGES = (*TERMS, "own")
+HEAVIER: Mapping[str, float] = {"loading_2": 2.0, "loading_4": 4.0, "loading_10": 10.0}
+"""Factors of the weight of the loading rate, with the other terms of HorseLeg-v0."""
+
+CHARGES = (*TERMS, "own", *HEAVIER)
 
 
 def id_of(charge: str) -> str:
@@ -67,11 +71,19 @@ def id_of(charge: str) -> str:
     return f"soft/{charge.title().replace('_', '')}-v0"
 
 
+def weights_of(charge: str) -> dict[str, float]:
+    """Return the weights of an id that are not those of HorseLeg-v0."""
+    if charge in TERMS:
+        return {"peak": 0.0, "loading": 0.0}
+    usual = next(term.weight for term in LEG_TERMS if term.name == "loading")
+    return {"loading": HEAVIER.get(charge, 1.0) * usual}
+
+
 for _charge in CHARGES:
     hoof_env.register(
         id_of(_charge),
         base="leg",
         terms=[TERMS[_charge]] if _charge in TERMS else [],
-        reward_weights={"peak": 0.0, "loading": 0.0} if _charge in TERMS else None,
+        reward_weights=weights_of(_charge),
         randomize=GROUNDS,
     )

@@ -6,7 +6,9 @@ import gymnasium as gym
 import numpy as np
 import pytest
 
+from agents.settings import FOLDER, load_settings, model_arguments
 from hoof_env import make_policy
+from hoof_env.errors import parse_pairs
 
 
 @pytest.fixture(scope="module")
@@ -65,3 +67,30 @@ def test_control_steps_hide_peaks(soft_terms, soft_landing):
     found = soft_landing.play("run", soft_terms.id_of("own"), 8)
     assert 0.9 < found["seen"] < 1.0
     assert np.isfinite(list(found.values())).all()
+
+
+def test_a_training_has_the_settings_of_the_leg(soft_landing, tmp_path, monkeypatch):
+    given = []
+    monkeypatch.setattr(soft_landing, "train", given.append)
+    soft_landing.train_all(soft_landing.Args("train", seeds=2, steps=4096, out=tmp_path))
+    assert len(given) == 2 * len(soft_landing.CHARGES)
+    assert len({arguments.out for arguments in given}) == len(given)
+    wanted = load_settings(FOLDER / "ppo_flat.yml", "hoof_env/HorseLeg-v0")
+    for arguments in given:
+        settings = parse_pairs("--params", arguments.params)
+        assert settings == wanted
+        model_arguments(settings, 4)
+
+
+def test_heavier_charges_differ_from_the_usual_in_one_weight(soft_terms):
+    usual = weights_in(soft_terms.id_of("own"))
+    assert usual == weights_in("hoof_env/HorseLeg-v0")
+    for charge, factor in soft_terms.HEAVIER.items():
+        weights = weights_in(soft_terms.id_of(charge))
+        changed = {name: weights[name] / usual[name] for name in usual if weights[name] != usual[name]}
+        assert changed == {"loading": factor}
+
+
+def weights_in(env_id):
+    """Weights of an environment's terms by name."""
+    return dict(gym.make(env_id).unwrapped.batch.weights)
