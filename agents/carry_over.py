@@ -281,6 +281,8 @@ def draw(found: Sequence[Found], path: Path) -> None:
     """Draw return over the undisturbed one, and falls, over the strength of each disturbance."""
     from matplotlib.figure import Figure
 
+    from hoof_env._plotting import save_png
+
     policies = list(dict.fromkeys(one.policy for one in found))
     picture = Figure((2.1 * len(DISTURBANCES), 4.6), layout="constrained")
     panels = picture.subplots(2, len(DISTURBANCES), sharex=True, sharey="row", squeeze=False)
@@ -305,7 +307,7 @@ def draw(found: Sequence[Found], path: Path) -> None:
     panels[1, 0].set_ylabel("episodes that fail [%]")
     handles, labels = panels[1, 0].get_legend_handles_labels()
     picture.legend(handles, labels, loc="outside lower center", ncols=len(policies), fontsize=8)
-    picture.savefig(path, dpi=110)
+    save_png(picture, path)
 
 
 def main(argv: list[str] | None = None) -> None:

@@ -28,7 +28,7 @@ def draw(presets: Sequence[str], gaits: Gaits, path: Path) -> None:
     import matplotlib
     from matplotlib.figure import Figure
 
-    from hoof_env._plotting import STYLE
+    from hoof_env._plotting import STYLE, save_png
 
     with matplotlib.rc_context(STYLE):
         figure = Figure(figsize=(2.6 * len(presets), 5.4), layout="constrained")
@@ -41,7 +41,7 @@ def draw(presets: Sequence[str], gaits: Gaits, path: Path) -> None:
         above[0].set_ylabel("height, hip heights")
         below[0].set_ylabel("normal force, weights")
         below[-1].legend(loc="upper right")
-        figure.savefig(path, dpi=110, metadata={"Software": None})
+        save_png(figure, path)
 
 
 def draw_leg(axes: Any, leg: Geometry, gait: GaitParameters) -> None:

@@ -139,7 +139,7 @@ def draw(rows: Sequence[dict[str, Any]], references: dict[str, dict[str, float]]
     from matplotlib.figure import Figure
     from matplotlib.ticker import EngFormatter
 
-    from hoof_env._plotting import BLUE, GREEN, GREY, ORANGE, PURPLE, STYLE
+    from hoof_env._plotting import BLUE, GREEN, GREY, ORANGE, PURPLE, STYLE, save_png
 
     colours = {"ppo": BLUE, "sac": ORANGE, "td3": GREEN, "tqc": PURPLE}
     styles = dict(zip(ANCHORS, (":", "--", "-"), strict=True))
@@ -178,7 +178,7 @@ def draw(rows: Sequence[dict[str, Any]], references: dict[str, dict[str, float]]
         for panel in panels[len(ids) :]:
             panel.set_axis_off()
         panels[0].legend(loc="lower right")
-        figure.savefig(path, metadata={"Software": None})
+        save_png(figure, path, dpi=150)
 
 
 PAGE = """# Stock learners
