@@ -10,6 +10,7 @@ All legs are as high and as heavy as `identified`, under the trunk of `HorseLeg-
 
 from __future__ import annotations
 
+import itertools
 import json
 import math
 from collections.abc import Mapping, Sequence
@@ -26,7 +27,7 @@ from agents.foot_paths import figures
 from agents.legs_picture import draw
 from agents.stock import LEGS_OUT
 from agents.stock_page import at
-from agents.stock_plan import LEG, LEGS, SPEED, read_curves
+from agents.stock_plan import HALF_RATES, LEG, LEGS, SPEED, leg_folder, read_curves
 from hoof_env._output import markdown_table, staged
 from hoof_env.constants import GRAVITY
 from hoof_env.envs.policies import constant_gait
@@ -194,8 +195,8 @@ def measured_table(gaits: Mapping[str, Mapping[str, GaitParameters]]) -> str:
 def learnt_table(out: Path) -> str:
     """Return a line for each learner of each leg that is trained; "" if none is."""
     rows = []
-    for preset in LEGS:
-        curves = read_curves(out / preset)
+    for preset, half_rates in itertools.product(LEGS, (False, True)):
+        curves = read_curves(out / leg_folder(preset, half_rates))
         for algo in dict.fromkeys(row["algo"] for row in curves):
             of_algo = [row for row in curves if row["algo"] == algo]
             last = max(row["steps"] for row in of_algo)
@@ -205,7 +206,7 @@ def learnt_table(out: Path) -> str:
             means = {key: float(np.mean([row[key] for row in ends])) for key in LEARNT}
             rows.append(
                 [
-                    f"`{preset}`",
+                    f"`{preset}`" + (", half the rates" if half_rates else ""),
                     f"{algo.upper()}, {len(ends)} seeds, {last:,} steps",
                     spread,
                     f"{means['speed_m_s']:.2f}",
@@ -250,7 +251,10 @@ LEARNT_PAGE = """
 ## Learnt
 
 Stock learners (`python -m agents.stock --preset LEG`): interquartile mean of the return with the lowest and
-highest seed, means of the other figures.
+highest seed, means of the other figures. With half the rates (`--half-rates`) actions change the gait by
+`crank_rate={crank}` and `swing_rate={swing}`: the foot of `klann` is farther from its crank and swings
+farther than those of the others, so that the first, random actions of a learner with the usual rates cost
+more than standing still does.
 
 {learnt}
 """
@@ -271,7 +275,11 @@ def write(out: Path, gaits: Mapping[str, Mapping[str, GaitParameters]]) -> None:
     learnt = learnt_table(out)
     with staged(out) as stage:
         draw(COMPARED, gaits, stage / "legs.png")
-        text += LEARNT_PAGE.format(learnt=learnt) if learnt else ""
+        text += (
+            LEARNT_PAGE.format(learnt=learnt, crank=HALF_RATES["crank_rate"], swing=HALF_RATES["swing_rate"])
+            if learnt
+            else ""
+        )
         (stage / "README.md").write_text(text, encoding="utf-8")
 
 

@@ -4,6 +4,7 @@
     python -m agents.stock --env-id hoof_env/HorseLeg-v0 --algo ppo --seeds 3 --steps 100000 --out runs/stock
     python -m agents.stock --draw                          table and picture alone
     python -m agents.stock --preset klann                  of another leg, to docs/evidence/legs/klann
+    python -m agents.stock --preset klann --half-rates     with actions that change its gait half as fast
 
 PPO, SAC and TD3 are Stable-Baselines3's, TQC is sb3-contrib's, made as `PPO("MlpPolicy", env)` makes them. A
 policy is scored without its noise on 100 starts that no training meets. A training is one set of rows in
@@ -26,7 +27,18 @@ import numpy as np
 from agents import runs, stock_page
 from agents.command import run
 from agents.settings import FOLDER, load_settings
-from agents.stock_plan import COLUMNS, FIGURES, LEGS, LEGS_PLAN, PLAN, TUNED, Curves, read_curves
+from agents.stock_plan import (
+    COLUMNS,
+    FIGURES,
+    HALF_RATES,
+    LEGS,
+    LEGS_PLAN,
+    PLAN,
+    TUNED,
+    Curves,
+    leg_folder,
+    read_curves,
+)
 from agents.train import Args as TrainArgs
 from agents.train import make_model
 from hoof_env._output import check_folder
@@ -55,11 +67,13 @@ class Args:
     """of each training; otherwise those of the table. Of ppo_flat rounded up to whole rollouts"""
     preset: str | None = None
     """another leg than that of the ids: jansen, klann or fourbar; agents.legs writes its table"""
+    half_rates: bool = False
+    """with half the usual crank_rate and swing_rate; of a preset alone"""
     workers: int = 1
     """trainings side by side, each on one thread"""
     out: Path | None = None
     """folder of curves.csv, README.md and stock.png; otherwise docs/evidence/stock, of a preset
-    docs/evidence/legs/PRESET"""
+    docs/evidence/legs/PRESET, or PRESET-half-rates"""
     draw: bool = False
     """train nothing; write table and picture from what is there"""
 
@@ -91,7 +105,10 @@ def jobs(args: Args) -> list[Job]:
     plan = PLAN
     if args.preset is not None:
         check_choice("preset", args.preset, LEGS)
-        plan = tuple(curves for curves in LEGS_PLAN if curves.preset == args.preset)
+        asked_for = (args.preset, args.half_rates)
+        plan = tuple(curves for curves in LEGS_PLAN if (curves.preset, curves.half_rates) == asked_for)
+    elif args.half_rates:
+        raise ParameterError("--half-rates: expected with --preset, for another leg than that of the ids")
     chosen = [
         curves for curves in plan if args.env_id in (None, curves.env_id) and args.algo in (None, curves.algo)
     ]
@@ -167,8 +184,9 @@ def train(job: Job) -> list[dict[str, Any]]:
 
 
 def leg_of(curves: Curves) -> dict[str, Any]:
-    """Return the argument of the environment that asks for another leg, if there is one."""
-    return {"preset": curves.preset} if curves.preset else {}
+    """Return the arguments of the environment that ask for another leg, if there is one."""
+    leg = {"preset": curves.preset} if curves.preset else {}
+    return {**leg, **(HALF_RATES if curves.half_rates else {})}
 
 
 def stock_model(job: Job) -> Any:
@@ -197,7 +215,9 @@ def trained(pending: Sequence[Job], workers: int) -> Iterator[list[dict[str, Any
 
 def folder_of(args: Args) -> Path:
     """Return the folder that is written."""
-    return args.out or (LEGS_OUT / args.preset if args.preset else OUT)
+    if args.out:
+        return args.out
+    return LEGS_OUT / leg_folder(args.preset, args.half_rates) if args.preset else OUT
 
 
 def has_run(rows: Sequence[dict[str, Any]], job: Job) -> bool:

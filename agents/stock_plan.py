@@ -20,6 +20,7 @@ class Curves:
     steps: int
     every: int  # steps between two scores
     preset: str = ""  # leg, if it is not the id's own
+    half_rates: bool = False  # with `HALF_RATES`
 
 
 TUNED: Final = "ppo_flat"
@@ -48,8 +49,13 @@ LEGS = ("jansen", "klann", "fourbar")
 LEGS_PLAN = (
     *(Curves(LEG, "ppo", 5, 200_000, 20_480, preset) for preset in LEGS),
     *(Curves(LEG, "sac", 5, 60_000, 6_000, preset) for preset in LEGS),
+    *(Curves(LEG, "ppo", 5, 200_000, 20_480, preset, half_rates=True) for preset in LEGS),
 )
 """Their trainings."""
+
+HALF_RATES = {"crank_rate": 9.0, "swing_rate": 0.6}
+"""Settings under which actions change a gait half as fast as usual: for a leg whose foot is far from its
+crank, so that its gait changes too much."""
 
 
 COLUMNS = ("env_id", "algo", "seed", "steps", "return", "train_seconds", "commit")
@@ -58,6 +64,11 @@ far; the commit is that of the code that trained, empty if there is no git."""
 
 FIGURES = ("speed_m_s", "stance_peak_n", "cost_of_transport", "weight_share")
 """Further columns for other legs: means of the episodes of the score."""
+
+
+def leg_folder(preset: str, half_rates: bool = False) -> str:
+    """Return the name of the folder of a leg's curves."""
+    return f"{preset}-half-rates" if half_rates else preset
 
 
 def read_curves(folder: Path) -> list[dict[str, Any]]:

@@ -2,12 +2,14 @@
 
 import csv
 
+import gymnasium as gym
 import numpy as np
 import pytest
 
 from agents import stock, stock_page
 from agents.stock import Args
 from agents.stock_plan import COLUMNS, LEG, OTHERS, PLAN, RAIL, TUNED, read_curves
+from hoof_env.errors import ParameterError
 from hoof_env.evaluation.episodes import FINAL_SEEDS
 
 
@@ -59,6 +61,12 @@ def test_another_leg_is_trained_by_its_own_plan_with_more_figures(tmp_path, monk
     assert [(job.curves.algo, job.curves.steps) for job in plan] == [("ppo", 200_000)] * 5 + [
         ("sac", 60_000)
     ] * 5
+    (slow,) = {job.curves for job in stock.jobs(Args(preset="klann", half_rates=True))}
+    usual = gym.make("hoof_env/HorseLeg-v0").unwrapped.batch.settings
+    for name, rate in stock.leg_of(slow).items():
+        assert rate == ("klann" if name == "preset" else getattr(usual, name) / 2)
+    with pytest.raises(ParameterError, match="expected with --preset"):
+        stock.jobs(Args(half_rates=True))
     args = Args(preset="klann", algo="ppo", seeds=1, steps=2048, out=tmp_path / "klann")
     rows = stock.stock(args)
     assert stock.stock_model(stock.jobs(args)[0]).env.envs[0].unwrapped.geometry.name == "klann"
