@@ -43,15 +43,14 @@ from hoof_env.render.instant import Instant
 from hoof_env.render.outline import (
     AROUND_M,
     ARROW_M,
-    HOLD_M,
     HORN_SHARE,
     LEAST_FORCE,
-    TRUNK_M,
     USUAL_HIP_M,
     LegOutline,
     reach,
 )
 from hoof_env.render.panel import KILONEWTONS, Unit
+from hoof_env.render.trunk import TrunkPainter
 
 HEIGHT_SLACK_M = 0.2  # how far O may rise or sink from the paper's hip height before the camera follows [m]
 SOIL_M = 0.4  # least depth of soil in the picture [m]
@@ -96,9 +95,8 @@ class Scene:
         self._paths: deque[tuple[float, complex, complex]] = deque()  # time [s], heel, toe [m]
         self._ground = GroundPainter(brush, terrain, size, self._scale, 2 * self._centre)
         self._leg = LegOutline(geometry)
-        self._kind = trunk
         self._girth = self.small
-        self._trunk = self._paint_trunk()
+        self._trunk = TrunkPainter(brush, trunk, self._metre)
         self._sky = self._paint_sky()
         self._key = lru_cache(maxsize=8)(self._paint_key)
 
@@ -130,9 +128,9 @@ class Scene:
         pixels = self.look_at(now)
         canvas.blit(self._sky, (0, 0))
         hip = pixels[self._geometry.mechanism.centre]
-        self._draw_support(canvas, hip)
+        self._trunk.draw_support(canvas, hip)
         self._ground.draw(canvas, self._soles([now]), self.corner)
-        self._draw_trunk(canvas, hip, now.pitch)
+        self._trunk.draw(canvas, hip, now.pitch)
         self._draw_paths(canvas, pixels)
         self._draw_leg(canvas, pixels)
         self._draw_forces(canvas, now, full_scale)
@@ -168,61 +166,6 @@ class Scene:
         ramp.set_at((0, 0), SKY_TOP)
         ramp.set_at((0, 1), SKY_BOTTOM)
         return pygame.transform.smoothscale(ramp, self._size)
-
-    def _paint_trunk(self) -> Any:
-        half, above, below = (self._metre * length for length in TRUNK_M)
-        image = pygame.Surface((round(2 * half), round(above + below)), pygame.SRCALPHA, 32)
-
-        def paint(fine: Any, place: Any) -> None:
-            for colour, inset in ((COAT_EDGE, 0), (COAT, round(1.5 * FINE))):
-                radius = round(0.25 * self._metre * FINE) - inset
-                barrel = fine.get_rect().inflate(-2 * inset, -2 * inset)
-                pygame.draw.rect(fine, colour, barrel, border_radius=radius)
-
-        self._brush.smooth(image, [0j, complex(*image.get_size())], 0, paint)
-        return image
-
-    def _draw_support(self, canvas: Any, hip: complex) -> None:
-        """The spring, the rail with wheels or the plate that holds the trunk around O at pixel `hip`."""
-        half = TRUNK_M[0] * self._metre
-        top = hip - 1j * TRUNK_M[1] * self._metre
-        hold = HOLD_M * self._metre
-        if self._kind == "suspended":
-            coil = np.linspace(complex(hip.real, 0), top, 17)
-            coil[2:-2] += 0.06 * self._metre * np.resize([1, -1], 13)
-
-            def paint(fine: Any, place: Any) -> None:
-                width = round(2 * self._brush.unit * FINE)
-                pygame.draw.lines(fine, GREY, False, [place(z) for z in coil.tolist()], width)
-
-            self._brush.smooth(canvas, coil, 3, paint)
-            return
-        thick = max(2, round(4 * self._brush.unit))
-        rail = round(top.imag - hold)
-        plate = canvas.get_rect()
-        ends = [top - half / 2, top + half / 2]
-        if self._kind == "rail":
-            for end in ends:
-                self._brush.disc(canvas, GREY, (end.real, end.imag - hold / 2), hold / 2)
-        else:
-            plate = pygame.Rect(round(hip.real - half), 0, round(2 * half), 0)
-            for x in np.arange(plate.left, plate.right, hold).tolist():  # hatched as drawings have it
-                pygame.draw.aaline(canvas, GREY, (x, rail - thick), (x + hold, rail - thick - hold))
-            for end in ends:
-                canvas.fill(GREY, (round(end.real - hold), rail, round(2 * hold), round(hold) + 1))
-        canvas.fill(GREY, (plate.left, rail - thick, plate.width, thick))
-
-    def _draw_trunk(self, canvas: Any, hip: complex, pitch: float) -> None:
-        """The trunk around O at pixel `hip`, turned by `pitch` [rad]."""
-        half, above, below = (self._metre * length for length in TRUNK_M)
-        image = self._trunk
-        corner = hip - complex(half, above)
-        if pitch:
-            image = pygame.transform.rotozoom(image, float(np.degrees(pitch)), 1.0)
-            middle = hip + 0.5j * (below - above) * np.exp(-1j * pitch)
-            corner = middle - complex(*image.get_size()) / 2
-        at = round(corner.real), round(corner.imag)
-        canvas.blit(image, at, special_flags=pygame.BLEND_PREMULTIPLIED)
 
     def _draw_leg(self, canvas: Any, pixels: dict[str, complex], lettered: bool = True) -> None:
         metre = self._girth * self._scale * FINE  # on the fine surface
