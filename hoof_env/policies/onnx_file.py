@@ -17,9 +17,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hoof_env._output import staged
-from hoof_env.envs.shown import line_of
 from hoof_env.errors import DataFileError, HoofEnvError, MissingExtraError, ParameterError, parse_json
-from hoof_env.policies.record import about, check_record
+from hoof_env.policies.file_policy import FilePolicy
+from hoof_env.policies.record import about
 
 FILE = "policy.onnx"
 
@@ -32,13 +32,13 @@ OBJECTS = ("env_kwargs", "settings")
 LISTS = (*OBJECTS, "observation_names", "action_names")
 """Metadata of an .onnx file that are JSON; the others are text."""
 
-NUMBERS = {"tensor(float)": np.float32, "tensor(double)": np.float64}
+NUMBERS: dict[str, type[np.floating[Any]]] = {"tensor(float)": np.float32, "tensor(double)": np.float64}
 """Types of numbers that a graph may take."""
 
 TRIED = 16  # random observations that a stamped policy must answer
 
 
-class OnnxPolicy:
+class OnnxPolicy(FilePolicy):
     """Policy in an ONNX file, with Stable-Baselines3's `predict`.
 
     Attributes:
@@ -62,7 +62,7 @@ class OnnxPolicy:
             raise HoofEnvError(
                 f'policy {path}: reading it needs onnxruntime: pip install "hoof-env[onnx]"'
             ) from None
-        self.path = path / FILE if path.is_dir() else path
+        super().__init__(path / FILE if path.is_dir() else path)
         options = onnxruntime.SessionOptions()
         # One thread: in a small network, waiting for other threads takes longer than the arithmetic.
         options.intra_op_num_threads = 1
@@ -95,41 +95,25 @@ class OnnxPolicy:
             given = [(one.name, one.shape) for one in inputs]
             raise ValueError(f"expected one input of floats, shape (batch, k), got {given}")
         self._input = inputs[0].name
-        self._numbers = NUMBERS[inputs[0].type]
+        self._number = NUMBERS[inputs[0].type]
         self._batch, self._size = inputs[0].shape
         self._output = OUTPUT if OUTPUT in names else names[0]
 
-    def __repr__(self) -> str:
-        return line_of(
-            "OnnxPolicy", path=self.path, env_id=self.record["env_id"], algo=self.record.get("algo")
-        )
+    @property
+    def number(self) -> type[np.floating[Any]]:
+        return self._number
 
-    def load(self, env: Any, env_id: str) -> OnnxPolicy:
-        """Return this policy; raise `DataFileError` if it does not fit `env`, and warn if it was trained with
-        other settings or another version of hoof-env."""
-        check_record(self.path, self.record, env, env_id)
-        return self
+    @property
+    def size(self) -> int | None:
+        return self._size if isinstance(self._size, int) else None
 
-    def predict(
-        self, observation: Any, state: Any = None, episode_start: Any = None, deterministic: bool = True
-    ) -> tuple[NDArray[np.float32], Any]:
-        """Return deterministic actions, shape (..., n), for observations of shape (..., k), and `state`.
-
-        Raises:
-            ParameterError: observations of another size.
-        """
-        numbers = np.asarray(observation, self._numbers)
-        if isinstance(self._size, int) and numbers.shape[-1:] != (self._size,):
-            raise ParameterError(
-                f"observation: expected shape (..., {self._size}) as the policy {self.path.name} takes, got"
-                f" {numbers.shape}"
-            )
-        rows = numbers.reshape(-1, numbers.shape[-1])
+    def act(self, observations: NDArray[np.floating[Any]]) -> NDArray[np.float32]:
+        rows = observations.reshape(-1, observations.shape[-1])
         # An exporter may have fixed the number of rows, as a rule to one.
         parts = [rows] if not isinstance(self._batch, int) else np.split(rows, len(rows) // self._batch)
         results = [self._session.run([self._output], {self._input: part})[0] for part in parts]
         actions = np.concatenate(results).astype(np.float32)
-        return actions.reshape(*numbers.shape[:-1], actions.shape[-1]), state
+        return actions.reshape(*observations.shape[:-1], actions.shape[-1])
 
 
 def stamp_onnx(path: str | Path, env: gym.Env[Any, Any], **record: str) -> OnnxPolicy:

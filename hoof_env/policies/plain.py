@@ -17,9 +17,9 @@ import numpy as np
 from gymnasium import spaces
 from numpy.typing import NDArray
 
-from hoof_env.envs.shown import line_of
-from hoof_env.errors import DataFileError, ParameterError, parse_json
-from hoof_env.policies.record import check_record, read_record
+from hoof_env.errors import DataFileError, parse_json
+from hoof_env.policies.file_policy import FilePolicy
+from hoof_env.policies.record import read_record
 
 WEIGHTS = "policy.safetensors"
 ABOUT = "policy.json"
@@ -37,7 +37,7 @@ KNOWN = ("activation_fn", "net_arch", "log_std_init", "ortho_init")
 """Arguments of a policy of PPO with which NumPy plays it; others may change what its weights mean."""
 
 
-class NumpyPolicy:
+class NumpyPolicy(FilePolicy):
     """Deterministic policy of PPO whose weights are plain data, with Stable-Baselines3's `predict`.
 
     Attributes:
@@ -54,7 +54,7 @@ class NumpyPolicy:
     """
 
     def __init__(self, path: Path) -> None:
-        self.path = path
+        super().__init__(path)
         self.record = read_record(path)
         try:
             about = parse_json((path / ABOUT).read_text(encoding="utf-8"))
@@ -78,38 +78,22 @@ class NumpyPolicy:
                 f"policy {path}: expected {ABOUT} and {WEIGHTS} of agents.train, cannot read them ({error})"
             ) from None
 
-    def __repr__(self) -> str:
-        record = self.record
-        return line_of("NumpyPolicy", path=self.path, env_id=record.get("env_id"), algo=record.get("algo"))
+    @property
+    def number(self) -> type[np.float32]:
+        return np.float32
 
-    def load(self, env: Any, env_id: str) -> NumpyPolicy:
-        """Return this policy; raise `DataFileError` if it does not fit `env`, and warn if it was trained with
-        other settings or another version of hoof-env."""
-        check_record(self.path, self.record, env, env_id)
-        return self
+    @property
+    def size(self) -> int:
+        return int(self.observation_space.shape[0])
 
-    def predict(
-        self, observation: Any, state: Any = None, episode_start: Any = None, deterministic: bool = True
-    ) -> tuple[NDArray[np.float32], Any]:
-        """Return deterministic actions, shape (..., n), for observations of shape (..., k), and `state`.
-
-        Raises:
-            ParameterError: observations of another size.
-        """
-        numbers = np.asarray(observation, np.float32)
-        size = self.observation_space.shape
-        if numbers.shape[-1:] != size:
-            raise ParameterError(
-                f"observation: expected shape (..., {size[0]}) as the policy {self.path.name} was trained"
-                f" with, got {numbers.shape}"
-            )
+    def act(self, observations: NDArray[np.floating[Any]]) -> NDArray[np.float32]:
         *hidden, (matrix, bias) = self._layers
         # In double precision, so that a row of many is rounded to the same action as the row alone.
-        x = self._normalize(numbers).astype(np.float64)
+        x = self._normalize(observations).astype(np.float64)
         for weights, offset in hidden:
             x = self._activation(x @ weights.T + offset)
         actions = np.clip(x @ matrix.T + bias, self.action_space.low, self.action_space.high)
-        return actions.astype(np.float32), state
+        return actions.astype(np.float32)
 
 
 def is_known(about: Mapping[str, Any]) -> bool:
