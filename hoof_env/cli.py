@@ -15,6 +15,7 @@ from pathlib import Path
 from hoof_env._output import bear_any_output, flush_or_drop
 from hoof_env._version import __version__
 from hoof_env.commands.lab import average, compare
+from hoof_env.commands.played import USUAL, Played
 from hoof_env.commands.policies import demo, evaluate, list_ids
 from hoof_env.commands.said import say as _say
 from hoof_env.commands.said import size as _size
@@ -46,10 +47,7 @@ def reproduce(out: Path, figures: bool = True, preset: str | None = None) -> Non
 
 def render(
     out: Path,
-    policy: str | None = None,
-    id: str = "hoof_env/HorseLeg-v0",
-    args: tuple[str, ...] = (),
-    seed: int = 0,
+    episode: Played = USUAL,
     seconds: float = 8.0,
     slow: float = 1.0,
     fps: float = 50.0,
@@ -60,13 +58,7 @@ def render(
 
     Args:
         out: the film; ends in .mp4 or .gif. Its folder is made if it is missing.
-        policy: a gait of the preset, or four gait parameters as 6.28,0.7,-0.2,-0.3, in which the episode
-            starts; idle, random, bang-bang, drag or airborne; the .json of an open-loop gait, to which the
-            policy goes, or open-loop for the best one of the package; or a trained model (only one that you
-            trust: a model is code). The default is run, or the reference gait of a horse.
-        id: id of the environment.
-        args: arguments of the environment: key=value ..., or one JSON object.
-        seed: seed of the episode and of "random".
+        episode: policy, environment and seed.
         seconds: longest duration of the episode.
         slow: factor by which the film plays slower than life.
         fps: frames a second.
@@ -77,15 +69,14 @@ def render(
     from hoof_env.film import render_episode
 
     made = check_new(out, overwrite)
-    count = render_episode(out, policy, id, args, seed, seconds, slow, fps, size)
+    count = render_episode(
+        out, episode.policy, episode.id, episode.args, episode.seed, seconds, slow, fps, size
+    )
     _say(f"{out}: {count} frames, {count / fps:.1f} s, {_size(out)}{made}")
 
 
 def view(
-    id: str = "hoof_env/HorseLeg-v0",
-    policy: str | None = None,
-    args: tuple[str, ...] = (),
-    seed: int = 0,
+    episode: Played = USUAL,
     port: int = 5006,
     address: str = "127.0.0.1",
     open: bool = True,
@@ -94,10 +85,7 @@ def view(
     """See and touch a leg or a horse in the browser: scene, forces, settings, recordings (needs 'view').
 
     Args:
-        id: id of the environment.
-        policy: the policy, as in `hoof-env render`.
-        args: arguments of the environment: key=value ..., or one JSON object.
-        seed: seed of the first episode and of "random"; the next episodes follow it.
+        episode: policy, environment and seed.
         port: port of the page; 0 takes any that is free.
         address: address on which the page is served; any other than this machine's own lets others use it.
         open: open the page in the browser, where there is a display.
@@ -105,15 +93,12 @@ def view(
     """
     from hoof_env.view.server import view
 
-    view(id, args, policy, seed, address, port, open, out)
+    view(episode.id, episode.args, episode.policy, episode.seed, address, port, open, out)
 
 
 def export(
     out: Path,
-    policy: str | None = None,
-    id: str = "hoof_env/HorseLeg-v0",
-    args: tuple[str, ...] = (),
-    seed: int = 0,
+    episode: Played = USUAL,
     seconds: float | None = None,
     threshold: float = 20.0,
     units: str = "N",
@@ -127,10 +112,7 @@ def export(
         out: the file; ends in .csv, .parquet (needs 'export'), .c3d (needs 'lab'), or OpenSim's .mot or .sto,
             which come with ExternalLoads in the same folder, as run_loads.xml (run_sto_loads.xml). The folder
             is made if it is missing.
-        policy: the policy, as in `hoof-env render`.
-        id: id of the environment.
-        args: arguments of the environment: key=value ..., or one JSON object.
-        seed: seed of the episode and of "random".
+        episode: policy, environment and seed.
         seconds: longest duration of the episode; without it, the episode is played to its end.
         threshold: force along the ground's normal below which a limb counts as unloaded, as on a force
             plate [N].
@@ -144,7 +126,18 @@ def export(
 
     # All files of the format are checked; the message names the first of them.
     made, *_ = [check_new(file, overwrite) for file in files_of(out)]
-    rows, weight = export_episode(out, policy, id, args, seed, seconds, threshold, units, reactions, bodies)
+    rows, weight = export_episode(
+        out,
+        episode.policy,
+        episode.id,
+        episode.args,
+        episode.seed,
+        seconds,
+        threshold,
+        units,
+        reactions,
+        bodies,
+    )
     others = "".join(f", with {file.name}" for file in files_of(out)[1:])
     _say(f"{out}: {rows} rows, 1 BW = {weight:.1f} N, {_size(out)}{others}{made}")
 

@@ -23,11 +23,11 @@ MOST = {
     "packed": 25,
     "unformatted": 5,
     "fragments": 0,
-    "people": 1,
-    "long_functions": 1,
-    "long_classes": 1,
+    "people": 0,
+    "long_functions": 0,
+    "long_classes": 0,
     "long_files": 0,
-    "many_parameters": 10,
+    "many_parameters": 6,
     "leg_or_horse": 5,
 }
 """Largest counts."""
@@ -90,8 +90,9 @@ def fragments() -> Iterator[Place]:
 
 
 def people() -> Iterator[Place]:
-    """Words for persons where the subject is a program, and other words that engineers do not use."""
-    words = r"\b(who|nobody|somebody|whoever|heed|heeds|beside|hoofs)\b"
+    """Words for persons where the subject is a program, and other words that engineers do not use; a name in
+    quotation marks is no word."""
+    words = r"(?<![\"`])\b(who|nobody|somebody|whoever|heed|heeds|beside|hoofs)\b"
     for path, line, text in docstrings():
         for found in re.finditer(words, text):
             yield path, line, found[0]

@@ -2,136 +2,150 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from pathlib import Path
+from typing import Annotated
+
+from tyro.conf import Positional, arg
 
 from hoof_env.commands.said import say, size
 from hoof_env.errors import HoofEnvError
 
 
-def compare(
-    a: Path,
-    b: Path,
-    /,
-    out: Path = Path("compare.png"),
-    map_a: tuple[str, ...] = (),
-    map_b: tuple[str, ...] = (),
-    units_a: str = "auto",
-    units_b: str = "auto",
-    reverse_a: str = "auto",
-    reverse_b: str = "auto",
-    rate_a: float | None = None,
-    rate_b: float | None = None,
-    mass_a: float | None = None,
-    mass_b: float | None = None,
-    up_a: str = "auto",
-    up_b: str = "auto",
-    forward_a: str = "auto",
-    forward_b: str = "auto",
-    align: str = "stances",
-    threshold: float | None = None,
-    units: str = "auto",
-    overwrite: bool = False,
-) -> None:
-    """Compare the ground reaction forces of two records, simulated or measured, limb by limb (needs 'lab').
+@dataclass(frozen=True)
+class ComparisonArgs:
+    """Arguments of `hoof-env compare`."""
 
-    Args:
-        a: the record that is taken as right: .csv, .txt, .tsv, .parquet (needs 'export'), .mot, .sto or .c3d.
-        b: the record of which the errors are reported.
-        out: the picture; ends in .png, .pdf or .svg.
-        map_a: columns of A if they have other names than ours: time=Seconds force_x=-Fx force_y=Fz, or
-            left_fore_force_y=LF_Fz ...; a - turns a column round, a + adds two, as left_force_y=p1_z+p3_z;
-            Fz#2 is the second column Fz, #3 the third of all. left_fore=plate_1 renames a limb,
-            left_fore=plate_1+plate_3 is the sum of two.
-        map_b: columns of B.
-        units_a: unit of A's forces: N, kN, N/kg, BW or %BW; auto takes the unit that the file states.
-        units_b: unit of B's forces.
-        reverse_a: components of A that point the other way: none, x, y or xy; auto turns both components of
-            each limb with a vertical force that points into the ground.
-        reverse_b: components of B that point the other way.
-        rate_a: samples a second of A, if it has no times, or times that cannot be read.
-        rate_b: samples a second of B.
-        mass_a: mass of A's animal [kg], for body weights, if the file does not state the weight.
-        mass_b: mass of B's animal [kg].
-        up_a: axis of A's file that points upward: x, y, z, -x, -y or -z; auto is y, and in a .c3d the normal
-            of its plates.
-        up_b: axis of B's file that points upward.
-        forward_a: axis of A's file in which the animal travels, likewise; auto is x.
-        forward_b: axis of B's file in which the animal travels.
-        align: stances lays each pair touchdown on touchdown, shift shifts B as a whole, none takes the times
-            of the files.
-        threshold: vertical force that makes a stance [N]; 20, or 1 % of the weight if forces are in body
-            weights and the weight is unknown.
-        units: unit of the errors: N or BW; auto is N if both records can be in N.
-        overwrite: replace an existing picture.
-    """
+    a: Positional[Path]
+    """the record that is taken as right: .csv, .txt, .tsv, .parquet (needs 'export'), .mot, .sto or .c3d."""
+    b: Positional[Path]
+    """the record of which the errors are reported."""
+    out: Path = Path("compare.png")
+    """the picture; ends in .png, .pdf or .svg."""
+    map_a: tuple[str, ...] = ()
+    """columns of A if they have other names than ours: time=Seconds force_x=-Fx force_y=Fz, or
+    left_fore_force_y=LF_Fz ...; a - turns a column round, a + adds two, as left_force_y=p1_z+p3_z; Fz#2 is
+    the second column Fz, #3 the third of all. left_fore=plate_1 renames a limb, left_fore=plate_1+plate_3 is
+    the sum of two."""
+    map_b: tuple[str, ...] = ()
+    """columns of B."""
+    units_a: str = "auto"
+    """unit of A's forces: N, kN, N/kg, BW or %BW; auto takes the unit that the file states."""
+    units_b: str = "auto"
+    """unit of B's forces."""
+    reverse_a: str = "auto"
+    """components of A that point the other way: none, x, y or xy; auto turns both components of each limb
+    with a vertical force that points into the ground."""
+    reverse_b: str = "auto"
+    """components of B that point the other way."""
+    rate_a: float | None = None
+    """samples a second of A, if it has no times, or times that cannot be read."""
+    rate_b: float | None = None
+    """samples a second of B."""
+    mass_a: float | None = None
+    """mass of A's animal [kg], for body weights, if the file does not state the weight."""
+    mass_b: float | None = None
+    """mass of B's animal [kg]."""
+    up_a: str = "auto"
+    """axis of A's file that points upward: x, y, z, -x, -y or -z; auto is y, and in a .c3d the normal of its
+    plates."""
+    up_b: str = "auto"
+    """axis of B's file that points upward."""
+    forward_a: str = "auto"
+    """axis of A's file in which the animal travels, likewise; auto is x."""
+    forward_b: str = "auto"
+    """axis of B's file in which the animal travels."""
+    align: str = "stances"
+    """stances lays each pair touchdown on touchdown, shift shifts B as a whole, none takes the times of the
+    files."""
+    threshold: float | None = None
+    """vertical force that makes a stance [N]; 20, or 1 % of the weight if forces are in body weights and the
+    weight is unknown."""
+    units: str = "auto"
+    """unit of the errors: N or BW; auto is N if both records can be in N."""
+    overwrite: bool = False
+    """replace an existing picture."""
+
+
+def compare(args: Annotated[ComparisonArgs, arg(name="")]) -> None:
+    """Compare ground reaction forces of two records, simulated or measured, limb by limb (needs 'lab')."""
     from hoof_env._output import check_new
     from hoof_env.lab.columns import parse_mapping
     from hoof_env.lab.compare import compare
     from hoof_env.lab.picture import check_picture, draw, report
     from hoof_env.lab.read import read_record
 
-    made = check_new(out, overwrite)
-    check_picture(out)
-    of_a = parse_mapping("--map-a", map_a)
-    of_b = parse_mapping("--map-b", map_b)
-    first = read_record(a, of_a, units_a, reverse_a, rate_a, mass_a, up_a, forward_a)
-    second = read_record(b, of_b, units_b, reverse_b, rate_b, mass_b, up_b, forward_b)
-    comparison = compare(first, second, align, threshold, units)
-    draw(comparison, out)
-    say(f"{report(comparison)}\n\n{out}: {size(out)}{made}")
+    made = check_new(args.out, args.overwrite)
+    check_picture(args.out)
+    map_a = parse_mapping("--map-a", args.map_a)
+    map_b = parse_mapping("--map-b", args.map_b)
+    a = read_record(
+        args.a, map_a, args.units_a, args.reverse_a, args.rate_a, args.mass_a, args.up_a, args.forward_a
+    )
+    b = read_record(
+        args.b, map_b, args.units_b, args.reverse_b, args.rate_b, args.mass_b, args.up_b, args.forward_b
+    )
+    comparison = compare(a, b, args.align, args.threshold, args.units)
+    draw(comparison, args.out)
+    say(f"{report(comparison)}\n\n{args.out}: {size(args.out)}{made}")
 
 
-def average(
-    records: tuple[Path, ...],
-    /,
-    out: Path,
-    map: tuple[str, ...] = (),
-    units_in: str = "auto",
-    reverse: str = "auto",
-    rate: float | None = None,
-    mass: float | None = None,
-    up: str = "auto",
-    forward: str = "auto",
-    threshold: float | None = None,
-    units: str = "auto",
-    points: int = 101,
-    overwrite: bool = False,
-) -> None:
-    """Write the mean stance of several trials, and its standard deviation, as a table.
+@dataclass(frozen=True)
+class AverageArgs:
+    """Arguments of `hoof-env average`."""
 
-    Args:
-        records: one file or more that `hoof-env compare` reads; the options below hold for all of them.
-        out: the table; ends in .csv.
-        map: columns, as --map-a of `hoof-env compare`.
-        units_in: unit of the files' forces: N, kN, N/kg, BW or %BW; auto takes the unit that each file
-            states.
-        reverse: components that point the other way: none, x, y or xy; auto turns both components of each
-            limb with a vertical force that points into the ground.
-        rate: samples a second, if the files have no times.
-        mass: mass of the animal [kg], for body weights, if the files do not state the weight.
-        up: axis of the files that points upward, as --up-a of `hoof-env compare`.
-        forward: axis of the files in which the animal travels.
-        threshold: vertical force that makes a stance [N]; 20, or 1 % of the weight if forces are in body
-            weights and the weight is unknown.
-        units: unit of the table: N or BW; auto is N if all files can be in N.
-        points: rows of the table, from touchdown to lift-off.
-        overwrite: replace an existing table.
-    """
+    records: Positional[tuple[Path, ...]]
+    """one file or more that `hoof-env compare` reads; the options below hold for all of them."""
+    out: Path
+    """the table; ends in .csv."""
+    map: tuple[str, ...] = ()
+    """columns, as --map-a of `hoof-env compare`."""
+    units_in: str = "auto"
+    """unit of the files' forces: N, kN, N/kg, BW or %BW; auto takes the unit that each file states."""
+    reverse: str = "auto"
+    """components that point the other way: none, x, y or xy; auto turns both components of each limb with a
+    vertical force that points into the ground."""
+    rate: float | None = None
+    """samples a second, if the files have no times."""
+    mass: float | None = None
+    """mass of the animal [kg], for body weights, if the files do not state the weight."""
+    up: str = "auto"
+    """axis of the files that points upward, as --up-a of `hoof-env compare`."""
+    forward: str = "auto"
+    """axis of the files in which the animal travels."""
+    threshold: float | None = None
+    """vertical force that makes a stance [N]; 20, or 1 % of the weight if forces are in body weights and the
+    weight is unknown."""
+    units: str = "auto"
+    """unit of the table: N or BW; auto is N if all files can be in N."""
+    points: int = 101
+    """rows of the table, from touchdown to lift-off."""
+    overwrite: bool = False
+    """replace an existing table."""
+
+
+def average(args: Annotated[AverageArgs, arg(name="")]) -> None:
+    """Write the mean stance of several trials, and its standard deviation, as a table."""
     from hoof_env._output import check_folder, check_new
     from hoof_env.lab import average as mean
     from hoof_env.lab.columns import parse_mapping
     from hoof_env.lab.doubts import for_one
     from hoof_env.lab.read import read_record
 
-    made = check_new(out, overwrite)
-    mean.check_table(out)
-    check_folder(out.parent)
-    mapping = parse_mapping("--map", map)
+    made = check_new(args.out, args.overwrite)
+    mean.check_table(args.out)
+    check_folder(args.out.parent)
+    mapping = parse_mapping("--map", args.map)
     try:
-        trials = [read_record(file, mapping, units_in, reverse, rate, mass, up, forward) for file in records]
+        trials = [
+            read_record(
+                file, mapping, args.units_in, args.reverse, args.rate, args.mass, args.up, args.forward
+            )
+            for file in args.records
+        ]
     except HoofEnvError as error:
         # Its message names the options of `compare`, which end in -a and -b.
         raise type(error)(for_one(str(error), "").replace("--units", "--units-in")) from None
-    stances = mean.average(trials, threshold, units, points)
-    mean.write_table(stances, out)
-    say(f"{mean.report(stances)}\n\n{out}: {points} rows, {size(out)}{made}")
+    stances = mean.average(trials, args.threshold, args.units, args.points)
+    mean.write_table(stances, args.out)
+    say(f"{mean.report(stances)}\n\n{args.out}: {args.points} rows, {size(args.out)}{made}")

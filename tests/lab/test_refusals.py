@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from hoof_env import cli, records
+from hoof_env.commands.lab import ComparisonArgs
 from hoof_env.errors import DataFileError, MissingExtraError, ParameterError
 from hoof_env.lab.average import average
 from hoof_env.lab.c3d import write_c3d
@@ -308,7 +309,7 @@ MISSING = [
     ("ezc3d", lambda path: read_record(path / "x.c3d"), r'c3d needs ezc3d: pip install "hoof-env\[lab\]"'),
     ("pyarrow", lambda path: read_record(path / "x.parquet"),
      r'Parquet needs pyarrow: pip install "hoof-env\[export\]"'),
-    ("matplotlib", lambda path: cli.compare(path / "a.csv", path / "b.csv", out=path / "x.png"),
+    ("matplotlib", lambda path: cli.compare(ComparisonArgs(path / "a.csv", path / "b.csv", path / "x.png")),
      r'pictures need matplotlib: pip install "hoof-env\[lab\]"'),
 ]  # fmt: skip
 """Package, call with a folder, words."""
