@@ -9,77 +9,11 @@ import subprocess
 import sys
 import textwrap
 import time
-from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
 
-import hoof_env
-
-ROOT = Path(hoof_env.__file__).parents[1]
-
-MODULE = """
-import os, sys, time
-from hoof_env.simd.compile import kernel
-from hoof_env.simd.cache import COMPILED
-from hoof_env.simd.types import instruction
-from pathlib import Path
-
-HERE = Path(__file__).parent
-
-@instruction(lambda x: x(x))
-def same(code, x):
-    (HERE / "began").touch()
-    limit = time.monotonic() + 100
-    while not (HERE / "go").exists() and time.monotonic() < limit:
-        time.sleep(0.05)
-    return x
-
-@kernel
-def inner(x):
-    return same(x) + 1.0
-
-@kernel
-def tiny(x):
-    return 2.0 * inner(x)
-
-@kernel
-def wrong(x):
-    return x.nothing
-"""
-
-CALL = "import tiny; print(tiny.tiny(3.0), tiny.COMPILED)"
-
-
-@pytest.fixture
-def start(tmp_path):
-    """Starts a process that has tiny kernels, whose compilation ends once the file `go` is there."""
-    (tmp_path / "tiny.py").write_text(MODULE)
-    processes = []
-
-    def begin(code=CALL, **environment):
-        settings = {"NUMBA_CACHE_DIR": str(tmp_path / "cache"), "PYTHONPATH": f"{ROOT}{os.pathsep}{tmp_path}"}
-        process = subprocess.Popen(
-            [sys.executable, "-c", textwrap.dedent(code)],
-            cwd=tmp_path,
-            env={**os.environ, "HOOF_ENV_QUIET": "0", **settings, **environment},
-            stdout=subprocess.PIPE,
-            stderr=subprocess.PIPE,
-            text=True,
-        )
-        processes.append(process)
-        return process
-
-    yield begin
-    for process in processes:
-        process.kill()
-        process.communicate()
-
-
-def ended(process, limit=120):
-    out, said = process.communicate(timeout=limit)
-    assert process.returncode == 0, said
-    return out.strip(), said
+from tests.simd.processes import CALL, CALL_OR_SAY, ROOT, ended
 
 
 def until(condition, process):
@@ -199,21 +133,6 @@ def test_threads_and_forked_children_do_not_lock_each_other_out(start, tmp_path)
     assert ended(start(code))[0] == "['inner', 'inner', 'tiny', 'tiny']"
 
 
-CALL_OR_SAY = """
-from hoof_env.errors import OutputError
-import hoof_env.envs.manual  # no folder is needed before something is compiled
-import tempfile, tiny
-def refuse(*args, **kwargs):
-    raise PermissionError("read-only")
-if {read_only}:
-    tempfile.TemporaryFile = refuse
-try:
-    print(tiny.tiny(3.0), tiny.COMPILED)
-except OutputError as error:
-    print(error)
-"""
-
-
 @pytest.mark.parametrize(
     "reason",
     [
@@ -242,12 +161,12 @@ def test_kernels_are_loaded_from_a_folder_that_is_not_writable(start, tmp_path):
     assert ended(start(CALL_OR_SAY.format(read_only=True)))[0] == "8.0 []"
 
 
-def test_without_compilation_the_reason_is_named(start):
-    _, said = start("import hoof_env.leg.kinematics", NUMBA_DISABLE_JIT="1").communicate()
+def test_without_compilation_the_reason_is_named(start_anew):
+    _, said = start_anew("import hoof_env.leg.kinematics", NUMBA_DISABLE_JIT="1").communicate()
     assert "HoofEnvError: NUMBA_DISABLE_JIT is set" in said
 
 
-def test_an_edit_of_the_mechanics_makes_kernels_anew(start, tmp_path):
+def test_an_edit_of_the_mechanics_makes_kernels_anew(start_anew, tmp_path):
     """`touch` calls `normal_force`, which lives in another file: numba alone would keep the old one."""
     package, code = tmp_path / "hoof_env", """
         import hoof_env
@@ -263,13 +182,13 @@ def test_an_edit_of_the_mechanics_makes_kernels_anew(start, tmp_path):
             law if factor == 1 else law.replace("return maximum(spring *", "return maximum(2.0 * spring *")
         )
         (package / "ground" / "laws.py").write_text(changed)
-        where, force, found = ended(start(code))[0].split()
+        where, force, found = ended(start_anew(code))[0].split()
         assert where == str(package / "__init__.py")
         assert float(force) == pytest.approx(factor * 2e4 * 0.04**1.5)
         assert found == str(is_compiled)
 
 
-def test_compiling_is_said_once_and_only_when_it_happens(start, tmp_path):
+def test_compiling_is_said_once_and_only_when_it_happens(start_anew, tmp_path):
     code = """
         import numba
         numba.njit(lambda x: x + 1)(1)  # not ours
@@ -279,12 +198,12 @@ def test_compiling_is_said_once_and_only_when_it_happens(start, tmp_path):
         for _ in range(2):
             touch(new_contacts()[0], -0.04j, 0j, Ground().to_record())
     """
-    before, *rest = ended(start(code))[1].splitlines()
+    before, *rest = ended(start_anew(code))[1].splitlines()
     assert before == "---"
     assert all(re.fullmatch(r"hoof-env: \w+ compiled in \d+\.\d s", line) for line in rest)
-    assert ended(start(code))[1] == "---\n"  # from the cache
+    assert ended(start_anew(code))[1] == "---\n"  # from the cache
     new = {"NUMBA_CACHE_DIR": str(tmp_path / "new"), "HOOF_ENV_QUIET": "1"}
-    assert ended(start(code, **new))[1] == "---\n"
+    assert ended(start_anew(code, **new))[1] == "---\n"
 
 
 def test_half_a_minute_is_told_of_kernels_that_take_as_long(capsys, monkeypatch):
@@ -318,7 +237,7 @@ def test_all_kernels_are_told_once_and_then_there_is_nothing_to_compile(start, t
     assert ended(start(code))[0] == f"nothing to compile; they are in {tmp_path / 'cache'}"
 
 
-def test_an_environment_has_all_its_kernels_once_it_is_made(start):
+def test_an_environment_has_all_its_kernels_once_it_is_made(start_anew):
     """So that one in a parent process warms the cache for workers; what is compiled ahead is all there is."""
     code = """
         import numpy as np
@@ -359,7 +278,7 @@ def test_an_environment_has_all_its_kernels_once_it_is_made(start):
     """
     # the folder of all tests: these kernels are large
     shared = os.environ.get("NUMBA_CACHE_DIR", "")
-    assert ended(start(code, NUMBA_CACHE_DIR=shared), limit=550)[0] == "True [] " * 5 + "[]"
+    assert ended(start_anew(code, NUMBA_CACHE_DIR=shared), limit=550)[0] == "True [] " * 5 + "[]"
 
 
 TWINS = """
@@ -399,108 +318,6 @@ def test_kernels_of_one_source_are_told_apart_when_both_are_loaded(tmp_path):
 
     assert [said("1"), said("2")] == ["2.0\n", "4.0\n"]
     assert [said("1", "2"), said("2", "1")] == ["2.0 4.0\n", "4.0 2.0\n"]
-
-
-@pytest.mark.parametrize("kind", ["nbi", "nbc"])
-def test_a_damaged_file_is_noticed_and_compiled_again(start, tmp_path, kind):
-    """Each damage in a copy of the same files, by two processes of which the second finds all in order."""
-    (tmp_path / "go").touch()
-    ended(start())
-    for damage in ("empty", "cut", "one bit", "another's", "no pickle"):
-        folder = tmp_path / damage
-        shutil.copytree(tmp_path / "cache", folder)
-        spoil(folder, kind, damage)
-        out, said = ended(start(NUMBA_CACHE_DIR=str(folder)))
-        assert out.startswith("8.0 ["), damage
-        assert "tiny" in out, damage
-        assert "compiling" in said, damage
-        assert ended(start(NUMBA_CACHE_DIR=str(folder))) == ("8.0 []", ""), damage
-
-
-def spoil(folder, kind, damage):
-    """Damage the file of a kernel, of those that end in `kind`."""
-    files = sorted(folder.rglob(f"*.{kind}"))
-    (file,) = [path for path in files if "tiny.tiny" in path.name]
-    (other,) = [path for path in files if path != file]
-    whole = file.read_bytes()
-    middle = len(whole) // 2
-    file.write_bytes(
-        {
-            "empty": b"",
-            "cut": whole[:middle],
-            "one bit": whole[:middle] + bytes([whole[middle] ^ 1]) + whole[middle + 1 :],
-            "another's": other.read_bytes(),
-            "no pickle": b"x" * len(whole),
-        }[damage]
-    )
-
-
-def test_a_file_that_asks_for_a_module_that_is_gone_is_compiled_again(start, tmp_path):
-    """As the kernel of a module that was loaded by its path; its digest is right."""
-    (tmp_path / "go").touch()
-    code = """
-        import importlib.util, sys
-        spec = importlib.util.spec_from_file_location("gone_by_now", "tiny.py")
-        module = importlib.util.module_from_spec(spec)
-        if sys.argv[1:]:
-            sys.modules["gone_by_now"] = module
-        spec.loader.exec_module(module)
-        print(module.tiny(3.0))
-    """
-    for first in ("sys.argv.append('x');", "", ""):
-        assert ended(start(f"import sys; {first}\n" + textwrap.dedent(code)))[0] == "8.0"
-
-
-@pytest.mark.skipif(os.name != "posix", reason="needs modes of files")
-@pytest.mark.parametrize("what", ["folder", "file"])
-@pytest.mark.parametrize("fault", ["mode", "owner"])
-def test_a_folder_or_file_of_somebody_else_is_refused_before_it_is_read(start, tmp_path, what, fault):
-    (tmp_path / "go").touch()
-    ended(start())
-    index = next((tmp_path / "cache").rglob("*tiny.tiny*.nbi"))
-    (tmp_path / "mark.py").write_text("print('ran')")
-    index.write_bytes(b"cmark\n.")  # a pickle that imports
-    victim = index.parent if what == "folder" else index
-    if fault == "mode":
-        victim.chmod(victim.stat().st_mode | 0o002)
-    elif os.geteuid():
-        pytest.skip("needs root")
-    else:
-        os.chown(victim, 65534, 65534)
-    code = CALL_OR_SAY.format(read_only=False)
-    out, _ = ended(start(code))
-    assert "cannot be trusted, for it" in out
-    assert ("writable by everybody" in out) == (fault == "mode")
-    assert str(victim) in out
-    assert "ran" not in out
-    assert "NUMBA_CACHE_DIR" in out
-
-
-@pytest.mark.skipif(os.name != "posix" or os.geteuid() != 0, reason="needs root")
-def test_the_remedy_of_folders_from_a_generous_umask_and_a_group_with_others_in_it_works(start, tmp_path):
-    """As an older version left them under umask 002."""
-    (tmp_path / "go").touch()
-    ended(start())
-    cache = tmp_path / "cache"
-    for path in (cache, *cache.rglob("*")):
-        os.chown(path, -1, 12345)
-        path.chmod(path.stat().st_mode | 0o020)
-    code = CALL_OR_SAY.format(read_only=False)
-    out, _ = ended(start(code))
-    assert "for it is writable by group 12345" in out
-    remedy = f"chmod -R go-w {cache}"
-    assert f"run `{remedy}` if all in it is yours" in out
-    subprocess.run(remedy.split(), check=True)
-    assert ended(start())[0] == "8.0 []"
-
-
-@pytest.mark.skipif(os.name != "posix", reason="needs modes of files")
-def test_what_is_made_here_is_closed_to_others_whatever_the_umask(start, tmp_path):
-    (tmp_path / "go").touch()
-    ended(start("import os; os.umask(0)\n" + CALL))
-    made = [tmp_path / "cache", *(tmp_path / "cache").rglob("*")]
-    assert not [path for path in made if path.stat().st_mode & 0o022 and path.suffix != ".lock"]
-    assert ended(start())[0] == "8.0 []"
 
 
 NESTED = """
