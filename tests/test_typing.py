@@ -20,6 +20,8 @@ from hoof_env.tasks.plain import to_json
 from hoof_env.tasks.registry import TASKS
 from hoof_env.tasks.settings import SETTINGS
 
+ROOT = Path(__file__).parents[1]
+
 SCRIPT = """\
 from typing import assert_type
 import numpy as np
@@ -53,8 +55,10 @@ hoof_env.HorseLeg  # wrong
 
 
 @pytest.fixture(scope="module")
-def cache(tmp_path_factory):
-    return tmp_path_factory.mktemp("mypy")
+def cache():
+    """Folder in which mypy keeps what it knows of the package and of NumPy, beside what `make lint` keeps of
+    other options; it reads again what has changed."""
+    return ROOT / ".mypy_cache" / "strict"
 
 
 def complaints(folder: Path, script: str, cache: Path) -> dict[int, str]:
