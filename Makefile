@@ -11,6 +11,8 @@
 PY := .venv/bin/python
 PYTHONS := $(or $(PYTHON),$(PY) python3 python3.14 python3.13 python3.12 python3.11)
 UNTYPED := --disable-error-code import-not-found --no-warn-unused-ignores --no-warn-unreachable
+# Processes without compiled bytes would compile each module again, a fifth of a second of each start.
+unexport PYTHONDONTWRITEBYTECODE
 LONG := -o faulthandler_timeout=3600
 IS_SUPPORTED := import sys; sys.exit(not (3, 11) <= sys.version_info[:2] <= (3, 14))
 
@@ -48,11 +50,11 @@ demo: setup-demo
 	@$(PY) -m agents.demo
 
 # Compiling and mypy take one processor each, so both go on at once. A file's tests stay in one process: the
-# others would make its fixtures again. A process that is lost stays lost: a new one would begin with the test
-# that killed the last.
+# others would make its fixtures again; `LONGEST` of tests/conftest.py begin, and xdist keeps that order. A
+# process that is lost stays lost: a new one would begin with the test that killed the last.
 test: setup
 	@$(MAKE) --no-print-directory -j2 lint kernels
-	@echo 'pytest' && $(PY) -m pytest -q -n auto --dist loadfile --max-worker-restart=0
+	@echo 'pytest' && $(PY) -m pytest -q -n auto --dist loadfile --no-loadscope-reorder --max-worker-restart=0
 
 kernels: setup
 	@echo 'kernels' && $(PY) -m tests.kernels

@@ -23,6 +23,34 @@ for library in ("OMP", "OPENBLAS", "MKL"):
 if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
     signal.signal(signal.SIGINT, signal.default_int_handler)
 
+LONGEST = (
+    "envs/test_bits.py",
+    "test_packaging.py",
+    "envs/test_own_task.py",
+    "test_site.py",
+    "dynamics/test_hoof_spring.py",
+    "envs/test_hoof_stiffness.py",
+    "envs/test_rewards_of_tasks.py",
+    "benchmarks/test_speed.py",
+    "agents/test_resume.py",
+    "test_setup.py",
+    "agents/test_horse_gaits.py",
+    "envs/test_refused_tasks.py",
+    "simd/test_cache.py",
+    "paper/test_figures.py",
+    "dynamics/test_animal.py",
+    "dynamics/test_reactions.py",
+    "test_typing.py",
+    "envs/test_conformance.py",
+    "agents/test_demo.py",
+    "test_cli.py",
+    "ecosystem/test_gymnasium.py",
+    "test_make_test.py",
+    "agents/test_examples.py",
+)
+"""Files that take longest, the longest first. They begin: one that began last would keep one processor busy
+while the others have nothing left to do."""
+
 HAS_TORCH = find_spec("torch") is not None
 NEED_TORCH = ("torch", "stable_baselines3", "sb3_contrib")
 LEFT_OUT = ("agents", "ecosystem")  # folders of tests whose commands import it in processes of their own
@@ -60,6 +88,13 @@ def pytest_ignore_collect(collection_path):
     if not HAS_TORCH and collection_path in [here / name for name in LEFT_OUT]:
         return True
     return None
+
+
+def pytest_collection_modifyitems(items):
+    """Put the longest files first; the tests of each stay in their order."""
+    here = Path(__file__).parent
+    places = {here / name: place for place, name in enumerate(LONGEST)}
+    items.sort(key=lambda item: places.get(item.path, len(places)))
 
 
 def pytest_terminal_summary(terminalreporter):
