@@ -58,16 +58,17 @@ def checkout(commit: str) -> Path:
     return tree
 
 
-def run_cases(tree: Path, runs: int = RUNS) -> dict[str, float]:
+def run_cases(tree: Path, runs: int = RUNS, share: float = 1.0) -> dict[str, float]:
     """Return the processor time [s] of each case, timed `runs` times in a process that takes the package from
-    `tree`.
+    `tree`; of a run's steps a share is taken.
 
     Raises:
         RuntimeError: the process took the package from elsewhere.
     """
     # The package of this tree, whichever is installed
     settings = {"PYTHONPATH": str(tree), "HOOF_ENV_QUIET": "1"}
-    command = [sys.executable, "-P", str(CASES), str(runs)]  # -P: with no module of this folder beside it
+    # -P: without the modules of the script's folder
+    command = [sys.executable, "-P", str(CASES), str(runs), str(share)]
     done = subprocess.run(command, cwd=tree, env=os.environ | settings, stdout=subprocess.PIPE, check=True)
     result = json.loads(done.stdout)
     if not Path(result["package"]).is_relative_to(tree):

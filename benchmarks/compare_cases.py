@@ -1,7 +1,7 @@
 """Cases of `compare`, as a script that knows only what every commit has: public names and ids.
 
-Its argument is the number of runs of each case. It prints the file of the package, and for each case the
-least processor time of a run [s].
+Its arguments are the number of runs of each case and the share of a run's steps that is taken. It prints the
+file of the package, and for each case the least processor time of a run [s].
 """
 
 from __future__ import annotations
@@ -87,22 +87,26 @@ def least_seconds(cases: dict[str, Callable[[], object]], runs: int) -> dict[str
     return {name: min(seconds) for name, seconds in spent.items()}
 
 
-def main(runs: int) -> None:
+def main(runs: int, share: float) -> None:
     """Time all cases and print them."""
+
+    def cut(count: int) -> int:
+        return max(1, round(count * share))
+
     leg = "hoof_env/HorseLeg-v0"
     terrain = "hoof_env/HorseLegTerrain-v0"
     many = gym.make_vec(leg, num_envs=BATCH)
     many.reset(seed=0)
     cases = {
-        "one leg": advance((0.0,), "fixed", 1, 1000, 100),
-        f"{BATCH} legs": advance((0.0,), "fixed", BATCH, 100, 4),
-        "one horse": advance((0.6, 0.6, -0.6, -0.6), "free", 1, 500, 60),
-        "HorseLeg, step": step(gym.make(leg), 3000),
-        "HorseLegTerrain, step": step(gym.make(terrain), 3000),
-        f"HorseLeg, {BATCH} at once": step_many(many, BATCH, 50),
+        "one leg": advance((0.0,), "fixed", 1, 1000, cut(100)),
+        f"{BATCH} legs": advance((0.0,), "fixed", BATCH, cut(100), 4),
+        "one horse": advance((0.6, 0.6, -0.6, -0.6), "free", 1, 500, cut(60)),
+        "HorseLeg, step": step(gym.make(leg), cut(3000)),
+        "HorseLegTerrain, step": step(gym.make(terrain), cut(3000)),
+        f"HorseLeg, {BATCH} at once": step_many(many, BATCH, cut(50)),
     }
     json.dump({"package": hoof_env.__file__, "seconds": least_seconds(cases, runs)}, sys.stdout)
 
 
 if __name__ == "__main__":
-    main(int(sys.argv[1]))
+    main(int(sys.argv[1]), float(sys.argv[2]))
