@@ -1,9 +1,8 @@
 """Legs that cannot be, and calls of legs and about them, by the words of each error: values of a `Geometry`
-(`VALUES`), calls (`CALLS`), files of presets (`FILES`), presets by name and by content (`PRESETS`). Lists of
-a mechanism are in tests/leg/test_refused_mechanisms.py."""
+(`VALUES`), calls (`CALLS`). Presets are in tests/leg/test_refused_presets.py, lists of a mechanism in
+tests/leg/test_refused_mechanisms.py."""
 
 import copy
-import json
 import re
 
 import numpy as np
@@ -12,10 +11,9 @@ import pytest
 from hoof_env.dynamics.engine import TrunkEngine
 from hoof_env.dynamics.parts import Limb, Motor, Trunk
 from hoof_env.eq8.solver import ConstrainedLeg
-from hoof_env.errors import DataFileError, GeometryError, OutputError, ParameterError
-from hoof_env.gait import load_gait
+from hoof_env.errors import GeometryError, OutputError, ParameterError
 from hoof_env.ground.contact import Ground
-from hoof_env.leg.geometry import Geometry, load_geometry, read_preset
+from hoof_env.leg.geometry import Geometry, load_geometry
 from hoof_env.leg.kinematics import FrameMotion, pose
 from hoof_env.leg.limb_masses import segment_masses, trunk_mass, with_limb_masses
 from hoof_env.leg.mechanism_list import PAPER, read_mechanism
@@ -394,96 +392,3 @@ def test_calls(call, error, words, tmp_path, monkeypatch):
     with pytest.raises(error, match=words):
         call(tmp_path)
     assert [path.name for path in tmp_path.iterdir()] == ["file"]
-
-
-CONTENT = read_preset("identified")
-BARE = {name: value for name, value in CONTENT["geometry"].items() if name != "pivot"}
-
-
-def edited(**changes):
-    """The text of a preset with other entries of its geometry."""
-    return json.dumps(CONTENT | {"geometry": CONTENT["geometry"] | changes})
-
-
-def edited_length(**lengths):
-    return edited(lengths=CONTENT["geometry"]["lengths"] | lengths)
-
-
-FILES = [
-    (None, DataFileError, r"cannot read .*leg\.json: No such file"),
-    *(
-        (text, DataFileError, words)
-        for text, words in (
-            ("{", "does not parse"),
-            ("[" * 100_000, "does not parse"),
-            (b"\xff\xfe\x00\x80", "does not parse"),
-            ("[]", "expected a JSON object with 'geometry' and 'gaits', got list"),
-            ("{}", r"leg\.json: expected an entry 'provenance' .*; found nothing"),
-            ('{"geometry": {}, "gaits": {}}', "expected an entry 'provenance' .*; found geometry, gaits"),
-            ('{"geometry": {}, "provenance": 3}', "expected an entry 'provenance' .*; got 3"),
-            ('{"provenance": ""}', "expected an entry 'geometry' .*, an object; found provenance"),
-            ('{"provenance": "", "geometry": 3}', "expected an entry 'geometry' .*, an object; got 3"),
-            (
-                '{"provenance": "", "geometry": {"pivot": 3}}',
-                r"leg\.json: geometry: .*; missing assembly, heel,",
-            ),
-            (
-                '{"provenance": "", "colour": "bay"}',
-                r"leg\.json: unknown entries colour; expected some of prov",
-            ),
-            (edited(colour="bay"), r"leg\.json: geometry: expected exactly .*; unknown colour$"),
-        )
-    ),
-    (edited_length(FG=np.nan), ParameterError, r"leg\.json: lengths\['FG'\]"),
-    (edited_length(CB=0.1), GeometryError, r"leg\.json: dyad 1"),
-]
-"""Content of a file, or None, class and words of the error."""
-
-
-@pytest.mark.parametrize(("content", "error", "words"), FILES)
-def test_files(content, error, words, tmp_path):
-    path = tmp_path / "leg.json"
-    if content is not None:
-        path.write_bytes(content if isinstance(content, bytes) else content.encode())
-    with pytest.raises(error, match=words):
-        load_geometry(path)
-
-
-def test_a_folder_is_no_file(tmp_path):
-    with pytest.raises(DataFileError, match="cannot read"):
-        load_geometry(tmp_path)
-
-
-PRESETS = [
-    *(
-        (lambda given=given: load_geometry(given), "preset: expected one of fourbar, .* got")
-        for given in (3, None, True, ["klann"], np.zeros(2), b"klann", "")
-    ),
-    (
-        lambda: load_geometry("first_fit"),
-        "preset: expected one of fourbar, identified, jansen, klann, got 'first_fit'",
-    ),
-    (
-        lambda: load_geometry({**CONTENT, "colour": "bay"}),
-        "preset: unknown entries colour; expected some of provenance, ",
-    ),
-    (
-        lambda: load_geometry({name: CONTENT[name] for name in ("geometry", "gaits")}),
-        r"preset: expected an entry 'provenance' .*geometry, gaits$",
-    ),
-    (
-        lambda: load_gait("walk", {**CONTENT, "gaits": {5: CONTENT["gaits"]["walk"]}}),
-        "gaits: expected names that are texts",
-    ),
-    (
-        lambda: load_geometry({**CONTENT, "geometry": {**BARE, "colour": "bay"}}),
-        r"preset: geometry: .*; missing pivot; unknown colour$",
-    ),
-]
-"""Calls with a preset by name or content, and words."""
-
-
-@pytest.mark.parametrize(("call", "words"), PRESETS)
-def test_presets(call, words):
-    with pytest.raises(ParameterError, match=words):
-        call()

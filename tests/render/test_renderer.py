@@ -1,24 +1,20 @@
-"""The picture says what the trace says, needs no display, and a window survives what people do to it."""
+"""The picture says what the trace says."""
 
 from __future__ import annotations
 
 import os
 import subprocess
 import sys
-import time
-import warnings
 from itertools import product
 
 import gymnasium as gym
 import numpy as np
 import pytest
-from gymnasium.error import DependencyNotInstalled, ResetNeeded
 
 from hoof_env.dynamics.engine import TrunkEngine
 from hoof_env.dynamics.parts import Limb, Trunk
 from hoof_env.envs.policies import make_policy
-from hoof_env.errors import ParameterError
-from hoof_env.gait import LIMITS, PARAMETERS, GaitParameters, load_gait
+from hoof_env.gait import LIMITS, PARAMETERS, GaitParameters
 from hoof_env.ground.contact import Ground
 from hoof_env.ground.terrain import Terrain
 from hoof_env.leg.geometry import load_geometry
@@ -29,58 +25,21 @@ from hoof_env.render.kinds import find_patches
 from hoof_env.render.outline import TRUNK_M
 from hoof_env.render.panel import Stances
 from hoof_env.render.renderer import Renderer
-from tests.legs import FIRST_FIT
+from tests.render.drawn import (
+    BLUE,
+    GEOMETRY,
+    KEY,
+    LINE,
+    PURPLE,
+    VERMILION,
+    draw,
+    loaded,
+    pixels,
+    renderer,
+    simulate,
+)
 
 pygame = pytest.importorskip("pygame")
-
-GEOMETRY = load_geometry(FIRST_FIT)
-SCENE = (slice(90, None), slice(0, 640))  # rows and columns of the scene, below its key and left of the panel
-KEY = (slice(10, 31), slice(0, 64))  # of the key's arrow
-VERMILION, BLUE, PURPLE, LINE = (213, 94, 0), (0, 114, 178), (204, 121, 167), (112, 95, 66)
-
-
-def simulate(seconds: float) -> list[list[Instant]]:
-    """Instants of the run's start and of every control step of 20 ms after it."""
-    engine = TrunkEngine(Limb(GEOMETRY), Trunk(height=GEOMETRY.hip_height), Ground())
-    gait = load_gait("run")
-    engine.reset(gait)
-    rows = instants(columns_of_engine(engine.run(gait.to_array(), round(seconds * 1000))))
-    return [rows[:1], *(rows[k : k + 20] for k in range(1, len(rows), 20))]
-
-
-@pytest.fixture(scope="module")
-def run() -> list[list[Instant]]:
-    return simulate(4.0)
-
-
-def renderer(mode: str = "rgb_array", trunk: str = "rail", **options) -> Renderer:
-    return Renderer(GEOMETRY, mode, 50, trunk="suspended" if "weight_n" in options else trunk, **options)
-
-
-def draw(*steps: list[Instant], **options) -> np.ndarray:
-    """A frame of a fresh renderer that has seen `steps`."""
-    picture = renderer(**options)
-    for step in steps:
-        picture.add(step)
-    return picture.frame()
-
-
-def loaded(run, toe: float, friction: float = 0.0, heel: float = 0.0, **changes) -> list[Instant]:
-    """The start, in flight, with made-up forces on toe and heel, the toe 5 cm inside the ground."""
-    now = run[0][0]
-    middle = (toe * now.toe_x + heel * now.heel_x) / max(toe + heel, 1.0)
-    made_up = {
-        "toe_normal": toe, "toe_friction": friction, "toe_force_x": friction, "toe_force_y": toe,
-        "heel_normal": heel, "heel_force_y": heel, "toe_y": -0.05, "toe_depth": 0.05,
-        "force_x": friction, "force_y": toe + heel, "cop_x": middle, "cop_y": -0.05,
-    }  # fmt: skip
-    return [now._replace(**made_up | changes)]
-
-
-def pixels(frame, colour, where=SCENE):
-    """Rows and columns of the pixels of a colour."""
-    rows, columns = np.nonzero((frame[where] == colour).all(axis=-1))
-    return rows + (where[0].start or 0), columns + (where[1].start or 0)
 
 
 def test_a_frame_is_a_fresh_array_of_the_asked_size(run):
@@ -347,144 +306,9 @@ def test_rows_that_are_not_finite_are_left_out(run):
     np.testing.assert_array_equal(draw(run[0], broken), draw(run[0], good))
 
 
-def test_a_window_shows_the_frame_at_its_pace_and_closes(run, monkeypatch):
-    monkeypatch.setenv("SDL_VIDEODRIVER", "dummy")
-    window = renderer("human")
-    try:
-        started = time.perf_counter()
-        for step in run[:6]:
-            window.add(step)
-            assert window.frame() is None
-        assert time.perf_counter() - started > 5 / 50 * 0.9
-        shown = pygame.surfarray.array3d(pygame.display.get_surface()).transpose(1, 0, 2)
-        np.testing.assert_array_equal(shown, draw(*run[:6]))
-    finally:
-        window.close()
-    assert not pygame.display.get_init()
-    window.close()
-    assert window.frame() is None
-
-
-def test_a_window_that_somebody_closed_stays_closed(run, monkeypatch):
-    monkeypatch.setenv("SDL_VIDEODRIVER", "dummy")
-    window = renderer("human")
-    window.add(run[0])
-    window.frame()
-    pygame.event.post(pygame.event.Event(pygame.QUIT))
-    for step in run[1:3]:
-        window.add(step)
-        assert window.frame() is None
-        assert not pygame.display.get_init()
-    window.close()
-
-
-def test_another_environment_may_quit_pygame(run, monkeypatch):
-    monkeypatch.setenv("SDL_VIDEODRIVER", "dummy")
-    picture, window = renderer(), renderer("human")
-    for one in (picture, window):
-        one.add(run[0])
-        one.frame()
-    pygame.quit()
-    for one in (picture, window):
-        one.add(run[1])
-        one.frame()
-    np.testing.assert_array_equal(picture.frame(), draw(*run[:2]))
-    window.close()
-
-
-def test_a_window_without_a_display_is_told_not_drawn_unseen_in_silence(run, monkeypatch):
-    """SDL falls back to a driver that shows nothing; only who asks for it gets it without a word. Gymnasium's
-    checker tries every mode, so that on a machine without a display the mode warns and goes on."""
-    words = r'a window needs a display.*render_mode="rgb_array".*xvfb-run'
-    no_display(monkeypatch)
-    window = renderer("human")
-    window.add(run[0])
-    no_display(monkeypatch)
-    with pytest.warns(UserWarning, match=words):
-        window.frame()
-    window.close()
-    monkeypatch.setenv("SDL_VIDEODRIVER", "dummy")
-    window = renderer("human")
-    window.add(run[0])
-    with warnings.catch_warnings():
-        warnings.simplefilter("error")
-        window.frame()
-    assert pygame.display.get_driver() == "dummy"
-    window.close()
-
-
-def no_display(monkeypatch):
-    """Have pygame's display open on a driver that shows nothing, for which nobody asked."""
-    monkeypatch.setenv("SDL_VIDEODRIVER", "dummy")
-    pygame.display.init()
-    monkeypatch.delenv("SDL_VIDEODRIVER")
-
-
-ONLY_CE = {
-    "": ("FRect", "Window", "Font", "Clock", "Event"),
-    "draw": ("aacircle", "flood_fill"),
-    "transform": ("box_blur", "gaussian_blur", "hsl", "invert", "pixelate", "solid_overlay"),
-    "display": ("get_desktop_refresh_rates", "is_vsync", "message_box", "set_window_position"),
-}
-"""What pygame-ce has and pygame, which `gymnasium[classic-control]` installs, lacks."""
-
-
-def test_nothing_is_drawn_with_what_only_pygame_ce_has(run, monkeypatch):
-    expected = draw(*run[:80], weight_n=856.0)
-    for module, names in ONLY_CE.items():
-        for name in names:
-            monkeypatch.delattr(getattr(pygame, module) if module else pygame, name, raising=False)
-    np.testing.assert_array_equal(draw(*run[:80], weight_n=856.0), expected)
-
-
-@pytest.mark.parametrize("text", ["forward speed", "1.23", "O"])
-def test_letters_are_finer_ones_scaled_down(text):
-    """`premul_alpha` of pygame, not of pygame-ce, takes the padding of a row of letters for pixels."""
-    letters = Brush((960, 540))._paint_letters(text, 21, VERMILION)
-    fine = pygame.font.Font(None, 42).render(text, True, VERMILION)
-    expected = pygame.Surface(fine.get_size(), pygame.SRCALPHA, 32)
-    alpha = pygame.surfarray.array_alpha(fine)
-    pygame.surfarray.pixels_alpha(expected)[:] = alpha
-    pygame.surfarray.pixels3d(expected)[:] = np.round(alpha[..., None] / 255 * VERMILION)
-    expected = pygame.transform.smoothscale(expected, letters.get_size())
-    for read in (pygame.surfarray.array3d, pygame.surfarray.array_alpha):
-        np.testing.assert_allclose(read(letters).astype(int), read(expected).astype(int), atol=2)
-
-
-@pytest.mark.parametrize("quit", [pygame.quit, pygame.font.quit, lambda: (pygame.quit(), pygame.font.init())])
-def test_letters_survive_whoever_quits_pygame(quit):
-    """A font of before crashes the whole process in pygame, and pygame-ce refuses it."""
-    canvas = pygame.Surface((200, 50), 0, 32)
-    brush = Brush((960, 540))
-    for text in ("one", "two"):
-        brush.write(canvas, text, (10, 10), 21, VERMILION, "topleft")
-        quit()
-
-
-def test_bad_input_is_named():
-    with pytest.raises(ParameterError, match=r"render_mode: expected one of human, rgb_array, got 'ansi'"):
-        renderer("ansi")
-    for size in ((960,), (100, 100), (9000, 540), (960, 10**9), (960.5, 540), "wide", None):
-        with pytest.raises(ParameterError, match="size: expected"):
-            renderer(size=size)
-    with pytest.raises(ParameterError, match="fps"):
-        Renderer(GEOMETRY, "rgb_array", 0)
-    with pytest.raises(ParameterError, match="weight_n"):
-        renderer(weight_n=-1.0)
-    with pytest.raises(ResetNeeded, match="reset"):
-        renderer().frame()
-
-
-def test_without_pygame_the_error_says_what_to_install(monkeypatch):
-    monkeypatch.setitem(sys.modules, "pygame", None)
-    with pytest.raises(DependencyNotInstalled, match=r'pip install "hoof-env\[render\]"'):
-        renderer()
-
-
 def test_what_is_around_a_small_leg_is_as_small():
     """The trunk of a robot at 0.2 was as long as that of the whole leg, over key and panel. Up to the scale
     all is the same picture, so that the same leg, made smaller, is drawn as large."""
-    from hoof_env.render.brush import Brush
     from hoof_env.render.outline import USUAL_HIP_M
     from hoof_env.render.scene import Scene
 
@@ -494,9 +318,9 @@ def test_what_is_around_a_small_leg_is_as_small():
         Scene(Brush(size), usual.scaled(factor), Terrain.flat(), size, right, "rail") for factor in (1.0, 0.2)
     )
     assert small._scale == pytest.approx(5 * large._scale)
-    assert small._trunk.get_size() == large._trunk.get_size()
+    assert small._trunk._image.get_size() == large._trunk._image.get_size()
     assert small._level == pytest.approx(large._level)
-    assert large._trunk.get_width() < size[0] - right
+    assert large._trunk._image.get_width() < size[0] - right
 
 
 @pytest.mark.parametrize(("lift_off", "unit"), [(0.0, "kN"), (28.0, "kN"), (2.0, "N")])

@@ -1,0 +1,81 @@
+"""The server of the live page: ports, addresses, its command, tabs beyond the limit."""
+
+from __future__ import annotations
+
+import asyncio
+import socket
+
+import pytest
+
+from hoof_env import cli
+from hoof_env.errors import MissingExtraError, ParameterError
+
+pytest.importorskip("bokeh")
+
+from tornado.httpclient import AsyncHTTPClient
+
+from hoof_env.view import server
+from hoof_env.view.server import Pages, start
+from tests.view.pages import SETUP, opened
+
+
+def test_a_port_that_is_taken_is_told():
+    with socket.socket() as taken:
+        taken.bind(("127.0.0.1", 0))
+        taken.listen()
+        with pytest.raises(ParameterError, match=r"port: expected a free one, \d+ is taken"):
+            start(SETUP, port=taken.getsockname()[1])
+    with pytest.raises(ParameterError, match="address"):
+        start(SETUP, address="203.0.113.7", port=0)
+    with pytest.raises(ParameterError, match=r"address: .* IPv4 .* got '::1'"):
+        start(SETUP, address="::1", port=0)
+
+
+@pytest.mark.parametrize(
+    "options", [["--id", "CartPole-v1"], ["--port", "99999"], ["--policy", "gallop"], ["--seed", "-1"]]
+)
+def test_the_command_refuses_before_it_serves(options, capsys):
+    assert cli.main(["view", "--no-open", *options]) == 2
+    assert "hoof-env: error" in capsys.readouterr().err
+
+
+def test_without_bokeh_the_command_says_how_to_get_it(monkeypatch):
+    monkeypatch.setattr(server, "find_spec", lambda name: None)
+    with pytest.raises(MissingExtraError, match=r'pip install "hoof-env\[view\]"'):
+        start(SETUP)
+
+
+def test_a_page_that_is_refused_takes_no_place_and_an_old_one_is_told(tmp_path):
+    pages = Pages(SETUP, tmp_path)
+    assert "too old" in opened(pages, setup=[b"guessed"]).template_variables["reason"]
+    kept = pages.keep(SETUP | {"seed": 7}).partition("=")[2]
+    doc = opened(pages, setup=[kept.encode()])
+    assert doc.template_variables["simulation"].seed == 7
+    assert len(pages._tabs) == 1
+
+
+def test_no_more_tabs_than_the_limit_however_fast_they_are_opened(tmp_path, monkeypatch):
+    """Requests that come in the same instant, before any browser is connected."""
+    monkeypatch.setattr(server, "MOST_TABS", 2)
+    running, url = start(SETUP, port=0, out=tmp_path)
+    loop = running.io_loop
+    client = AsyncHTTPClient()
+
+    async def load(count):
+        answers = [client.fetch(url, request_timeout=300, connect_timeout=300) for _ in range(count)]
+        return [(await answer).body.decode() for answer in answers]
+
+    async def at_last():
+        # Sessions without a browser are let go after a second.
+        for _ in range(50):
+            (page,) = await load(1)
+            if "Set-up" in page:
+                return page
+            await asyncio.sleep(0.2)
+        return page
+
+    pages = loop.run_sync(lambda: load(4))
+    assert sum("Set-up" in page for page in pages) == 2
+    assert sum('http-equiv="refresh"' in page and "2 tabs are open" in page for page in pages) == 2
+    assert "Set-up" in loop.run_sync(at_last)
+    running.stop()
