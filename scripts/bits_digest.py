@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from typing import Any
 
 import numpy as np
@@ -58,3 +58,7 @@ def as_bytes(value: Any) -> bytes:
     if array.dtype == object:
         return repr(array.tolist()).encode()
     return array.dtype.kind.encode() + str(array.shape).encode() + array.tobytes()
+
+
+Cases = Iterator[tuple[str, Digests]]
+"""Names of cases, and what was found in each."""

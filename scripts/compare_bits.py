@@ -8,8 +8,9 @@ between machines, so digests that were written elsewhere say nothing. Digests of
 runs/bits and are taken again only when the machine, the Python packages or the cases have changed.
 Exits with 1 where any digest differs, and names it.
 
-What is digested is in bits_cases.py, what must be refused in bits_refusals.py. Every quantity has a digest
-of its own; renamed.toml says which were renamed since the base, and which are meant to differ.
+What is digested is in bits_cases.py and bits_engines.py, what must be refused in bits_refusals.py. Every
+quantity has a digest of its own; renamed.toml says which were renamed since the base, and which are meant to
+differ.
 """
 
 from __future__ import annotations
@@ -38,7 +39,7 @@ from bits_refusals import refusals
 HERE = Path(__file__).resolve().parent
 ROOT = HERE.parent
 KEPT = ROOT / "runs" / "bits"
-CASES = ("bits_cases.py", "bits_digest.py", "bits_refusals.py")
+CASES = ("bits_cases.py", "bits_digest.py", "bits_engines.py", "bits_refusals.py")
 
 Found = dict[str, str]
 """Digests by name; of a refusal its words."""
