@@ -1,6 +1,6 @@
 """Processes that tests start: copies of one that has numba and the package imported, or fresh ones.
 
-An import takes half a second of processor time, a copy a hundredth of one.
+A fresh one takes nearly a second of processor time until its first kernel runs, a copy a thirtieth of that.
 """
 
 import multiprocessing
@@ -69,7 +69,7 @@ class Copy:
 
     def __init__(self, code, folder, environment):
         context = multiprocessing.get_context("forkserver")
-        context.set_forkserver_preload(["hoof_env.simd.compile"])
+        context.set_forkserver_preload(["tests.simd.warmed"])
         out, to_out = context.Pipe(duplex=False)
         err, to_err = context.Pipe(duplex=False)
         self._process = context.Process(target=run, args=(code, folder, environment, to_out, to_err))
