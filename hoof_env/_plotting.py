@@ -6,7 +6,7 @@ import io
 from pathlib import Path
 from typing import Any
 
-from hoof_env.errors import HoofEnvError
+from hoof_env.errors import MissingExtraError
 
 # Okabe and Ito's colours, which colour-blind readers can distinguish
 BLUE = "#0072B2"
@@ -32,14 +32,13 @@ STYLE: dict[Any, Any] = {
 """Settings of matplotlib for pictures on a page."""
 
 
-def check_matplotlib() -> None:
-    """Raise `HoofEnvError`, which says what to do, unless matplotlib can be imported."""
+def check_matplotlib(instead: str = "") -> None:
+    """Raise `MissingExtraError`, which says what to do, unless matplotlib can be imported; `instead` is what
+    else helps."""
     try:
         import matplotlib  # noqa: F401
     except ImportError:
-        raise HoofEnvError(
-            'figures need matplotlib: pip install "hoof-env[plot]", or leave them out with --no-figures'
-        ) from None
+        raise MissingExtraError(f'figures need matplotlib: pip install "hoof-env[plot]"{instead}') from None
 
 
 def save_png(figure: Any, path: Path, dpi: int = 110) -> None:

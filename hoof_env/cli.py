@@ -38,7 +38,7 @@ def reproduce(out: Path, figures: bool = True, preset: str | None = None) -> Non
     # Before the simulation, which takes a while.
     check_folder(out)
     if figures:
-        check_matplotlib()
+        check_matplotlib(", or leave them out with --no-figures")
     from hoof_env.paper.reproduce import reproduce, write_reproduction
 
     paths = write_reproduction(reproduce(_say, preset=preset), out, figures=figures, command=command)

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from hoof_env import records
 from hoof_env._output import staged
-from hoof_env.errors import HoofEnvError, ParameterError, check_number, parse_pairs
+from hoof_env.errors import HoofEnvError, MissingExtraError, ParameterError, check_number, parse_pairs
 from hoof_env.render.instant import Columns, instants
 
 if TYPE_CHECKING:
@@ -71,12 +71,13 @@ def check_film(path: Path, fps: float) -> None:
         HoofEnvError: pygame, imageio-ffmpeg or ffmpeg is missing.
     """
     check_number("fps", fps, low=0, high=1000, exclusive_low=True)
-    for name, package, extra in (
-        ("pygame", "pygame-ce", "render"),
-        ("imageio_ffmpeg", "imageio-ffmpeg", "video"),
-    ):
-        if find_spec(name) is None:
-            raise HoofEnvError(f'films need {package}: pip install "hoof-env[{extra}]"')
+    needed = {"pygame": ("pygame-ce", "render"), "imageio_ffmpeg": ("imageio-ffmpeg", "video")}
+    missing = [names for module, names in needed.items() if find_spec(module) is None]
+    if missing:
+        packages, extras = zip(*missing, strict=True)
+        raise MissingExtraError(
+            f'films need {" and ".join(packages)}: pip install "hoof-env[{",".join(extras)}]"'
+        )
     import imageio_ffmpeg
 
     try:

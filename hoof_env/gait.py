@@ -74,6 +74,11 @@ class GaitParameters:
 
     How fast a crank may be commanded to turn depends on the size of the leg; environments check it.
 
+    >>> import hoof_env
+    >>> slow = hoof_env.GaitParameters(crank_speed=3.0, swing_offset=0.7, swing_sin=-0.2, swing_cos=-0.3)
+    >>> slow.to_array().tolist()
+    [3.0, 0.7, -0.2, -0.3]
+
     Attributes:
         crank_speed: theta's rate [rad/s], 0 to `FASTEST_CRANK`; to 4 pi in environments of the published leg.
         swing_offset: phi0 [rad], -0.4 to 1.4.
@@ -220,6 +225,10 @@ def gait_names(preset: Preset = DEFAULT_PRESET) -> list[str]:
 
 def load_gait(name: str, preset: Preset = DEFAULT_PRESET) -> GaitParameters:
     """Return a gait of a preset by name, of a file by path, or of such a file's content.
+
+    >>> import hoof_env
+    >>> round(hoof_env.load_gait("run").crank_speed, 2)  # [rad/s]
+    6.28
 
     Raises:
         ParameterError: unknown preset or gait name, a value outside its limits, or content that lacks a part.

@@ -133,6 +133,8 @@ MISSING = [
     ("pygame", ["render", *MP4], r'pip install "hoof-env\[render\]"'),
     ("imageio_ffmpeg", ["render", *MP4], r'pip install "hoof-env\[video\]"'),
     ("pyarrow", ["export", "--out", "{}/x.parquet"], r'pip install "hoof-env\[export\]"'),
+    *((package, ["demo", "--out", "{}/demo"], rf'needs more: pip install "hoof-env\[{extra}\]"$')
+      for package, extra in (("matplotlib", "plot"), ("pygame", "render"), ("imageio_ffmpeg", "video"))),
 ]  # fmt: skip
 """Package, command and words."""
 

@@ -10,11 +10,12 @@ import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
+from importlib.util import find_spec
 from pathlib import Path
 
 from hoof_env._output import check_folder, staged
-from hoof_env._plotting import check_matplotlib
 from hoof_env.demo.report import OPEN_LOOP, Report, data_uri
+from hoof_env.errors import MissingExtraError
 from hoof_env.evaluation.scores import DEFAULT_ENV, Evaluation, Score, evaluate, text_table, write_json
 from hoof_env.evaluation.versions import versions
 from hoof_env.film import check_film, render_episode
@@ -37,6 +38,9 @@ QUICK_FILM_SECONDS = 0.4
 
 Say = Callable[[str], None]
 
+EXTRAS = {"plot": ("matplotlib", "jinja2"), "render": ("pygame",), "video": ("imageio_ffmpeg",)}
+"""Modules of the extras that the demonstration needs."""
+
 
 def demo(out: Path, quick: bool = False, say: Say = print) -> Path:
     """Make the report, and return its path.
@@ -51,7 +55,7 @@ def demo(out: Path, quick: bool = False, say: Say = print) -> Path:
         HoofEnvError: an extra is missing.
     """
     check_folder(out)
-    check_matplotlib()
+    check_extras()
     check_film(out / "film.mp4", 50.0)
     steps = Steps(3, say)
     command = shlex.join(["hoof-env", "demo", "--out", str(out), *(["--quick"] if quick else [])])
@@ -71,6 +75,14 @@ def demo(out: Path, quick: bool = False, say: Say = print) -> Path:
             )
             (stage / PAGE).write_text(report.html(), encoding="utf-8")
     return out / PAGE
+
+
+def check_extras() -> None:
+    """Raise `MissingExtraError` with all extras that are missing at once."""
+    missing = [extra for extra, modules in EXTRAS.items() if not all(map(find_spec, modules))]
+    if missing:
+        names = ",".join(missing)
+        raise MissingExtraError(f'the demonstration needs more: pip install "hoof-env[{names}]"')
 
 
 class Steps:

@@ -287,6 +287,13 @@ class RandomizeParameters(gym.Wrapper[Any, Any, Any, Any], RecordConstructorArgs
     The info of the reset contains the drawn values under "parameters". Vector environments have the argument
     `randomize` instead.
 
+    >>> import gymnasium as gym, hoof_env
+    >>> leg = gym.make("hoof_env/HorseLeg-v0")
+    >>> env = hoof_env.RandomizeParameters(leg, {"friction": (0.2, 0.6), "trunk_mass": 55.0})
+    >>> observation, info = env.reset(seed=0)
+    >>> 0.2 <= info["parameters"]["friction"] <= 0.6
+    True
+
     Args:
         env: environment of this package, wrapped or not.
         ranges: (lowest, highest) or a number, by the names of `settings.PER_EPISODE`.

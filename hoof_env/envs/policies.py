@@ -146,6 +146,12 @@ def make_policy(name: str, env: Any, seed: int = 0) -> Scripted:
     "airborne" turns it to its highest position and stops there. For a horse, "reference" is the zero action:
     the gait from which actions make offsets.
 
+    >>> import gymnasium as gym, hoof_env
+    >>> env = gym.make("hoof_env/HorseLeg-v0")
+    >>> policy = hoof_env.make_policy("run", env)
+    >>> observation, info = env.reset(seed=0, options=policy.start)
+    >>> action, _ = policy.predict(observation, episode_start=True)
+
     Args:
         name: one of `policy_names`.
         env: environment of this package, wrapped or not.

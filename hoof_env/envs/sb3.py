@@ -31,6 +31,13 @@ class Sb3VecEnv(VecEnv):
     `reset_infos` contains the info of the reset of each environment's present episode, drawn parameters
     included.
 
+    >>> import hoof_env
+    >>> from stable_baselines3 import PPO
+    >>> envs = hoof_env.Sb3VecEnv("hoof_env/HorseLeg-v0", num_envs=3)
+    >>> model = PPO("MlpPolicy", envs, device="cpu")
+    >>> model.predict(envs.reset())[0].shape
+    (3, 4)
+
     Args:
         env_id: registered id of this package.
         num_envs: number of environments.

@@ -54,6 +54,13 @@ class HorseLegVectorEnv(  # type: ignore[misc]  # generators are of all
 ):
     """`num_envs` environments of a task, stepped together.
 
+    >>> import gymnasium as gym, hoof_env
+    >>> envs = gym.make_vec("hoof_env/HorseLeg-v0", num_envs=3)
+    >>> observations, infos = envs.reset(seed=0)
+    >>> observations, rewards, terminated, truncated, infos = envs.step(envs.action_space.sample())
+    >>> observations.shape, rewards.shape
+    ((3, 22), (3,))
+
     Args:
         num_envs: number of environments, 1 to `MOST_ENVS`.
         num_threads: threads that share the environments in a step; their number changes no bit.

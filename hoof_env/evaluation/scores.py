@@ -111,6 +111,12 @@ def evaluate(
 ) -> Evaluation:
     """Play the same episodes with several policies.
 
+    >>> from hoof_env.evaluation.scores import evaluate
+    >>> found = evaluate(["run", "shipped"], "hoof_env/HorseLeg-v0", episodes=2)
+    >>> run, shipped = found.scores
+    >>> shipped.estimates["return"].mean > run.estimates["return"].mean
+    True
+
     Args:
         policies: policies as `load_policy` takes them as texts.
         env_id: id of the environment; None takes that of the first policy from a file, or HorseLeg-v0.
@@ -126,20 +132,23 @@ def evaluate(
     seeds = _seeds(episodes, seed, published)
     if not policies:
         raise ParameterError("policy: expected a name or the path of a trained model, got none")
-    known, of_record = _environment(policies, env_id, published)
+    known, of_record, file = _environment(policies, env_id, published)
     arguments = dict(of_record if env_kwargs is None else env_kwargs)
-    with make_env(known, **arguments) as env:
+    with _made(known, arguments, file if env_kwargs is None else "") as env:
         find = _find_same if published else find_policy
         # All are found before the first is played.
         found = {name: find(name, env, known) for name in policies}
         tell = _Progress(len(found) * len(seeds))
         scores = []
         for name, policy in found.items():
-            if published:
-                played = score_vector(policy, known, seeds, **arguments)
-                tell(len(seeds))
-            else:
-                played = play(env, policy, seeds, tell)
+            try:
+                if published:
+                    played = score_vector(policy, known, seeds, **arguments)
+                    tell(len(seeds))
+                else:
+                    played = play(env, policy, seeds, tell)
+            except ParameterError as error:
+                raise _of_policy(name, error) from error
             scores.append(Score(name, played))
     return Evaluation(known, arguments, seeds, scores)
 
@@ -158,15 +167,33 @@ def _seeds(episodes: int | None, seed: int | None, published: bool) -> range:
     return range(first, first + count)
 
 
-def _environment(policies: Sequence[str], env_id: str | None, published: bool) -> tuple[str, dict[str, Any]]:
-    """Return id and arguments of the environment: `env_id`, else those of the first policy with a file."""
+def _made(env_id: str, arguments: Mapping[str, Any], file: str) -> gym.Env[Any, Any]:
+    """Make the environment; an error of arguments that come from a policy's file names the file."""
+    try:
+        return make_env(env_id, **arguments)
+    except ParameterError as error:
+        if not (file and arguments):
+            raise
+        raise DataFileError(f"{file}: its record has arguments that do not fit: {error}") from None
+
+
+def _of_policy(name: str, error: ParameterError) -> ParameterError:
+    """Return an error in the play of a policy with the policy's name, where it lacks it."""
+    return error if name in str(error) else ParameterError(f"policy {name}: {error}")
+
+
+def _environment(
+    policies: Sequence[str], env_id: str | None, published: bool
+) -> tuple[str, dict[str, Any], str]:
+    """Return id and arguments of the environment, `env_id`, else those of the first policy with a file; and
+    the name of that policy, "" without one."""
     records = {name: read_policy_record(name) for name in policies if not is_function(name)}
     for name in filter(is_model, records):
         if published and name != "shipped" and not records[name].get("env_id"):
             warnings.warn(f"policy {name}: nothing says what it was trained for", stacklevel=3)
     name, record = next(((name, record_of) for name, record_of in records.items() if record_of), ("", {}))
     known, arguments = environment_of(name, record, env_id)
-    return known or DEFAULT_ENV, arguments
+    return known or DEFAULT_ENV, arguments, name
 
 
 def _find_same(name: str, env: gym.Env[Any, Any], env_id: str) -> Any:

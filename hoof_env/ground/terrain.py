@@ -37,6 +37,10 @@ class Terrain:
     normal jump, and so does the force on a point inside the ground: make a sharp corner of several small
     ones.
 
+    >>> import hoof_env
+    >>> ramp = hoof_env.Terrain(height=(0.0, 0.0, 0.1), friction=(1.0, 1.0, 0.5), spacing=2.0)
+    >>> hill = hoof_env.Terrain.slope(0.05)  # [rad]
+
     Attributes:
         height: heights at the knots [m].
         stiffness: factors on `Ground.stiffness` at the knots [-]; a number is for all knots.

@@ -14,12 +14,12 @@ import numpy as np
 
 from hoof_env.envs.policies import constant_gait, load_open_loop, make_policy, open_loop_record, policy_names
 from hoof_env.envs.shipped import SHIPPED
-from hoof_env.errors import DataFileError, MissingExtraError, ParameterError
+from hoof_env.errors import DataFileError, MissingExtraError, ParameterError, count
 from hoof_env.gait import PARAMETERS, GaitParameters
 from hoof_env.policies.onnx_file import FILE, OnnxPolicy
 from hoof_env.policies.plain import ABOUT, NumpyPolicy
 from hoof_env.policies.record import own_id, same_id
-from hoof_env.policies.saved import SavedModel
+from hoof_env.policies.saved import CHECKPOINTS, SavedModel
 
 MODEL = "model.zip"
 
@@ -52,8 +52,7 @@ def is_model(name: str) -> bool:
     is_path = (
         name.lower().endswith((".zip", ".onnx"))
         or Path(name).name != name
-        or (Path(name) / MODEL).is_file()
-        or (Path(name) / ABOUT).is_file()
+        or any((Path(name) / part).exists() for part in (MODEL, ABOUT, FILE, CHECKPOINTS))
     )
     return (is_path and not name.endswith(".json")) or name == "shipped"
 
@@ -90,7 +89,8 @@ class Function:
     ) -> tuple[Any, Any]:
         """Return actions for observations, shape (n, k) or (k,); `ParameterError` if the function does not
         fit."""
-        rows = np.atleast_2d(observation)
+        # A copy, which the function may change
+        rows = np.array(observation, ndmin=2)
         try:
             actions = np.asarray(self.act(rows), np.float32)
         except (TypeError, ValueError) as error:
@@ -231,16 +231,23 @@ def load_policy(policy: Any, env: gym.Env[Any, Any] | None = None, seed: int = 0
     """
     if env is None:
         return _load_alone(policy)
+    if not isinstance(env, gym.Env):
+        raise ParameterError(
+            "env: expected a single environment, as gymnasium.make returns it, for its policy plays many"
+            f" observations, too: load_policy(policy, env); got {env!r}"
+        )
+    count("seed", seed, low=0)
     spec = env.spec
     if callable(policy) and not isinstance(policy, type):
-        count = gym.spaces.flatdim(env.action_space)
-        return Function(getattr(policy, "__name__", repr(policy)), policy, count)
+        actions = gym.spaces.flatdim(env.action_space)
+        return Function(getattr(policy, "__name__", repr(policy)), policy, actions)
     if isinstance(policy, GaitParameters):
         return constant_gait(policy, env, starts_in_it=True)
     if isinstance(policy, (tuple, list, np.ndarray)):
-        if np.shape(policy) != (len(PARAMETERS),):
+        values = policy.tolist() if isinstance(policy, np.ndarray) else list(policy)
+        if not isinstance(values, list) or len(values) != len(PARAMETERS):
             raise ParameterError(f"policy: expected four gait parameters, got {policy!r}")
-        return constant_gait(GaitParameters(*map(float, policy)), env, starts_in_it=True)
+        return constant_gait(GaitParameters(*values), env, starts_in_it=True)
     if not isinstance(policy, (str, Path)):
         raise ParameterError(f"policy: expected a name, a path, a gait or a function, got {policy!r}")
     name = str(policy)

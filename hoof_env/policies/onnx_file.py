@@ -72,7 +72,7 @@ class OnnxPolicy(FilePolicy):
             read = self.path.read_bytes() if content is None else content
             self._session = onnxruntime.InferenceSession(read, options, ["CPUExecutionProvider"])
             metadata = self._session.get_modelmeta().custom_metadata_map
-            self.record = {key: parse_json(text) if key in LISTS else text for key, text in metadata.items()}
+            self.record = {key: _entry(key, text) for key, text in metadata.items()}
             self._read_graph()
         # Exceptions of onnxruntime have no common base.
         except Exception as error:
@@ -85,10 +85,8 @@ class OnnxPolicy(FilePolicy):
     def _read_graph(self) -> None:
         """Read the names and the types of input and output; raise ValueError where they, or the metadata, are
         none of a policy."""
-        if "env_id" not in self.record:
+        if not self.record.get("env_id"):
             raise ValueError("its metadata name no environment; hoof_env.stamp_onnx(path, env) adds them")
-        if not all(isinstance(self.record.get(key, {}), dict) for key in OBJECTS):
-            raise ValueError(f"metadata {self.record}")
         inputs = self._session.get_inputs()
         names = [node.name for node in self._session.get_outputs()]
         if len(inputs) != 1 or len(inputs[0].shape) != 2 or inputs[0].type not in NUMBERS:
@@ -109,11 +107,30 @@ class OnnxPolicy(FilePolicy):
 
     def act(self, observations: NDArray[np.floating[Any]]) -> NDArray[np.float32]:
         rows = observations.reshape(-1, observations.shape[-1])
+        if isinstance(self._batch, int) and len(rows) % self._batch:
+            raise ParameterError(
+                f"observation: expected a multiple of {self._batch} rows, which the graph of {self.path.name}"
+                f" takes at once, got {len(rows)}; export it with a batch of any size"
+            )
         # An exporter may have fixed the number of rows, as a rule to one.
         parts = [rows] if not isinstance(self._batch, int) else np.split(rows, len(rows) // self._batch)
         results = [self._session.run([self._output], {self._input: part})[0] for part in parts]
         actions = np.concatenate(results).astype(np.float32)
         return actions.reshape(*observations.shape[:-1], actions.shape[-1])
+
+
+def _entry(key: str, text: str) -> Any:
+    """Return an entry of the metadata; raise ValueError for one that is not of its type."""
+    if key not in LISTS:
+        return text
+    try:
+        value = parse_json(text)
+    except ValueError:
+        value = None
+    kind, words = (dict, "object") if key in OBJECTS else (list, "list")
+    if not isinstance(value, kind):
+        raise ValueError(f"metadata {key}: expected a JSON {words}, got {text[:80]!r}")
+    return value
 
 
 def stamp_onnx(path: str | Path, env: gym.Env[Any, Any], **record: str) -> OnnxPolicy:
@@ -125,6 +142,11 @@ def stamp_onnx(path: str | Path, env: gym.Env[Any, Any], **record: str) -> OnnxP
     gives them, (batch, k), and give mean actions, (batch, n), as the output "action" or the first one; with a
     batch of fixed size that is 1. Actions beyond [-1, 1] are clipped by the environment.
 
+    >>> import gymnasium as gym, hoof_env
+    >>> env = gym.make("hoof_env/HorseLeg-v0")
+    >>> policy = hoof_env.stamp_onnx("mine.onnx", env, algo="ppo")  # doctest: +SKIP
+    >>> action, _ = policy.predict(env.reset(seed=0)[0])  # doctest: +SKIP
+
     Args:
         path: the file.
         env: the environment for which the policy was trained, made by `gymnasium.make`.
@@ -133,18 +155,25 @@ def stamp_onnx(path: str | Path, env: gym.Env[Any, Any], **record: str) -> OnnxP
     Raises:
         DataFileError: there is no such file, or it does not answer observations of `env` with its actions.
             The file is as it was.
-        ParameterError: `env` was not made by `gymnasium.make`.
+        ParameterError: `env` was not made by `gymnasium.make`, the file does not end in .onnx, or `record`
+            has an entry that is read off `env`.
         MissingExtraError: onnx is not installed (extra "onnx").
     """
     try:
         import onnx
     except ImportError:
         raise MissingExtraError('stamping an ONNX file needs onnx: pip install "hoof-env[onnx]"') from None
+    if not isinstance(env, gym.Env) or env.spec is None:
+        raise ParameterError(
+            f"env: expected a single environment made by gymnasium.make, stamp_onnx(path, env), got {env!r}"
+        )
+    if not isinstance(path, (str, Path)) or Path(path).suffix.lower() != ".onnx":
+        raise ParameterError(f"path: expected that of a file that ends in .onnx, got {path!r}")
     file = Path(path)
-    if env.spec is None:
-        raise ParameterError(f"env: expected an environment made by gymnasium.make, got {env!r}")
-    env_kwargs = arguments_of(env)
-    metadata = about(env, env.spec.id, env_kwargs, {}) | record
+    known = about(env, env.spec.id, arguments_of(env), {})
+    if taken := sorted(known.keys() & record):
+        raise ParameterError(f"record: expected entries besides those that are read off env, got {taken}")
+    metadata = known | record
     try:
         graph = onnx.load(file)
     # Damaged files raise exceptions of any type.

@@ -116,10 +116,11 @@ def environment_of(
     asks |= {"task": kwargs["task"]} if ":" in str(kwargs.get("task", "")) else {}
     for name, asked in asks.items():
         if own_id(asked) not in gym.registry:
-            option = f"--env-id {asked}" if name == "env_id" else "--env-id, with the task as its argument"
+            option = f"--id {asked}" if name == "env_id" else "--id, with the task as its argument"
             raise DataFileError(
-                f"{path}: expected the id of an environment that is registered here, got {name} {asked!r}; a "
-                f"file must not import a module. If you trust it, name it yourself: {option}"
+                f"{path}: expected the id of an environment that is registered here, got {name} {asked!r}; a"
+                f" file must not import a module. If you trust it, name it yourself: {option} (of agents:"
+                " --env-id)"
             )
     if "task" in asks:
         kwargs = kwargs | {"task": registered_task(asks["task"])}
@@ -156,7 +157,10 @@ def refuse_misfit(path: Path, there: dict[str, Any], here: dict[str, Any]) -> No
     for key, expected in compared.items():
         trained = there.get(key, expected)
         if trained != expected and not (key == "env_id" and same_id(trained, expected)):
-            unlike.append(f"{key} {trained}, expected {expected}")
+            unlike.append(_difference(key, trained, expected))
+        # What follows from another environment is not told
+        if key == "env_id" and unlike:
+            break
     if is_old:
         unlike.insert(0, f"actions of an older form (positions in a box), expected {here['actions']}")
     if unlike:
@@ -165,6 +169,16 @@ def refuse_misfit(path: Path, there: dict[str, Any], here: dict[str, Any]) -> No
         if name_there == name_here != "" and version_there != version_here:
             unlike.append("another version of an id is another task")
         raise DataFileError(f"policy {path}: trained for {'; '.join(unlike)}")
+
+
+def _difference(key: str, trained: Any, expected: Any) -> str:
+    """Write how an entry differs; of names only those that are more or fewer."""
+    if not (isinstance(trained, list) and isinstance(expected, list)):
+        return f"{key} {trained}, expected {expected}"
+    more = [str(name) for name in trained if name not in expected]
+    fewer = [str(name) for name in expected if name not in trained]
+    words = [f"{word} {', '.join(names)}" for word, names in (("with", more), ("without", fewer)) if names]
+    return f"{key} {' and '.join(words) or 'in another order'}, expected {len(expected)} of this environment"
 
 
 def check_record(path: Path, record: dict[str, Any], env: Any, env_id: str) -> None:

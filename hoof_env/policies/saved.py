@@ -15,6 +15,7 @@ from __future__ import annotations
 import json
 import math
 import warnings
+import zipfile
 from dataclasses import dataclass
 from importlib import import_module
 from pathlib import Path
@@ -53,6 +54,22 @@ ALGORITHMS = {
     "tqc": "sb3_contrib",
 }
 """Module of each algorithm's class; agents/hyperparams has a file for each."""
+
+
+MARKS = {"tqc": "top_quantiles_to_drop_per_net", "sac": "target_entropy", "td3": "policy_delay"}
+"""Entry by which the data in a .zip are known to be of an algorithm; TQC has that of SAC, too."""
+
+
+def algorithm_of(path: Path) -> str:
+    """Return the algorithm of `ALGORITHMS` that plays a .zip of Stable-Baselines3, "ppo" for those without a
+    mark, among them A2C, whose policy is that of PPO. Nothing is unpickled.
+
+    Raises:
+        OSError, KeyError, ValueError, zipfile.BadZipFile: not such a file.
+    """
+    with zipfile.ZipFile(path) as file:
+        entries = parse_json(file.read("data"))
+    return next((algo for algo, mark in MARKS.items() if mark in entries), "ppo")
 
 
 def algorithm_class(name: str) -> Any:
@@ -167,7 +184,8 @@ class SavedModel:
         """Load the .zip and the statistics of observations next to it, if there are any."""
         from stable_baselines3.common.vec_env import DummyVecEnv, VecNormalize
 
-        model = algorithm_class(self.record.get("algo", "ppo")).load(self.path, device="cpu")
+        algo = self.record.get("algo") or algorithm_of(self.path)
+        model = algorithm_class(algo).load(self.path, device="cpu")
         statistics = self.path.with_name(STATISTICS)
         if not statistics.is_file():
             return TrainedPolicy(model, None)

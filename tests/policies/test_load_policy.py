@@ -1,6 +1,7 @@
 """Policies by whatever names them: each plays as it should, and what does not fit says why."""
 
 import warnings
+import zipfile
 
 import gymnasium as gym
 import numpy as np
@@ -103,6 +104,10 @@ def test_settings_that_differ_are_told_and_the_default_ones_are_not():
         ("gallop", r"expected a name \(.*run.*open-loop, shipped\).*got 'gallop'"),
         ((1.0, 2.0), r"expected four gait parameters, got \(1\.0, 2\.0\)"),
         ((1e3, 0.0, 0.0, 0.0), "crank_speed"),
+        (["6.28", "0", "0", "x"], "crank_speed: expected a finite number .* got '6.28'"),
+        ([[1], [2, 3], 4, 5], r"crank_speed: expected a finite number .* got \[1\]"),
+        (np.array(3.0), "expected four gait parameters"),
+        ([[1, 2, 3, 4]], "expected four gait parameters"),
         (3, "expected a name, a path, a gait or a function, got 3"),
         ("none.zip", r"none\.zip"),
         ("none.onnx", r"none\.onnx"),
@@ -112,6 +117,57 @@ def test_settings_that_differ_are_told_and_the_default_ones_are_not():
 def test_what_does_not_fit_is_refused(policy, words, env):
     with pytest.raises((ParameterError, DataFileError), match=words):
         hoof_env.load_policy(policy, env)
+
+
+@pytest.mark.parametrize("seed", ["3", -1, 1.5, None])
+def test_a_seed_that_is_none_is_refused(seed, env):
+    with pytest.raises(ParameterError, match="seed: expected a whole number, 0 or more, got"):
+        hoof_env.load_policy("random", env, seed=seed)
+
+
+def test_what_is_no_environment_is_refused(env):
+    """An id, arguments in the other order, and a vector environment."""
+    envs = hoof_env.HorseLegVectorEnv(2)
+    for policy, given in (("shipped", ENV_ID), (env, "shipped"), ("shipped", envs)):
+        with pytest.raises(ParameterError, match=r"env: expected a single environment.*load_policy\("):
+            hoof_env.load_policy(policy, given)
+
+
+def test_a_function_may_change_its_observations_and_not_ours(env):
+    def greedy(observations):
+        observations[:] = 9.0
+        return observations[:, :4]
+
+    seen = np.linspace(-1, 1, 22, dtype=np.float32)
+    kept = seen.copy()
+    np.testing.assert_array_equal(hoof_env.load_policy(greedy, env).predict(seen)[0], np.full(4, 9.0))
+    np.testing.assert_array_equal(seen, kept)
+
+
+@pytest.mark.filterwarnings("ignore:.*pickle")
+@pytest.mark.parametrize("algo", ["PPO", "A2C", "SAC", "TD3", "TQC"])
+def test_a_zip_of_any_algorithm_is_played_without_a_record(algo, env, tmp_path):
+    """As `model.save` writes it, without a folder of agents.train around it."""
+    stable_baselines3 = pytest.importorskip("stable_baselines3")
+    module = pytest.importorskip("sb3_contrib") if algo == "TQC" else stable_baselines3
+    few = {} if algo in ("PPO", "A2C") else {"buffer_size": 10}
+    small = {"net_arch": [8]}
+    model = getattr(module, algo)("MlpPolicy", env, policy_kwargs=small, device="cpu", seed=0, **few)
+    model.save(tmp_path / "mine.zip")
+    seen = np.linspace(-1, 1, 22, dtype=np.float32)
+    played = hoof_env.load_policy(tmp_path / "mine.zip", env).predict(seen)[0]
+    np.testing.assert_array_equal(played, model.predict(seen, deterministic=True)[0])
+
+
+@pytest.mark.filterwarnings("ignore:.*pickle")
+def test_a_zip_that_is_no_model_is_one_error(env, tmp_path):
+    pytest.importorskip("stable_baselines3")
+    path = tmp_path / "mine.zip"
+    for name, content in (("a.txt", "x"), ("data", "["), ("data", "{}"), ("data", "3")):
+        with zipfile.ZipFile(path, "w") as file:
+            file.writestr(name, content)
+        with pytest.raises(DataFileError, match=r"mine\.zip: expected a model saved by Stable-Baselines3"):
+            hoof_env.load_policy(path, env)
 
 
 def test_what_needs_an_environment_says_so():

@@ -1,11 +1,14 @@
 """ONNX files of other exporters, written here by hand: what fits is marked, the rest left alone."""
 
+from pathlib import Path
+
 import gymnasium as gym
 import numpy as np
 import pytest
 
 import hoof_env
-from hoof_env.errors import DataFileError, ParameterError
+from hoof_env.errors import DataFileError, HoofEnvError, ParameterError
+from hoof_env.evaluation.scores import evaluate
 
 onnx = pytest.importorskip("onnx")
 pytest.importorskip("onnxruntime")
@@ -91,7 +94,8 @@ def test_the_output_of_the_name_action_is_taken(env, tmp_path):
         ({"outputs": 3}, r"expected actions of shape \(16, 4\) .* got shape \(16, 3\)"),
         ({"before": ("value",)}, r"got shape \(16, 22\)"),
         ({"scale": np.nan}, "got numbers that are not finite"),
-        ({"batch": 5}, "with a batch of any size"),
+        ({"batch": 5}, "expected a multiple of 5 rows, .* got 16; export it with a batch of any size"),
+        ({"batch": 8}, "expected a multiple of 8 rows, .* got 1; export it with a batch of any size"),
     ],
 )  # fmt: skip
 def test_what_does_not_answer_is_left_alone(env, tmp_path, arguments, words):
@@ -114,3 +118,89 @@ def test_what_is_no_graph_or_no_made_environment(env, tmp_path):
     write(path)
     with hoof_env.HorseLegEnv() as bare, pytest.raises(ParameterError, match=r"made by gymnasium\.make"):
         hoof_env.stamp_onnx(path, bare)
+
+
+def test_a_stamp_says_nothing_else_than_the_environment(env, tmp_path):
+    path = tmp_path / "mine.onnx"
+    write(path)
+    before = path.read_bytes()
+    for entry in ("env_id", "actions", "settings", "hoof_env"):
+        with pytest.raises(ParameterError, match=rf"besides those that are read off env, got \['{entry}'\]"):
+            hoof_env.stamp_onnx(path, env, **{entry: "other"})
+    assert path.read_bytes() == before
+
+
+def test_arguments_that_are_no_file_or_no_environment(env, tmp_path):
+    path = tmp_path / "mine.onnx"
+    write(path)
+    other = tmp_path / "mine.bin"
+    write(other)
+    envs = hoof_env.HorseLegVectorEnv(2)
+    for given in (ENV_ID, envs, None):
+        with pytest.raises(ParameterError, match=r"env: expected a single environment made by"):
+            hoof_env.stamp_onnx(path, given)
+    for given in (other, 3, tmp_path):
+        with pytest.raises(ParameterError, match=r"path: expected that of a file that ends in \.onnx, got"):
+            hoof_env.stamp_onnx(given, env)
+
+
+@pytest.mark.parametrize(
+    ("entry", "text", "words"),
+    [
+        ("env_kwargs", "[1]", r"metadata env_kwargs: expected a JSON object, got '\[1\]'"),
+        ("env_kwargs", "{", "metadata env_kwargs: expected a JSON object, got '{'"),
+        ("settings", "3", "metadata settings: expected a JSON object, got '3'"),
+        ("observation_names", '"abc"', "metadata observation_names: expected a JSON list, got '\"abc\"'"),
+        ("observation_names", '["height", "wings"]', "observation_names with wings and without sin"),
+        ("env_id", "", "name no environment"),
+        ("env_id", "hoof_env/HorseLegRail-v0", "env_id hoof_env/HorseLegRail-v0, expected [^;]*$"),
+        ("action_space", "Box(3)", r"action_space Box\(3\), expected Box"),
+    ],
+)  # fmt: skip
+def test_metadata_that_do_not_fit_are_named(env, tmp_path, entry, text, words):
+    path = tmp_path / "mine.onnx"
+    write(path)
+    hoof_env.stamp_onnx(path, env)
+    change(path, **{entry: text})
+    with pytest.raises(DataFileError, match=words):
+        hoof_env.load_policy(path, env)
+
+
+def change(path, **metadata):
+    """Metadata of a stamped file, as a text editor may leave them."""
+    model = onnx.load(path)
+    kept = {each.key: each.value for each in model.metadata_props}
+    onnx.helper.set_model_props(model, kept | metadata)
+    onnx.save(model, path)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "metadata", "words"),
+    [
+        ({"scale": np.nan}, {}, r"policy .*mine\.onnx: action: expected finite numbers"),
+        ({"outputs": 3}, {}, r"policy .*mine\.onnx: action: expected 4 finite numbers"),
+        ({"inputs": 21}, {}, r"observation: expected shape \(\.\.\., 21\) as the policy mine\.onnx takes"),
+        ({"batch": 8}, {}, r"mine\.onnx takes at once, got 1"),
+        ({}, {"env_kwargs": '{"wings": 2}'}, r"mine\.onnx: its record has arguments .* argument 'wings'"),
+        ({}, {"env_kwargs": '{"friction": "x"}'}, r"mine\.onnx: its record has arguments .* got 'x'"),
+        ({}, {"env_id": "my/Leg-v0"}, "must not import a module.* --id my/Leg-v0"),
+    ],
+)  # fmt: skip
+def test_what_a_file_does_in_an_evaluation_is_told_with_its_name(env, tmp_path, arguments, metadata, words):
+    """Metadata of a file that fits, on a graph that does not."""
+    path = tmp_path / "mine.onnx"
+    write(path)
+    hoof_env.stamp_onnx(path, env)
+    stamped = {each.key: each.value for each in onnx.load(path).metadata_props}
+    write(path, **arguments)
+    change(path, **stamped | metadata)
+    with pytest.raises(HoofEnvError, match=words):
+        evaluate([str(path)], episodes=1)
+
+
+def test_a_folder_of_an_exported_policy_says_for_which_environment_it_is(env, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    Path("mine").mkdir()
+    write("mine/policy.onnx")
+    hoof_env.stamp_onnx("mine/policy.onnx", env)
+    assert evaluate(["mine"], episodes=1).env_kwargs == SETTINGS
