@@ -423,11 +423,6 @@ def _read_file(source: str | Path) -> dict[str, Any]:
 def load_geometry(source: Preset = DEFAULT_PRESET) -> Geometry:
     """Return the geometry of a preset by name, of a file by path, or of such a file's content.
 
-    >>> import hoof_env
-    >>> leg = hoof_env.load_geometry("identified")
-    >>> round(leg.hip_height, 2)  # [m]
-    1.7
-
     Raises:
         ParameterError: unknown preset name, a value out of range, or content that lacks a part.
         DataFileError: the file is unreadable, lacks a part or has unknown entries.
