@@ -140,6 +140,7 @@ def main(argv: list[str] | None = None) -> None:
         returns[env_id] = returns_of(env_id, known.get(env_id, {}))
         print(env_id, returns[env_id], flush=True)
     runs.write_text(path, json.dumps(returns, indent=1) + "\n")
+    print("next: hoof-env manual --out docs/environments --films agents/policies")
 
 
 if __name__ == "__main__":

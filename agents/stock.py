@@ -263,6 +263,8 @@ def main(argv: list[str] | None = None) -> None:
     args = tyro.cli(Args, args=argv, prog="python -m agents.stock", description=__doc__)
     stock(args)
     print(f"written: {folder_of(args)}")
+    if folder_of(args) == OUT:
+        print("next: python -m agents.gallery, which tells the pages of the ids")
 
 
 if __name__ == "__main__":

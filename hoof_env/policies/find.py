@@ -32,7 +32,10 @@ def shipped_ids() -> list[str]:
 def shipped_policy(env_id: str) -> NumpyPolicy:
     """Return the trained policy that ships for an id; raise `DataFileError` if there is none."""
     if own_id(env_id) not in shipped_ids():
-        raise DataFileError(f"policy: none ships for {env_id}; expected one of {', '.join(shipped_ids())}")
+        known = ", ".join(shipped_ids())
+        raise DataFileError(
+            f"policy: none ships for {env_id}; expected one of {known}, which load_policy(id) plays elsewhere"
+        )
     return NumpyPolicy(SHIPPED / own_id(env_id).rpartition("/")[2])
 
 
