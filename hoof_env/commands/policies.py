@@ -61,6 +61,8 @@ def evaluate(
     say(f"{found.env_id}{with_what}, episodes {found.seeds[0]:,} to {found.seeds[-1]:,}\n")
     say(scores.published_lines(found.scores) if published else scores.text_table(found.scores))
     if out is not None:
+        # Another command may have written it meanwhile
+        check_new(out, overwrite)
         scores.WRITERS[out.suffix.lower()](found, out)
         say(f"\n{out}: {size(out)}{made}")
 

@@ -291,7 +291,7 @@ class RandomizeParameters(gym.Wrapper[Any, Any, Any, Any], RecordConstructorArgs
     >>> leg = gym.make("hoof_env/HorseLeg-v0")
     >>> env = hoof_env.RandomizeParameters(leg, {"friction": (0.2, 0.6), "trunk_mass": 55.0})
     >>> observation, info = env.reset(seed=0)
-    >>> 0.2 <= info["parameters"]["friction"] <= 0.6
+    >>> bool(0.2 <= info["parameters"]["friction"] <= 0.6)
     True
 
     Args:

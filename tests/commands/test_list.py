@@ -53,3 +53,19 @@ def test_a_refusal_is_one_line(arguments, words, capsys, monkeypatch, tmp_path):
     assert re.search(words, said), said
     assert said.count("\n") == 1
     assert not [*tmp_path.iterdir()]
+
+
+def test_a_file_that_another_command_wrote_meanwhile_stays(monkeypatch, tmp_path, capsys):
+    """The table is printed all the same."""
+    out = tmp_path / "scores.csv"
+
+    def play(*_):
+        out.write_text("theirs", encoding="utf-8")
+        return [{"return": 1.0}]
+
+    monkeypatch.setattr("hoof_env.evaluation.scores.play", play)
+    assert cli.main(["evaluate", "run", "--episodes", "1", "--out", str(out)]) == 2
+    said = capsys.readouterr()
+    assert "exists already; name another file, or add --overwrite" in said.err
+    assert "run" in said.out
+    assert out.read_text(encoding="utf-8") == "theirs"
