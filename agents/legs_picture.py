@@ -37,7 +37,7 @@ def draw(presets: Sequence[str], gaits: Gaits, path: Path) -> None:
             draw_leg(top, load_geometry(preset), gaits[preset]["walk"])
             top.set_title(preset)
             draw_forces(bottom, preset, gaits[preset])
-        above[1].legend(loc="upper center")
+        above[0].legend(loc="upper right")
         above[0].set_ylabel("height, hip heights")
         below[0].set_ylabel("normal force, weights")
         below[-1].legend(loc="upper right")

@@ -60,7 +60,7 @@ TERMS = {
     ),
 }
 
-HEAVIER: Mapping[str, float] = {"loading_2": 2.0, "loading_4": 4.0, "loading_10": 10.0}
+HEAVIER: Mapping[str, float] = {"loading_2": 2.0, "loading_3": 3.0, "loading_4": 4.0}
 """Factors of the weight of the loading rate, with the other terms of HorseLeg-v0."""
 
 CHARGES = (*TERMS, "own", *HEAVIER)
