@@ -327,6 +327,9 @@ def test_an_edit_of_the_users_file_compiles_anew_and_nothing_else_does(tmp_path)
     assert exchanged != USER
     (tmp_path / "mine.py").write_text(textwrap.dedent(exchanged))
     assert rewards("A", "B") == [(0.4, False), (0.04, False)]
+    edited = USER.replace("PAY = 1.0", "PAY = 3.0").replace("2.0 * x", "5.0 * x")
+    (tmp_path / "mine.py").write_text(textwrap.dedent(edited))
+    assert rewards("A") == [(0.3, True)]
 
 
 # The page
