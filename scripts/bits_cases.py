@@ -1,4 +1,4 @@
-"""What compare_bits.py digests: environments, files, pictures, policies, training; engines are in
+"""Cases that compare_bits.py digests: environments, files, pictures, policies, training; engines are in
 bits_engines.py.
 
 Each part yields pairs of a case's name and its `Digests`. A part calls only what both commits have:

@@ -1,4 +1,4 @@
-"""What compare_bits.py digests of engines: the package's, one and nine at once, and the paper's own solver.
+"""Cases of engines that compare_bits.py digests: the package's, one and nine at once, and the paper's solver.
 
 Each part yields pairs of a case's name and its `Digests`, as those of bits_cases.py do.
 """

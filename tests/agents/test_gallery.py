@@ -1,4 +1,4 @@
-"""What the page of all ids says of learning is read off the curves of stock learners, for ids with curves."""
+"""Learning on the page of all ids is read off the curves of stock learners, for ids with curves."""
 
 import json
 

@@ -1,4 +1,4 @@
-"""What a process imports before it is copied: numba, with its compiler set up by a first function."""
+"""Imports of a process before it is copied: numba, with its compiler set up by a first function."""
 
 import numba
 

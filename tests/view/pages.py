@@ -37,7 +37,7 @@ class Page:
 
     @property
     def news(self):
-        """What was sent last: row, curves and terms by name, and True if they begin anew."""
+        """Return the last message: row, curves and terms by name, and True if they begin anew."""
         player = self.tab.player
         anew, *counts = self.tab.wire.news[:3]
         names = [[*player.history.between(-1, 1e9)[0]], ["time", *player.simulation.terms]]
