@@ -23,6 +23,7 @@ from hoof_env.dynamics.parts import (
     Result,
     Trunk,
 )
+from hoof_env.dynamics.push import push_kernel
 from hoof_env.dynamics.reactions import reactions_layout
 from hoof_env.errors import (
     Floats,
@@ -224,30 +225,28 @@ class EngineMemory(Mechanics):
         self._put(kept)
 
     def push(self, forward: ArrayLike, upward: ArrayLike = 0.0, envs: ArrayLike | None = None) -> None:
-        """Push trunks at their centres of mass. Reports show the new velocity from the next call on.
+        """Push trunks at their centres of mass, which turns cranks with motors, too. Reports show the new
+        velocities from the next call on.
 
         Args:
             forward, upward: impulses [N s], one number, or one for each environment that is pushed.
             envs: environments that are pushed, as indices or as a mask of shape (num_envs,); None is all.
 
         Raises:
-            ParameterError: an impulse beyond `MOST_IMPULSE` or of the wrong shape, a fixed trunk, or a crank
-                with a motor, whose speed would change, too.
+            ParameterError: an impulse beyond `MOST_IMPULSE` or of the wrong shape, or a fixed trunk.
         """
         where = memory.which(envs, self.num_envs)
-        if self.trunk.kind == "fixed" or any(isinstance(limb.drive, Motor) for limb in self.limbs):
-            raise ParameterError("push: expected a trunk that moves, and prescribed cranks")
-        push = np.array([spread("forward", forward, where.shape), spread("upward", upward, where.shape)])
-        if np.abs(push).max(initial=0.0) > MOST_IMPULSE:
-            most = f"{MOST_IMPULSE:g}"
-            raise ParameterError(
-                f"push: expected impulses from -{most} to {most} N s, got {np.abs(push).max():g}"
-            )
+        if self.trunk.kind == "fixed":
+            raise ParameterError("push: expected a trunk that moves, got a fixed one")
+        pushed = {"forward": forward, "upward": upward}
+        push = np.array([spread(name, given, where.shape, MOST_IMPULSE) for name, given in pushed.items()])
         m = self._memory
         moving = views(layout.Moving, m.trunk[layout.TrunkState.rows("moving")])
         place = views(layout.TrunkReport, m.trunk_report).place[:, where]
         if self.trunk.kind == "rail":
             push[1] = 0.0
+        if any(isinstance(limb.drive, Motor) for limb in self.limbs):
+            push_kernel(self.features)(m.data, *self._model, *push, where)
         moving.momentum[:, where] += push
         if self.trunk.kind == "free":
             off = place - moving.centre[:, where]

@@ -214,8 +214,7 @@ class LegBase(LegProperties, SettingsChanges):
             envs: environments that are pushed, as indices or as a mask; None for all.
 
         Raises:
-            ParameterError: an impulse is not finite or of another shape, or the trunk cannot be pushed: it is
-                fixed, or a motor turns the crank.
+            ParameterError: an impulse is not finite or of another shape, or the trunk is fixed.
             ResetNeeded: there is no episode yet.
         """
         self._check_started("push")

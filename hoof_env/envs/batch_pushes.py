@@ -69,8 +69,6 @@ def check_can_be_pushed(name: str, batch: Any, upward: bool) -> None:
         raise ParameterError(f"{name}: expected none on a fixed trunk, which stays where it is")
     if s.trunk == "rail" and upward:
         raise ParameterError(f"{name}: expected no impulse upward on a rail, which holds the trunk's height")
-    if s.drive == "motor":
-        raise ParameterError(f'{name}: expected none with drive="motor": a push would turn the cranks, too')
 
 
 def begin_disturbances(batch: Any, which: Rows, generators: Generators, options: Mapping[str, Any]) -> None:

@@ -230,7 +230,6 @@ DISTURBANCES = [
     (LEG, {"push_impulse": 3.0, "pushes": [[1.0, 2.0, 0.0]]}, "pushes: expected none beside a push_impulse"),
     (LEG, {"pushes": [[1.0, 2.0]]}, r"pushes\[0\]: expected \[s, N s forward, N s upward\]"),
     (LEG, {"pushes": [[10.0, 2.0, 0.0]]}, r"pushes\[0\], time: expected"),
-    (LEG, {"drive": "motor", "push_impulse": 3.0}, 'push_impulse: expected none with drive="motor"'),
     (RAIL, {"pushes": [[1.0, 2.0, 1.0]]}, "pushes: expected no impulse upward on a rail"),
     (LEG, {"push_impulse": 2e5}, r"push_impulse\[0\]: expected a finite number in \[-100000, 100000\]"),
     (
