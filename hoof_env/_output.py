@@ -7,30 +7,47 @@ import os
 import shutil
 import sys
 import tempfile
-from collections.abc import Iterable, Iterator
+from collections.abc import Collection, Iterable, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from hoof_env.errors import OutputError
 
+STAGE = ".unfinished-"
+"""First letters of the name of a folder whose files are not complete yet."""
+
+KEPT = "kept-"
+"""First letters of the name of a folder with complete files whose places another command took meanwhile."""
+
 
 @contextmanager
-def staged(folder: Path) -> Iterator[Path]:
+def staged(folder: Path, new: Collection[str] = ()) -> Iterator[Path]:
     """Yield a temporary folder inside `folder`, which is made if need be. If the block succeeds, its files
     replace those of `folder`. Folders that were made and are still empty are removed.
 
+    Inside the block of another `staged` with its temporary folder, that folder is yielded.
+
+    Args:
+        folder: folder of the files.
+        new: names of files that must not be there at the end either.
+
     Raises:
-        OutputError: the folder cannot be made or written to.
+        OutputError: the folder cannot be made or written to; or a file of `new` is there, which stays, and
+            all files of the block are in a folder next to it.
     """
+    if folder.name.startswith(STAGE):
+        yield folder
+        return
     stage = None
     made = []
     try:
         made = [path for path in (folder, *folder.parents) if not path.exists()]
         folder.mkdir(parents=True, exist_ok=True)
-        stage = Path(tempfile.mkdtemp(prefix=".unfinished-", dir=folder))
+        stage = Path(tempfile.mkdtemp(prefix=STAGE, dir=folder))
         yield stage
-        for file in sorted(stage.iterdir()):
-            os.replace(file, folder / file.name)
+        _publish(stage, folder, new)
+    except OutputError:
+        raise
     except OSError as error:
         if stage is None:
             reason = f"({error.strerror}); expected a writable folder"
@@ -43,6 +60,47 @@ def staged(folder: Path) -> Iterator[Path]:
         for path in made:
             with suppress(OSError):
                 path.rmdir()
+
+
+@contextmanager
+def new_file(path: Path, overwrite: bool, others: Collection[Path] = ()) -> Iterator[Path]:
+    """Yield a path, in a temporary folder, for a file that comes to `path` when it is complete.
+
+    Args:
+        path: place of the file.
+        overwrite: replace a file that is there; otherwise it stays, also one that came during the block.
+        others: files that are written with it into the same folder.
+
+    Raises:
+        OutputError: as in `staged`.
+    """
+    names = {path.name, *(other.name for other in others)}
+    with staged(path.parent, () if overwrite else names) as stage:
+        yield stage / path.name
+
+
+def _publish(stage: Path, folder: Path, new: Collection[str]) -> None:
+    """Move the files of a temporary folder to their places, all or none."""
+    claimed: list[Path] = []
+    try:
+        for name in new:
+            # The system lets one process alone make a file with "x": from here on others find it.
+            with (folder / name).open("x"):
+                claimed.append(folder / name)
+        for file in sorted(stage.iterdir()):
+            os.replace(file, folder / file.name)
+        claimed.clear()
+    except FileExistsError as error:
+        there = Path(error.filename)
+        kept = folder / stage.name.replace(STAGE, KEPT)
+        os.replace(stage, kept)
+        raise OutputError(
+            f"{str(there)!r} exists already: it was written meanwhile, and stays; the new one is"
+            f" {str(kept / there.name)!r}"
+        ) from None
+    finally:
+        for path in claimed:
+            path.unlink()
 
 
 def check_folder(folder: Path) -> None:

@@ -65,13 +65,16 @@ def render(
         size: width and height [pixels].
         overwrite: replace an existing file.
     """
-    from hoof_env._output import check_new
-    from hoof_env.film import render_episode
+    from hoof_env._output import check_new, new_file
+    from hoof_env.film import FFMPEG, render_episode
+    from hoof_env.records import check_place
 
     made = check_new(out, overwrite)
-    count = render_episode(
-        out, episode.policy, episode.id, episode.args, episode.seed, seconds, slow, fps, size
-    )
+    check_place(out, FFMPEG)
+    with new_file(out, overwrite) as file:
+        count = render_episode(
+            file, episode.policy, episode.id, episode.args, episode.seed, seconds, slow, fps, size
+        )
     _say(f"{out}: {count} frames, {count / fps:.1f} s, {_size(out)}{made}")
 
 
@@ -121,23 +124,25 @@ def export(
         bodies: bodies of your OpenSim model that carry the forces: leg=BODY, or left_fore=BODY ...
         overwrite: replace existing files.
     """
-    from hoof_env._output import check_new
-    from hoof_env.records import export_episode, files_of
+    from hoof_env._output import check_new, new_file
+    from hoof_env.records import check_export, export_episode, files_of
 
     # All files of the format are checked; the message names the first of them.
     made, *_ = [check_new(file, overwrite) for file in files_of(out)]
-    rows, weight = export_episode(
-        out,
-        episode.policy,
-        episode.id,
-        episode.args,
-        episode.seed,
-        seconds,
-        threshold,
-        units,
-        reactions,
-        bodies,
-    )
+    check_export(out)
+    with new_file(out, overwrite, files_of(out)) as file:
+        rows, weight = export_episode(
+            file,
+            episode.policy,
+            episode.id,
+            episode.args,
+            episode.seed,
+            seconds,
+            threshold,
+            units,
+            reactions,
+            bodies,
+        )
     others = "".join(f", with {file.name}" for file in files_of(out)[1:])
     _say(f"{out}: {rows} rows, 1 BW = {weight:.1f} N, {_size(out)}{others}{made}")
 
@@ -181,22 +186,25 @@ def mjcf(
         theta, swing: crank angle and swing of the pose in which the model begins [rad].
         overwrite: replace an existing file.
     """
-    from hoof_env._output import check_new
+    from hoof_env._output import check_new, new_file
     from hoof_env.dynamics.parts import Motor, Trunk
     from hoof_env.ground.contact import load_ground
+    from hoof_env.leg.checks import checked_path
     from hoof_env.leg.geometry import DEFAULT_PRESET, load_geometry
 
     made = check_new(out, overwrite)
+    checked_path(out, ".xml")
     chosen = preset or DEFAULT_PRESET
     leg = load_geometry(chosen)
-    leg.to_mjcf(
-        out,
-        theta=theta,
-        swing=swing,
-        trunk=Trunk(kind=trunk, height=leg.hip_height),
-        motor=Motor() if motor else None,
-        ground=load_ground(chosen) if ground else None,
-    )
+    with new_file(out, overwrite) as file:
+        leg.to_mjcf(
+            file,
+            theta=theta,
+            swing=swing,
+            trunk=Trunk(kind=trunk, height=leg.hip_height),
+            motor=Motor() if motor else None,
+            ground=load_ground(chosen) if ground else None,
+        )
     _say(f"{out}: {_size(out)}{made}")
 
 

@@ -69,7 +69,7 @@ class ComparisonArgs:
 
 def compare(args: Annotated[ComparisonArgs, arg(name="")]) -> None:
     """Compare ground reaction forces of two records, simulated or measured, limb by limb (needs 'lab')."""
-    from hoof_env._output import check_new
+    from hoof_env._output import check_new, new_file
     from hoof_env.lab.columns import parse_mapping
     from hoof_env.lab.compare import compare
     from hoof_env.lab.picture import check_picture, draw, report
@@ -86,8 +86,10 @@ def compare(args: Annotated[ComparisonArgs, arg(name="")]) -> None:
         args.b, map_b, args.units_b, args.reverse_b, args.rate_b, args.mass_b, args.up_b, args.forward_b
     )
     comparison = compare(a, b, args.align, args.threshold, args.units)
-    draw(comparison, args.out)
-    say(f"{report(comparison)}\n\n{args.out}: {size(args.out)}{made}")
+    say(f"{report(comparison)}\n")
+    with new_file(args.out, args.overwrite) as file:
+        draw(comparison, file)
+    say(f"{args.out}: {size(args.out)}{made}")
 
 
 @dataclass(frozen=True)
@@ -126,7 +128,7 @@ class AverageArgs:
 
 def average(args: Annotated[AverageArgs, arg(name="")]) -> None:
     """Write the mean stance of several trials, and its standard deviation, as a table."""
-    from hoof_env._output import check_folder, check_new
+    from hoof_env._output import check_folder, check_new, new_file
     from hoof_env.lab import average as mean
     from hoof_env.lab.columns import parse_mapping
     from hoof_env.lab.doubts import for_one
@@ -147,5 +149,7 @@ def average(args: Annotated[AverageArgs, arg(name="")]) -> None:
         # Its message names the options of `compare`, which end in -a and -b.
         raise type(error)(for_one(str(error), "").replace("--units", "--units-in")) from None
     stances = mean.average(trials, args.threshold, args.units, args.points)
-    mean.write_table(stances, args.out)
-    say(f"{mean.report(stances)}\n\n{args.out}: {args.points} rows, {size(args.out)}{made}")
+    say(f"{mean.report(stances)}\n")
+    with new_file(args.out, args.overwrite) as file:
+        mean.write_table(stances, file)
+    say(f"{args.out}: {args.points} rows, {size(args.out)}{made}")

@@ -48,7 +48,7 @@ def evaluate(
         out: write all figures of all episodes to this file; ends in .csv or .json.
         overwrite: replace an existing file.
     """
-    from hoof_env._output import check_new
+    from hoof_env._output import check_new, new_file
     from hoof_env.evaluation import scores
     from hoof_env.records import check_place
 
@@ -61,9 +61,8 @@ def evaluate(
     say(f"{found.env_id}{with_what}, episodes {found.seeds[0]:,} to {found.seeds[-1]:,}\n")
     say(scores.published_lines(found.scores) if published else scores.text_table(found.scores))
     if out is not None:
-        # Another command may have written it meanwhile
-        check_new(out, overwrite)
-        scores.WRITERS[out.suffix.lower()](found, out)
+        with new_file(out, overwrite) as file:
+            scores.WRITERS[out.suffix.lower()](found, file)
         say(f"\n{out}: {size(out)}{made}")
 
 
@@ -74,7 +73,7 @@ def list_ids(id: str | None = None) -> None:
         id: only this environment, with the names of its scripted policies.
     """
     from hoof_env.envs.shipped import good_returns, summaries
-    from hoof_env.policies.find import shipped_policy
+    from hoof_env.policies.find import names_of, shipped_policy
 
     known = summaries()
     if id is not None and id not in known:
@@ -93,12 +92,9 @@ def list_ids(id: str | None = None) -> None:
         say("next: hoof-env evaluate shipped open-loop run, or hoof-env list --id ID for its policies")
         return
     from hoof_env.envs.made import make_env
-    from hoof_env.envs.policies import policy_names
 
     with make_env(id) as env:
-        is_leg = env.unwrapped.action_form == "rates"  # type: ignore[attr-defined]
-        names = [*policy_names(env), *(["open-loop"] if is_leg else []), "shipped"]
-    say(f"    policies: {', '.join(names)}")
+        say(f"    policies: {', '.join(names_of(env))}")
 
 
 def demo(out: Path = Path("hoof-env-demo"), quick: bool = False, overwrite: bool = False) -> None:
@@ -114,5 +110,5 @@ def demo(out: Path = Path("hoof-env-demo"), quick: bool = False, overwrite: bool
     from hoof_env.demo.demo import PAGE, demo
 
     check_new(out / PAGE, overwrite)
-    page = demo(out, quick, say)
+    page = demo(out, quick, say, overwrite)
     say(f"open {page} ({size(page)})")

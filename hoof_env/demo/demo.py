@@ -42,16 +42,17 @@ EXTRAS = {"plot": ("matplotlib", "jinja2"), "render": ("pygame",), "video": ("im
 """Modules of the extras that the demonstration needs."""
 
 
-def demo(out: Path, quick: bool = False, say: Say = print) -> Path:
+def demo(out: Path, quick: bool = False, say: Say = print, overwrite: bool = True) -> Path:
     """Make the report, and return its path.
 
     Args:
         out: folder of the report; an older one there is replaced when the new one is complete.
         quick: tiny numbers, which show that everything works.
         say: function that prints a line.
+        overwrite: False: another report that is there at the end stays, and the new one is kept next to it.
 
     Raises:
-        OutputError: the folder cannot be written.
+        OutputError: the folder cannot be written, or there is another report.
         HoofEnvError: an extra is missing.
     """
     check_folder(out)
@@ -59,7 +60,7 @@ def demo(out: Path, quick: bool = False, say: Say = print) -> Path:
     check_film(out / "film.mp4", 50.0)
     steps = Steps(3, say)
     command = shlex.join(["hoof-env", "demo", "--out", str(out), *(["--quick"] if quick else [])])
-    with staged(out) as stage:
+    with staged(out, () if overwrite else (PAGE,)) as stage:
         reproduction = reproduce_paper(stage, command, steps)
         with steps.announced(f"the agent that ships and scripted policies in {ENV_ID}"):
             count = QUICK_EPISODES if quick else EPISODES

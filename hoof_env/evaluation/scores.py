@@ -23,7 +23,7 @@ import gymnasium as gym
 from hoof_env._output import markdown_table, staged
 from hoof_env._version import __version__
 from hoof_env.envs.made import make_env
-from hoof_env.errors import DataFileError, ParameterError, check_number
+from hoof_env.errors import DataFileError, ParameterError, count
 from hoof_env.evaluation.episodes import FINAL_SEEDS, play, score_vector
 from hoof_env.evaluation.statistics import (
     TABLE,
@@ -42,6 +42,9 @@ DEFAULT_ENV = "hoof_env/HorseLeg-v0"
 
 TELL_SECONDS = 5.0
 """Time between two lines about the progress [s]."""
+
+MOST_EPISODES = 1_000_000
+"""Largest number of episodes of an evaluation."""
 
 
 @dataclass(frozen=True)
@@ -162,9 +165,9 @@ def _seeds(episodes: int | None, seed: int | None, published: bool) -> range:
                 f" {FINAL_SEEDS[-1]:,}"
             )
         return FINAL_SEEDS
-    count = 20 if episodes is None else int(check_number("episodes", episodes, low=1))
-    first = 1000 if seed is None else int(check_number("seed", seed, low=0))
-    return range(first, first + count)
+    number = 20 if episodes is None else count("episodes", episodes, most=MOST_EPISODES)
+    first = 1000 if seed is None else count("seed", seed, low=0)
+    return range(first, first + number)
 
 
 def _made(env_id: str, arguments: Mapping[str, Any], file: str) -> gym.Env[Any, Any]:
@@ -193,7 +196,7 @@ def _environment(
             warnings.warn(f"policy {name}: nothing says what it was trained for", stacklevel=3)
     name, record = next(((name, record_of) for name, record_of in records.items() if record_of), ("", {}))
     known, arguments = environment_of(name, record, env_id)
-    return known or DEFAULT_ENV, arguments, name
+    return DEFAULT_ENV if known is None else known, arguments, name
 
 
 def _find_same(name: str, env: gym.Env[Any, Any], env_id: str) -> Any:

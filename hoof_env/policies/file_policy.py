@@ -47,9 +47,14 @@ class FilePolicy(ABC):
         """Return deterministic actions, shape (..., n), for observations of shape (..., k), and `state`.
 
         Raises:
-            ParameterError: observations of another size.
+            ParameterError: observations that are no numbers, or of another size.
         """
-        numbers = np.asarray(observation, self.number)
+        try:
+            numbers = np.asarray(observation, self.number)
+        except (TypeError, ValueError):
+            raise ParameterError(
+                f"observation: expected numbers for the policy {self.path.name}, got {observation!r:.100}"
+            ) from None
         if self.size is not None and numbers.shape[-1:] != (self.size,):
             raise ParameterError(
                 f"observation: expected shape (..., {self.size}) as the policy {self.path.name} takes, got"

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+import traceback
 from collections.abc import Callable
 from dataclasses import dataclass
 from importlib import import_module
@@ -52,6 +53,8 @@ def find_saved(path: Path) -> OnnxPolicy | SavedModel:
 
 def is_model(name: str) -> bool:
     """Return True if a policy's name is the path of a model, or the id of one that ships."""
+    if not name:
+        return False
     is_path = (
         name.lower().endswith((".zip", ".onnx"))
         or Path(name).name != name
@@ -96,9 +99,11 @@ class Function:
         rows = np.array(observation, ndmin=2)
         try:
             actions = np.asarray(self.act(rows), np.float32)
-        except (TypeError, ValueError) as error:
+        # The function is the user's, and may fail in any way.
+        except Exception as error:
             raise ParameterError(
-                f"policy {self.name}: expected a function of observations: {error}"
+                f"policy {self.name}: expected a function of observations, shape {rows.shape}, that returns"
+                f" actions; {_place(error)}"
             ) from error
         if actions.shape != (len(rows), self.actions) or not np.isfinite(actions).all():
             raise ParameterError(
@@ -107,6 +112,12 @@ class Function:
                 f" {np.sum(~np.isfinite(actions))} that are not finite"
             )
         return actions.reshape(*np.shape(observation)[:-1], self.actions), state
+
+
+def _place(error: Exception) -> str:
+    """Return an error of a user's code in words, with the line that raised it."""
+    line = traceback.extract_tb(error.__traceback__)[-1]
+    return f"{type(error).__name__} in {Path(line.filename).name}, line {line.lineno}: {error}"
 
 
 def is_function(name: str) -> bool:
@@ -125,12 +136,21 @@ def find_function(name: str, actions: int) -> Function:
         act = getattr(import_module(module), function)
     except (ImportError, AttributeError, SyntaxError) as error:
         raise ParameterError(f"policy: expected MODULE:NAME, got {name!r}: {error}") from error
+    # The module is the user's, and may fail in any way.
+    except Exception as error:
+        raise ParameterError(f"policy: expected MODULE:NAME, got {name!r}; {_place(error)}") from error
     if not callable(act):
         raise ParameterError(f"policy {name}: expected a function of observations, got {act!r}")
     return Function(name, act, actions)
 
 
 # -- all policies ------------------------------------------------------------------------------
+
+
+def names_of(env: gym.Env[Any, Any]) -> list[str]:
+    """Return the names of the policies of an environment of this package."""
+    is_leg = env.unwrapped.action_form == "rates"  # type: ignore[attr-defined]
+    return [*policy_names(env), *(["open-loop"] if is_leg else []), "shipped"]
 
 
 def default_policy(env: gym.Env[Any, Any]) -> str:
@@ -164,7 +184,7 @@ def find_policy(name: str | None, env: gym.Env[Any, Any], env_id: str, seed: int
         return find_function(text, gym.spaces.flatdim(env.action_space))
     if text == "shipped" or text in shipped_ids():
         return shipped_policy(env_id if text == "shipped" else text).load(env, env_id)
-    if is_model(text) or Path(text).is_dir():
+    if is_model(text) or (text and Path(text).is_dir()):
         return _load_saved(find_saved(Path(text)), env, env_id)
     if not is_ours:
         raise ParameterError(
@@ -181,7 +201,7 @@ def find_policy(name: str | None, env: gym.Env[Any, Any], env_id: str, seed: int
     if len(numbers) == len(PARAMETERS):
         return constant_gait(GaitParameters(*numbers), env, starts_in_it=True)
     raise ParameterError(
-        f"policy: expected a name ({', '.join(names)}, open-loop, shipped), four gait parameters as "
+        f"policy: expected a name ({', '.join(names_of(env))}), four gait parameters as "
         f"6.28,0.7,-0.2,-0.3, module:function, or the path of a trained model or a gait's .json, got {name!r}"
     )
 

@@ -156,7 +156,7 @@ def stamp_onnx(path: str | Path, env: gym.Env[Any, Any], **record: str) -> OnnxP
         DataFileError: there is no such file, or it does not answer observations of `env` with its actions.
             The file is as it was.
         ParameterError: `env` was not made by `gymnasium.make`, the file does not end in .onnx, or `record`
-            has an entry that is read off `env`.
+            has an entry that is no text or is read off `env`.
         MissingExtraError: onnx is not installed (extra "onnx").
     """
     try:
@@ -173,6 +173,9 @@ def stamp_onnx(path: str | Path, env: gym.Env[Any, Any], **record: str) -> OnnxP
     known = about(env, env.spec.id, arguments_of(env), {})
     if taken := sorted(known.keys() & record):
         raise ParameterError(f"record: expected entries besides those that are read off env, got {taken}")
+    for key, value in record.items():
+        if not isinstance(value, str):
+            raise ParameterError(f'{key}: expected a text, as in seed="3", got {value!r}')
     metadata = known | record
     try:
         graph = onnx.load(file)
@@ -213,6 +216,13 @@ def check_answers(policy: OnnxPolicy, env: gym.Env[Any, Any]) -> None:
     space.seed(0)
     seen = np.stack([space.sample() for _ in range(TRIED)])
     expected = (TRIED, *(env.action_space.shape or ()))
+    if policy.size not in (None, seen.shape[-1]):
+        made = env.spec.id if env.spec else repr(env)
+        raise DataFileError(
+            f"policy {policy.path}: expected a graph that takes the {seen.shape[-1]} observations of {made},"
+            f" got one that takes {policy.size}; make the environment with the id and the arguments of the"
+            " training"
+        )
     try:
         actions, _ = policy.predict(seen)
         alone, _ = policy.predict(seen[0])

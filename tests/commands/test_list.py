@@ -39,7 +39,11 @@ def test_one_id_has_the_names_of_its_policies(capsys):
     [
         (["list", "--id", "Horse"], "id: expected one of hoof_env/HorseLeg-v0, .*, got 'Horse'"),
         (["evaluate"], "policy: expected a name or the path of a trained model, got none"),
-        (["evaluate", "run", "--episodes", "0"], "episodes: expected"),
+        (["evaluate", "run", "--episodes", "0"], "episodes: expected a whole number, 1 or more, got 0"),
+        (["evaluate", "run", "--episodes", "9999999"], r"episodes: expected at most 1e\+06, got 9999999"),
+        (["evaluate", "run", "--seed", "-1"], "seed: expected a whole number, 0 or more, got -1"),
+        (["evaluate", "run", "--id", ""], "environment '' with no arguments: expected a registered id"),
+        (["evaluate", ""], "expected a name .* got ''"),
         (["evaluate", "run", "--published", "--seed", "3"], "neither episodes nor seed with it"),
         (["evaluate", "run", "--out", "scores.txt"], r"ends in \.csv, \.json, got 'scores\.txt'"),
         (["evaluate", "gallop"], "expected a name .* got 'gallop'"),
@@ -66,6 +70,8 @@ def test_a_file_that_another_command_wrote_meanwhile_stays(monkeypatch, tmp_path
     monkeypatch.setattr("hoof_env.evaluation.scores.play", play)
     assert cli.main(["evaluate", "run", "--episodes", "1", "--out", str(out)]) == 2
     said = capsys.readouterr()
-    assert "exists already; name another file, or add --overwrite" in said.err
+    assert re.search(r"exists already: .* the new one is '.*kept-.*scores\.csv'\n", said.err)
     assert "run" in said.out
     assert out.read_text(encoding="utf-8") == "theirs"
+    (kept,) = tmp_path.glob("kept-*/scores.csv")
+    assert kept.read_text(encoding="utf-8").startswith("policy,seed,return\n")

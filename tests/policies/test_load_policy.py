@@ -1,5 +1,6 @@
 """Policies by whatever names them: each plays as it should, and what does not fit says why."""
 
+import sys
 import warnings
 import zipfile
 
@@ -112,6 +113,7 @@ def test_settings_that_differ_are_told_and_the_default_ones_are_not():
         ("none.zip", r"none\.zip"),
         ("none.onnx", r"none\.onnx"),
         ("nothing:act", "expected MODULE:NAME, got 'nothing:act'"),
+        ("", "expected a name .*, got ''"),
     ],
 )  # fmt: skip
 def test_what_does_not_fit_is_refused(policy, words, env):
@@ -131,6 +133,39 @@ def test_what_is_no_environment_is_refused(env):
     for policy, given in (("shipped", ENV_ID), (env, "shipped"), ("shipped", envs)):
         with pytest.raises(ParameterError, match=r"env: expected a single environment.*load_policy\("):
             hoof_env.load_policy(policy, given)
+
+
+@pytest.mark.parametrize(
+    ("body", "words"),
+    [
+        ("return 1 / 0", r"ZeroDivisionError in mine\.py, line 3: division by zero"),
+        ("return rows.missing", r"AttributeError in mine\.py, line 3: .*'missing'"),
+        ("return ['a'] * len(rows)", "ValueError in .*could not convert string"),
+        ("return rows[:, :3]", r"expected finite actions of shape \(1, 4\) .* got shape \(1, 3\)"),
+        ("return rows[:, :4] * np.nan", "4 that are not finite"),
+    ],
+)
+def test_what_fails_in_a_function_of_the_user_is_told_with_its_line(body, words, env, tmp_path, monkeypatch):
+    monkeypatch.syspath_prepend(tmp_path)
+    (tmp_path / "mine.py").write_text(f"import numpy as np\ndef act(rows):\n    {body}\n")
+    monkeypatch.delitem(sys.modules, "mine", raising=False)
+    policy = hoof_env.load_policy("mine:act", env)
+    with pytest.raises(ParameterError, match=f"policy mine:act: .*{words}"):
+        policy.predict(np.zeros(22))
+
+
+def test_a_module_of_the_user_that_fails_is_told_with_its_line(env, tmp_path, monkeypatch):
+    monkeypatch.syspath_prepend(tmp_path)
+    (tmp_path / "licensed.py").write_text("raise RuntimeError('no licence')\n")
+    words = r"got 'licensed:act'; RuntimeError in licensed\.py, line 1: no licence"
+    with pytest.raises(ParameterError, match=words):
+        hoof_env.load_policy("licensed:act", env)
+
+
+@pytest.mark.parametrize("observation", ["x", None, ["a"] * 22, [[1], [2, 3]]])
+def test_observations_that_are_no_numbers(observation):
+    with pytest.raises(ParameterError, match=r"observation: expected (numbers|shape) .*HorseLeg-v0.*got"):
+        hoof_env.load_policy("hoof_env/HorseLeg-v0").predict(observation)
 
 
 def test_a_function_may_change_its_observations_and_not_ours(env):

@@ -90,7 +90,7 @@ def test_the_output_of_the_name_action_is_taken(env, tmp_path):
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
-        ({"inputs": 21}, r"of shape \(16, 22\), got observation: expected shape \(\.\.\., 21\)"),
+        ({"inputs": 21}, "takes the 22 observations of hoof_env/HorseLeg-v0, got one that takes 21; make"),
         ({"outputs": 3}, r"expected actions of shape \(16, 4\) .* got shape \(16, 3\)"),
         ({"before": ("value",)}, r"got shape \(16, 22\)"),
         ({"scale": np.nan}, "got numbers that are not finite"),
@@ -127,6 +127,9 @@ def test_a_stamp_says_nothing_else_than_the_environment(env, tmp_path):
     for entry in ("env_id", "actions", "settings", "hoof_env"):
         with pytest.raises(ParameterError, match=rf"besides those that are read off env, got \['{entry}'\]"):
             hoof_env.stamp_onnx(path, env, **{entry: "other"})
+    for value in (3, None, ["ppo"]):
+        with pytest.raises(ParameterError, match=r"algo: expected a text, as in seed=\"3\", got"):
+            hoof_env.stamp_onnx(path, env, algo=value)
     assert path.read_bytes() == before
 
 
