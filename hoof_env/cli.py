@@ -9,7 +9,9 @@ from __future__ import annotations
 import os
 import shlex
 import sys
-from collections.abc import Callable, Sequence
+import warnings
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 
 from hoof_env._output import bear_any_output, flush_or_drop
@@ -241,6 +243,17 @@ def _with_axes(arguments: list[str]) -> list[str]:
     return joined
 
 
+@contextmanager
+def _warnings_of_one_line() -> Iterator[None]:
+    """Make warnings print their words alone, without the place in the code."""
+    usual = warnings.formatwarning
+    warnings.formatwarning = lambda message, *_, **__: f"hoof-env: warning: {message}\n"
+    try:
+        yield
+    finally:
+        warnings.formatwarning = usual
+
+
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run one sub-command, by default the one of the command line; return the exit code."""
     options = _with_axes(sys.argv[1:] if arguments is None else list(arguments))
@@ -254,12 +267,13 @@ def main(arguments: Sequence[str] | None = None) -> int:
     try:
         import tyro
 
-        tyro.extras.subcommand_cli_from_dict(
-            COMMANDS,
-            prog="hoof-env",
-            description="A horse's leg, or a horse, on the ground. --version prints the version.",
-            args=options,
-        )
+        with _warnings_of_one_line():
+            tyro.extras.subcommand_cli_from_dict(
+                COMMANDS,
+                prog="hoof-env",
+                description="A horse's leg, or a horse, on the ground. --version prints the version.",
+                args=options,
+            )
         sys.stdout.flush()
     except HoofEnvError as error:
         print(f"hoof-env: error: {error}", file=sys.stderr)

@@ -86,6 +86,15 @@ def test_a_file_is_replaced_on_demand_only_and_its_folder_is_told(command, name,
     assert "folder" not in capsys.readouterr().out
 
 
+def test_a_warning_is_one_line():
+    """In a process of its own: pytest keeps warnings."""
+    warn = "cli.COMMANDS['list'] = lambda: warnings.warn('doubtful')"
+    code = f"import sys, warnings; from hoof_env import cli; {warn}; sys.exit(cli.main(['list']))"
+    command = [sys.executable, "-c", code]
+    done = subprocess.run(command, capture_output=True, text=True, timeout=300, check=False)
+    assert (done.returncode, done.stderr) == (0, "hoof-env: warning: doubtful\n")
+
+
 @pytest.mark.parametrize("columns", ["1", "5"])
 def test_help_ends_in_a_narrow_terminal(columns):
     ours = os.environ | {"COLUMNS": columns}

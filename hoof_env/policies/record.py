@@ -116,7 +116,8 @@ def environment_of(
     asks |= {"task": kwargs["task"]} if ":" in str(kwargs.get("task", "")) else {}
     for name, asked in asks.items():
         if own_id(asked) not in gym.registry:
-            option = f"--id {asked}" if name == "env_id" else "--id, with the task as its argument"
+            module = "" if ":" in asked else "MODULE:"
+            option = f"--id {module}{asked}" if name == "env_id" else "--id, with the task as its argument"
             raise DataFileError(
                 f"{path}: expected the id of an environment that is registered here, got {name} {asked!r}; a"
                 f" file must not import a module. If you trust it, name it yourself: {option} (of agents:"
@@ -168,6 +169,8 @@ def refuse_misfit(path: Path, there: dict[str, Any], here: dict[str, Any]) -> No
         name_here, _, version_here = str(here.get("env_id")).rpartition("-v")
         if name_there == name_here != "" and version_there != version_here:
             unlike.append("another version of an id is another task")
+        if "env_id" not in there:
+            unlike.append("the file names no id; give the one of its training")
         raise DataFileError(f"policy {path}: trained for {'; '.join(unlike)}")
 
 
