@@ -32,8 +32,13 @@ REQUESTS = {
             [*CSV, "--id", "hoof_env/Nobody-v0"],
             "environment 'hoof_env/Nobody-v0' with no arguments: expected a registered id",
         ),
+        *(
+            ([*CSV, "--id", given], r"did you mean hoof_env/HorseLegRail-v0\?")
+            for given in ("HorseLegRail", "horselegrail-v0", "hoof_env/HorseLegRial-v0")
+        ),
+        ([*CSV, "--id", "nothing/Like-v0"], "with no arguments: expected a registered id .* nothing[^?]*$"),
         ([*CSV, "--id", "CartPole-v1"], "expected one leg of this package .* got CartPole"),
-        ([*CSV, "--args", "wings=2"], "unexpected keyword argument 'wings'"),
+        ([*CSV, "--args", "wings=2"], "unexpected keyword argument 'wings'(?!.*creator)"),
         *(
             ([*CSV, "--args", given], f"{PAIRS} '{given.format()}'")
             for given in ("trunk", "=3", "{{trunk: 1}}")

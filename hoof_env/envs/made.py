@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from difflib import get_close_matches
 from typing import Any
 
 import gymnasium as gym
@@ -14,10 +15,24 @@ def make_env(env_id: str, **kwargs: Any) -> gym.Env[Any, Any]:
     take."""
     try:
         return gym.make(env_id, **kwargs)
-    except ParameterError:
-        raise
+    except ParameterError as error:
+        # Gymnasium puts the name of the id and all arguments behind an error of an argument
+        raise type(error)(str(error).partition(" was raised from the environment creator")[0]) from None
     except (gym.error.Error, ModuleNotFoundError, TypeError) as error:
         raise ParameterError(
             f"environment {env_id!r} with {kwargs or 'no arguments'}: expected a registered id and arguments "
-            f"that it takes: {error}"
+            f"that it takes: {str(error).rstrip('. ')}{_alike(env_id)}"
         ) from None
+
+
+def _alike(env_id: str) -> str:
+    """Return a question that names the id of this package most like one that is not registered, "" if none
+    is."""
+    ours = {_bare(name): name for name in gym.registry if name.startswith("hoof_env/")}
+    found = get_close_matches(_bare(env_id), ours, 1, 0.7)
+    return f"; did you mean {ours[found[0]]}?" if found and env_id not in gym.registry else ""
+
+
+def _bare(env_id: str) -> str:
+    """Return an id without namespace and version, in small letters."""
+    return env_id.rpartition("/")[2].partition("-v")[0].lower()
