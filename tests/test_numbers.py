@@ -9,7 +9,7 @@ import csv
 import json
 import re
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from functools import cache
 from importlib import import_module
 from pathlib import Path
@@ -228,6 +228,120 @@ def test_numbers_without_a_source_do_not_become_more(page):
 def test_a_number_without_a_source_is_found():
     assert NUMBER.findall("forces of 3.2 kN and 12 % in 5 steps") == ["3.2 kN", "12 %", "5 steps"]
     assert not NUMBER.findall("Python 3.11, 1024 legs, Eq. 8, 3.2 kN<!-- = score a b c -->")
+
+
+# -- whole tables ------------------------------------------------------------------------------
+
+
+def table(page: str, *titles: str) -> dict[str, dict[str, str]]:
+    """The first table of a page whose head has these titles: cells by the title of the column, of each row by
+    its first cell; without marks."""
+    text = re.sub(r"<!--.*?-->", "", (ROOT / page).read_text(encoding="utf-8"))
+    for block in re.findall(r"(?:^\|.*\n)+", text, re.MULTILINE):
+        head, _, *rows = [
+            [cell.strip() for cell in line.strip("|").split("|")] for line in block.splitlines()
+        ]
+        if set(titles) <= set(head):
+            return {row[0].strip("`"): dict(zip(head, row, strict=True)) for row in rows}
+    raise AssertionError(f"{page} has no table with {titles}")
+
+
+def numbers(text: str) -> list[float]:
+    """The numbers of a cell."""
+    return [float(number) for number in re.findall(r"-?\d+(?:\.\d+)?", text)]
+
+
+def differs(shown: str, values: Iterable[float]) -> bool:
+    """True if the numbers of a cell are not these values, rounded to the digits that each shows."""
+    texts = re.findall(r"-?\d+(?:\.\d+)?", shown)
+    steps = [0.1 ** len(text.partition(".")[2]) for text in texts]
+    pairs = zip(map(float, texts), steps, values, strict=True)
+    return any(abs(number - value) > 0.5001 * step for number, step, value in pairs)
+
+
+COLUMNS = (
+    "return",
+    "speed m/s",
+    "stance peak kN",
+    "loading rate kN/s",
+    "slip of a stance m",
+    "cost of transport",
+    "weight share",
+)
+"""Columns of the table of agents whose titles the evidence shares."""
+
+
+def test_agents_reach_on_the_page_what_they_reach_in_the_evidence():
+    shown = table("docs/agents.md", "the suspension's share")
+    found = table("docs/evidence/actions.md", "suspension's share")
+    seeds = [row for name, row in found.items() if name.startswith("ppo_flat, seed")]
+    assert len(seeds) == 10
+    for title, own in (("the suspension's share", "suspension's share"), *((one, one) for one in COLUMNS)):
+        for name, row in (
+            ("scripted run", "run"),
+            ("zero action", "zero action"),
+            ("best open-loop gait", "open-loop"),
+        ):
+            assert not differs(shown[name][title], numbers(found[row][own])[:1]), (name, title)
+        values = [numbers(seed[own])[0] for seed in seeds]
+        assert not differs(shown["ppo_flat`, ten seeds"][title], (min(values), max(values))), title
+
+
+def test_seconds_to_learn_are_those_of_the_benchmark():
+    page = "benchmarks/results/512-bits/learn_seconds.md"
+    row = table(page, "seconds to the best open loop")["ppo_flat"]
+    best = numbers(row["seconds to the best open loop"])
+    near = numbers(row["seconds to within 5 %"])
+    text = (ROOT / "docs/agents.md").read_text(encoding="utf-8")
+    said = f"after {best[0]:g} seconds of learning (median of ten seeds, {best[2]:g} in the worst)"
+    assert said in text
+    assert f"within 5 % of its final return after {near[0]:g}" in text
+
+
+def test_reference_gaits_on_the_page_are_those_of_the_evidence():
+    shown = table("docs/horse.md", "Froude number", "0.25")
+    found = table("docs/evidence/horse.md", "Fr 0.1, 1.17 m/s")
+    speeds = {title.split(",")[0].removeprefix("Fr "): title for title in found["fell"] if title != "figure"}
+    for name, row in shown.items():
+        for froude in ("0.1", "0.25", "0.5", "1"):
+            if name == "speed over the command":
+                reached = numbers(found["speed [m/s]"][speeds[froude]])[0]
+                assert abs(float(row[froude]) - reached / numbers(speeds[froude])[1]) < 0.008
+                continue
+            pair = [name.replace("fore and hind", leg) for leg in ("fore", "hind")]
+            own = [numbers(found[one][speeds[froude]])[0] for one in dict.fromkeys(pair)]
+            assert not differs(row[froude], own), (name, froude)
+
+
+def test_a_living_horse_is_compared_with_what_the_evidence_has():
+    shown = table("docs/horse.md", "slow gait", "trot-like")
+    judged = table("docs/evidence/horse.md", "judge", "reference gaits")
+    trot = table("docs/evidence/horse.md", "Froude number", "slip, fore and hind [m]")["3.67"]
+    of_judges = {
+        "lag [strides]": "walk: lag",
+        "duty factor, fore": "walk: duty_fore",
+        "duty factor, hind": "walk: duty_hind",
+        "stances with two peaks": "walk: two_peaked",
+        "stance peak, fore [N/kg]": "walk: peak_fore",
+        "stance peak, hind [N/kg]": "walk: peak_hind",
+        "stride over hip height, Froude 0.5": "stride_over_hip",
+    }
+    for name, judge in of_judges.items():
+        cell = judged[judge]["reference gaits"]
+        assert not differs(shown[name]["slow gait"], numbers(cell)[:1]), name
+        for verdict in ("met", "missed"):
+            assert (verdict in shown[name]["slow gait"]) == (verdict in cell), name
+    peaks = numbers(trot["stance peak, fore and hind [N/kg]"])
+    duties = numbers(trot["duty factor, fore and hind"])
+    for k, leg in enumerate(("fore", "hind")):
+        assert not differs(shown[f"stance peak, {leg} [N/kg]"]["trot-like"], peaks[k : k + 1])
+        assert not differs(shown[f"duty factor, {leg}"]["trot-like"], duties[k : k + 1])
+
+
+def test_a_cell_that_differs_is_found():
+    assert not differs("0.56, 0.53", (0.564, 0.532))
+    assert differs("0.56, 0.53", (0.564, 0.537))
+    assert differs("176 to 183", (175.2, 183.2))
 
 
 if __name__ == "__main__":
