@@ -34,7 +34,7 @@ from hoof_env.tasks.one_leg import lead_of, reach_per_rate
 OUT = STOCK.with_name("actions")
 
 FILTERS = FilterSettings()
-FASTEST = {"crank_rate": FILTERS.crank_rate, "swing_rate": FILTERS.swing_rate}
+FASTEST: dict[str, Any] = {"crank_rate": FILTERS.crank_rate, "swing_rate": FILTERS.swing_rate}
 """Settings with which an action of 1 changes the gait as fast as its filters allow."""
 
 DT = 0.02
