@@ -27,6 +27,12 @@ HEIGHTS = {1280: 800, 390: 844}
 WINDOWS = ((1280, "light"), (390, "dark"))
 """Width and scheme of colours; --all takes the other two, too."""
 
+TELL_SECONDS = 20.0
+"""Time between two lines about the progress [s]."""
+
+WAIT = 120_000
+"""Longest wait for a page [ms]: other work may have the processors."""
+
 RULES = {"runOnly": ["wcag2a", "wcag2aa", "wcag21a", "wcag21aa"], "resultTypes": ["violations"]}
 """Of axe-core: contrast AA, text of images, names of links and buttons, order of headings and others."""
 
@@ -85,6 +91,7 @@ def served(site: Path) -> Iterator[str]:
 def faults_of(browser: Browser, address: str, width: int, scheme: str) -> list[str]:
     """What is wrong with one page in one window."""
     page = browser.new_page(viewport={"width": width, "height": HEIGHTS[width]}, color_scheme=scheme)
+    page.set_default_timeout(WAIT)
     faults: list[str] = []
     page.on("console", lambda said: faults.append(f"console: {said.text}") if said.type == "error" else None)
     page.on("pageerror", lambda error: faults.append(f"script: {error}"))
@@ -106,11 +113,12 @@ def faults_of(browser: Browser, address: str, width: int, scheme: str) -> list[s
 def faults_of_use(browser: Browser, root: str) -> list[str]:
     """What is wrong with the way in, search and the buttons that copy code; an error if one is not there."""
     page = browser.new_page()
+    page.set_default_timeout(WAIT)
     try:
         page.goto(root)
         page.wait_for_url(f"{root}/docs/index.html")
         page.goto(f"{root}/search.html?q=stance")
-        page.wait_for_selector("#search-results ul.search li", timeout=20_000)
+        page.wait_for_selector("#search-results ul.search li")
         page.goto(f"{root}/docs/environments/HorseLeg.html")
         blocks, buttons = (page.locator(what).count() for what in ("div.highlight pre", "button.copybtn"))
         return [] if blocks == buttons > 0 else [f"{blocks} blocks of code, {buttons} buttons to copy"]
@@ -190,7 +198,11 @@ def main() -> int:
                 print(answers(browser, root))
             browser.close()
             return 0
-        for file in files:
+        said = started
+        for done, file in enumerate(files):
+            if time.monotonic() - said >= TELL_SECONDS:
+                said = time.monotonic()
+                print(f"{done} of {len(files)} pages, {said - started:.0f} s", file=sys.stderr, flush=True)
             for width, scheme in windows:
                 for fault in faults_of(browser, f"{root}/{file}", width, scheme):
                     wrong += 1
