@@ -74,7 +74,7 @@ def new_file(path: Path, overwrite: bool, others: Collection[Path] = ()) -> Iter
     Raises:
         OutputError: as in `staged`.
     """
-    names = {path.name, *(other.name for other in others)}
+    names = list(dict.fromkeys(file.name for file in (path, *others)))
     with staged(path.parent, () if overwrite else names) as stage:
         yield stage / path.name
 
@@ -93,7 +93,10 @@ def _publish(stage: Path, folder: Path, new: Collection[str]) -> None:
     except FileExistsError as error:
         there = Path(error.filename)
         kept = folder / stage.name.replace(STAGE, KEPT)
-        os.replace(stage, kept)
+        # With the rights of any new folder; those of the temporary one are the owner's alone
+        kept.mkdir()
+        for file in sorted(stage.iterdir()):
+            os.replace(file, kept / file.name)
         raise OutputError(
             f"{str(there)!r} exists already: it was written meanwhile, and stays; the new one is"
             f" {str(kept / there.name)!r}"

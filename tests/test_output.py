@@ -68,6 +68,8 @@ def test_a_pair_of_which_one_is_there_is_kept_as_a_pair(tmp_path):
     assert [path.name for path in tmp_path.iterdir() if path.is_file()] == ["b.xml"]
     (kept,) = tmp_path.glob("kept-*")
     assert contents(kept) == {"a.csv": "a", "b.xml": "b"}
+    (tmp_path / "usual").mkdir()
+    assert kept.stat().st_mode == (tmp_path / "usual").stat().st_mode
 
 
 @pytest.mark.parametrize(
