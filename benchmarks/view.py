@@ -1,7 +1,7 @@
 """How the live page runs: python -m benchmarks.view --out DIR [--hour]
 
 States that reach the browser, frames that it paints, processor shares of the server and of the simulation
-alone, memory over an hour of simulated time, sizes of pages that stand alone, and pictures. Needs the extras
+alone, memory of the server over an hour, sizes of pages that stand alone, and pictures. Needs the extras
 `view` and `site`, and Chromium.
 """
 
@@ -10,22 +10,23 @@ from __future__ import annotations
 import argparse
 import json
 import os
-import resource
 import shutil
 import subprocess
 import sys
 import time
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
 from hoof_env.view.controls import CONDITIONS, PAPER_ID
 from hoof_env.view.playback import Playback
-from hoof_env.view.player import Player
 from hoof_env.view.simulation import Simulation
 
 LEG, HORSE = "hoof_env/HorseLeg-v0", "hoof_env/Horse-v0"
 WATCHED = 15.0  # time over which a page is watched [s]
 HOUR = 3600.0  # [s]
+TABS = 20  # number of tabs that are opened and closed after an hour
 
 SERVE = """
 import sys
@@ -39,6 +40,9 @@ COUNTS = (
     "[Number(document.body.dataset.states), Number(document.body.dataset.frames), performance.now() / 1000]"
 )
 
+SHOWN = "parseFloat(document.querySelector('#at').textContent)"
+MOVE = "(slider, value) => { slider.value = value; slider.dispatchEvent(new Event('change')) }"
+
 
 def processor_time(process: int) -> float:
     """Return the processor time that a process has used [s], from /proc."""
@@ -46,26 +50,47 @@ def processor_time(process: int) -> float:
     return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
 
 
-def watch(env_id: str, out: Path, width: int = 1280) -> dict[str, float]:
-    """Return states and frames a second of a page, and the share of a core that its server takes."""
+@contextmanager
+def served(env_id: str) -> Iterator[tuple[int, str]]:
+    """Serve a page from another process; yield the process's number and the address."""
+    command = [sys.executable, "-c", SERVE, env_id]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as server:
+        assert server.stdout is not None
+        try:
+            yield server.pid, server.stdout.readline().strip()
+        finally:
+            server.kill()
+
+
+@contextmanager
+def chromium() -> Iterator[Any]:
+    """Start Chromium without a display; yield it."""
     from playwright.sync_api import sync_playwright
 
-    chromium = os.environ.get("CHROMIUM") or shutil.which("chromium")
-    command = [sys.executable, "-c", SERVE, env_id]
-    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as server, sync_playwright() as players:
-        assert server.stdout is not None
-        url = server.stdout.readline().strip()
-        browser = players.chromium.launch(executable_path=chromium)
-        page = browser.new_page(viewport={"width": width, "height": 900})
-        page.goto(url)
-        page.wait_for_selector("body[data-ready]", timeout=120_000)
-        page.wait_for_timeout(3000)
-        before, used = page.evaluate(COUNTS), processor_time(server.pid)
-        page.wait_for_timeout(1000 * WATCHED)
-        after, spent = page.evaluate(COUNTS), processor_time(server.pid)
-        page.screenshot(path=out / f"{env_id.rpartition('/')[2]}-{width}.png")
+    path = os.environ.get("CHROMIUM") or shutil.which("chromium")
+    with sync_playwright() as players:
+        browser = players.chromium.launch(executable_path=path)
+        yield browser
         browser.close()
-        server.kill()
+
+
+def opened(browser: Any, url: str, width: int = 1280) -> Any:
+    """Open a page and return it when it plays."""
+    page = browser.new_page(viewport={"width": width, "height": 900})
+    page.goto(url)
+    page.wait_for_selector("body[data-ready]", timeout=120_000)
+    return page
+
+
+def watch(env_id: str, out: Path, width: int = 1280) -> dict[str, float]:
+    """Return states and frames a second of a page, and the share of a core that its server takes."""
+    with served(env_id) as (server, url), chromium() as browser:
+        page = opened(browser, url, width)
+        page.wait_for_timeout(3000)
+        before, used = page.evaluate(COUNTS), processor_time(server)
+        page.wait_for_timeout(1000 * WATCHED)
+        after, spent = page.evaluate(COUNTS), processor_time(server)
+        page.screenshot(path=out / f"{env_id.rpartition('/')[2]}-{width}.png")
     seconds = after[2] - before[2]
     return {
         "states a second": (after[0] - before[0]) / seconds,
@@ -86,20 +111,41 @@ def alone(env_id: str) -> float:
     return (time.process_time() - began) / (steps * simulation.setting.dt)
 
 
-def memory_over(seconds: float) -> dict[str, float]:
-    """Return the memory of a page after a tenth of some simulated time and at its end [MB]."""
-    simulation = Simulation(LEG)
-    player = Player(simulation)
-    player.reset(simulation.reset())
-    found = {}
-    for part, name in ((0.1, "after a tenth"), (1.0, "at the end")):
-        while player.shown < part * seconds:
-            player.go(0.2)
-            player.curves()
-            player.steps()
-            player.row()
-        found[name] = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1e3
-    return found
+def memory_of(process: int) -> float:
+    """Return the memory of a process that is resident [MB], from /proc."""
+    pages = Path(f"/proc/{process}/statm").read_text(encoding="utf-8").split()[1]
+    return int(pages) * os.sysconf("SC_PAGE_SIZE") / 1e6
+
+
+def memory_over(env_id: str, seconds: float, speed: float = 1.0) -> dict[str, Any]:
+    """Return the memory of a server by the minutes that its page has shown, and after tabs that were opened and
+    closed [MB].
+
+    Args:
+        env_id: id of an environment.
+        seconds: simulated time over which the page is watched [s].
+        speed: simulated over real time [-].
+    """
+    with served(env_id) as (server, url), chromium() as browser:
+        page = opened(browser, url)
+        page.emulate_media(reduced_motion="reduce")  # what the browser paints is not measured here
+        page.locator("#speed").evaluate(MOVE, str(speed))
+        minutes: dict[str, float] = {}
+        shown = 0.0
+        while shown < seconds:
+            page.wait_for_timeout(60_000)
+            shown, states = page.evaluate(SHOWN), page.evaluate(COUNTS)[0]
+            minutes[f"{shown / 60:.1f}"] = memory_of(server)
+            print(f"{env_id}, {shown / 60:.1f} min, {states} states: {memory_of(server):.1f} MB", flush=True)
+        tabs = []
+        for _ in range(TABS):
+            other = opened(browser, url)
+            other.wait_for_timeout(3000)
+            other.close()
+            page.wait_for_timeout(3000)
+            tabs.append(memory_of(server))
+            print(f"{env_id}, tab {len(tabs)}: {tabs[-1]:.1f} MB", flush=True)
+    return {"states": states, "by minute": minutes, "after each tab": tabs}
 
 
 def sizes(out: Path) -> dict[str, float]:
@@ -125,7 +171,7 @@ def main() -> None:
     """Measure, print and write view.json."""
     parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
     parser.add_argument("--out", type=Path, required=True, help="folder of figures and pictures")
-    parser.add_argument("--hour", action="store_true", help="also simulate an hour")
+    parser.add_argument("--hour", action="store_true", help="watch a page of each id for an hour of its time")
     given = parser.parse_args()
     given.out.mkdir(parents=True, exist_ok=True)
     figures: dict[str, Any] = {"load": os.getloadavg()[0]}
@@ -135,7 +181,7 @@ def main() -> None:
     watch(LEG, given.out, 390)
     figures["sizes"] = sizes(given.out)
     if given.hour:
-        figures["memory"] = memory_over(HOUR)
+        figures["memory"] = {LEG: memory_over(LEG, HOUR), HORSE: memory_over(HORSE, HOUR, speed=2.0)}
     (given.out / "view.json").write_text(json.dumps(figures, indent=1) + "\n", encoding="utf-8")
     print(json.dumps(figures, indent=1))
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import time
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,6 +19,8 @@ FIRST_NUMBERS = {"time": 2, "speed": 2, "target": 2, "return": 2}
 """Digits of the numbers of a page that belong to the whole body."""
 LEG_NUMBERS = {"grf": 0, **dict(zip(STANCE, (0, 0, 1, 2, 1), strict=True))}
 """Digits of the numbers of each leg."""
+LONGEST_WORK = 0.1
+"""Time after which no further step is taken before the page has the last one [s]."""
 TERM_DIGITS = 2
 """Digits of the terms of the reward."""
 
@@ -88,17 +91,21 @@ class Player:
             seconds: time of the page [s].
 
         Returns:
-            How an episode ended meanwhile, "" if none did; the next one has begun then.
+            How an episode ended meanwhile, "" if none did; the next one has begun then. Where a step takes
+            long, as with a slow policy, the clock goes on by less than asked, to the end of the step.
 
         Raises:
             HoofEnvError: the policy or the environment cannot go on; the clock has not moved.
         """
         until = self.clock + seconds
+        late = time.monotonic() + LONGEST_WORK
         simulation = self.simulation
         while self._simulated < until - 1e-9 and not simulation.ended:
             chunk = simulation.step()
             if chunk is not None:
                 self._take(chunk)
+            if time.monotonic() > late:
+                until = min(until, self._simulated)
         self._reveal(until)
         ended = "" if self._waiting else simulation.ended
         if ended:
@@ -125,8 +132,9 @@ class Player:
             gap = np.full(len(curves["time"]), np.nan)
             curves |= dict.fromkeys(path_columns(self.legs, self.drawing.has_heel), gap)
         self._waiting.append((chunk.columns, curves))
-        if self.recording is not None:
-            self.recording.add(chunk)
+        recording = self.recording  # another thread ends it when the page is closed
+        if recording is not None:
+            recording.add(chunk)
         if chunk.terms:
             for name, value in chunk.terms.items():
                 self._totals[name] += value

@@ -109,7 +109,7 @@ def start(
     from bokeh.application.handlers.function import FunctionHandler
     from bokeh.server.server import Server
 
-    from hoof_env.view.tab import try_out
+    from hoof_env.view.answers import try_out
 
     count("port", port, low=0, most=65535)
     if ":" in address:  # Bokeh's list of origins cannot name it

@@ -59,6 +59,7 @@ class Simulation:
         hand: gait that drives the leg instead of the policy, None for the policy.
         same_motion: forces that other ground would give.
         ended: how the episode ended, "" while it runs.
+        is_asking: True while the policy is asked for an action.
 
     Raises:
         HoofEnvError: as in `records.make_env` and `records.find_policy`.
@@ -83,6 +84,7 @@ class Simulation:
         self.hand: dict[str, float] | None = None
         self.same_motion = SameMotion(self._leg.batch)  # type: ignore[attr-defined]
         self.ended = ""
+        self.is_asking = False
         self._observation: Any = None
         self._starts = True
 
@@ -167,14 +169,17 @@ class Simulation:
         if self.hand is not None:
             return self._leg.action_for(np.array([*self.hand.values()]))
         start = np.full(1, self._starts)
+        self.is_asking = True
         try:
             action, _ = self._player.predict(self._observation, episode_start=start, deterministic=True)
             is_finite = np.isfinite(np.asarray(action, float)).all()
         except HoofEnvError:
             raise
-        except Exception as error:
+        except (Exception, SystemExit) as error:
             said = f"{type(error).__name__}: {error}"
             raise ParameterError(f"policy {self.policy_name}: expected actions, it raised {said}") from error
+        finally:
+            self.is_asking = False
         if not is_finite:
             numbers = np.asarray(action).tolist()
             raise ParameterError(f"policy {self.policy_name}: expected finite actions, got {numbers}")

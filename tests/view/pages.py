@@ -27,18 +27,33 @@ class Page:
         heard = {}
         self.tab.wire.on_change("told", lambda attr, old, new: heard.update(new))
         self.tab._on_asked("asked", None, {"name": name, "count": 1} | more)
+        self.wait()
         return heard
+
+    def wait(self):
+        """Wait until the thread of the tab is idle; take what it sends."""
+        self.tab._worker._jobs.join()
+        self.tab._send()
 
     def tick(self, seconds):
         """Let real time pass."""
         for _ in range(round(seconds / 0.04)):
             self.tab._last = time.monotonic() - 0.04
             self.tab._tick()
+            self.wait()
+
+    @property
+    def answers(self):
+        return self.tab.answers
+
+    @property
+    def player(self):
+        return self.tab.answers.player
 
     @property
     def news(self):
         """Return the last message: row, curves and terms by name, and True if they begin anew."""
-        player = self.tab.player
+        player = self.player
         anew, *counts = self.tab.wire.news[:3]
         names = [[*player.history.between(-1, 1e9)[0]], ["time", *player.simulation.terms]]
         lengths = [player.drawing.length]

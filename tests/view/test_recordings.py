@@ -21,9 +21,9 @@ def test_a_recording_is_written_in_each_format(page, suffix, tmp_path):
     assert page.ask("record", suffix=suffix)["recording"] is True
     page.tick(0.2)
     writes = []
-    recording = page.tab.player.recording
+    recording = page.player.recording
     recording._tell = lambda *what: writes.append(what)
-    page.tab.player.recording = None
+    page.player.recording = None
     recording.write().join()
     assert writes[0][1] == "note", writes
     (path,) = tmp_path.glob(f"horseleg-v0-*{suffix}")
@@ -37,9 +37,9 @@ def test_a_film_begins_with_the_recording(page, monkeypatch):
     monkeypatch.setattr(film, "write_film", lambda frames, path, fps: made.extend(frames))
     page.tick(0.6)
     page.ask("record", suffix=".gif")
-    recording = page.tab.player.recording
+    recording = page.player.recording
     page.tick(0.4)
-    page.tab.player.recording = None
+    page.player.recording = None
     recording.write().join()
     assert 10 <= len(made) <= 11  # 0.4 s
 
@@ -48,7 +48,7 @@ def test_a_tab_that_is_closed_during_a_recording_writes_it(tmp_path, capfd):
     page = Page(tmp_path)
     page.ask("record", suffix=".csv")
     page.tick(0.2)
-    recording = page.tab.player.recording
+    recording = page.player.recording
     write = recording.write
     threads = []
     recording.write = lambda: threads.append(write())
@@ -66,14 +66,14 @@ def test_a_recording_describes_its_own_episode_when_the_next_one_has_begun(end, 
     monkeypatch.setattr(records, "write", lambda columns, about, path: described.append(about))
     page.ask("touch", setting="friction", value=0.5)
     page.ask("record", suffix=".csv")
-    recording = page.tab.player.recording
+    recording = page.player.recording
     page.tick(0.2)
     if end == "reset":
         page.ask("reset", seed=9, policy="run")
     else:
         page.tick(0.6)
     page.ask("touch", setting="friction", value=0.7)
-    assert page.tab.player.simulation.seed != 3
+    assert page.player.simulation.seed != 3
     recording.write().join()
     for about in described:
         assert (about["seed"], about["policy"]) == (3, "walk")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 import warnings
 from types import SimpleNamespace
 
@@ -13,11 +14,11 @@ from hoof_env import records
 pytest.importorskip("bokeh")
 
 
-from hoof_env.view import tab as tab_module
+from hoof_env.view import answers as answers_module
+from hoof_env.view.answers import HANDLERS
 from hoof_env.view.controls import CONDITIONS, PAPER_ID, paper_values
 from hoof_env.view.server import Pages
 from hoof_env.view.simulation import Simulation
-from hoof_env.view.tab import HANDLERS
 from tests.view.pages import LEG, SETUP, Page, opened
 
 
@@ -59,16 +60,16 @@ def test_a_reset_with_a_seed_begins_the_same_episode(page):
     page.tick(0.3)
     page.ask("reset", seed=5)
     np.testing.assert_array_equal(page.row, first)
-    assert page.tab.player.simulation.policy == "walk"
+    assert page.player.simulation.policy == "walk"
     assert page.row[0] == 0.0
 
 
 def test_a_reset_says_whether_a_hand_still_drives(page):
     page.ask("drive", setting="crank_speed", value=3.0)
     assert page.ask("reset")["hand"] is True
-    assert page.tab.player.simulation.hand["crank_speed"] == 3.0
+    assert page.player.simulation.hand["crank_speed"] == 3.0
     assert page.ask("reset", policy="walk")["hand"] is False
-    assert page.tab.player.simulation.hand is None
+    assert page.player.simulation.hand is None
 
 
 def test_another_preset_needs_no_other_policy_where_none_was_named(page):
@@ -84,9 +85,9 @@ def test_a_slider_moves_the_ground_and_the_next_episode_keeps_it(page):
     page.ask("reset")
     page.ask("touch", setting="restitution", value=0.1)  # before the first step of the episode
     page.tick(0.2)
-    assert page.tab.player.simulation.parameters == {"stiffness": 40000.0, "restitution": 0.1}
+    assert page.player.simulation.parameters == {"stiffness": 40000.0, "restitution": 0.1}
     page.ask("touch", setting="target_speed", value=1.5)
-    assert page.tab.player.simulation.commanded_speed == 1.5
+    assert page.player.simulation.commanded_speed == 1.5
     page.ask("touch", setting="exponent", value=1.5)
     # What was touched goes along to the page of the other exponent.
     assert page.kept[-1]["arguments"] == {"stiffness": 40000.0, "restitution": 0.1, "exponent": 1.5}
@@ -128,12 +129,12 @@ def test_no_state_is_lost_or_doubled_whatever_is_asked_meanwhile(page, seed):
     page.ask("speed", value=1.0)
     page.ask("play", value=True)
     page.tick(0.8)
-    history = page.tab.player.history
+    history = page.player.history
     for k, group in enumerate(("curves", "steps")):
         time = np.array(has[group, "time"])
         assert len(time) > 30
         assert np.all(np.diff(time) > 0)
-        assert time[-1] > page.tab.player.shown - 0.07
+        assert time[-1] > page.player.shown - 0.07
         whole = history.between(time[0], time[-1])[k]
         for name, values in whole.items():
             np.testing.assert_array_equal(has[group, name], values, err_msg=name)
@@ -141,7 +142,7 @@ def test_no_state_is_lost_or_doubled_whatever_is_asked_meanwhile(page, seed):
 
 def test_a_warning_waits_until_the_page_has_opened(tmp_path, monkeypatch):
     warned = lambda **setup: warnings.warn("A zip.", stacklevel=1) or Simulation(**setup)  # noqa: E731
-    monkeypatch.setattr(tab_module, "Simulation", warned)
+    monkeypatch.setattr(answers_module, "Simulation", warned)
     page = Page(tmp_path)
     page.tick(0.2)
     assert page.tab.wire.told == {}
@@ -153,7 +154,7 @@ def test_a_warning_waits_until_the_page_has_opened(tmp_path, monkeypatch):
 
 def test_a_push_adds_its_impulse_over_the_mass(page):
     page.tick(0.1)
-    leg = page.tab.player.simulation.env.unwrapped
+    leg = page.player.simulation.env.unwrapped
     before = leg.batch.engine.state["momentum_x"].item()
     assert "60 N s" in page.ask("push", value=60)["status"]
     assert leg.batch.engine.state["momentum_x"].item() == pytest.approx(before + 60)
@@ -176,7 +177,7 @@ def test_a_push_adds_its_impulse_over_the_mass(page):
         ({"name": "push", "value": None}, "push"),
         ({"name": "push", "value": 1e9}, "push"),
         ({"name": "stop everything"}, "request"),
-        ({"name": "touch"}, "TypeError: Tab.touch() missing"),
+        ({"name": "touch"}, "TypeError: Answers.touch() missing"),
     ],
 )
 def test_a_refusal_says_why_and_the_page_lives_on(page, request_, words):
@@ -234,19 +235,20 @@ def raising(*given, **more):
         (lambda *_, **__: (np.full(4, np.nan), None), "expected finite actions"),
         (lambda *_, **__: (["fast"], None), "could not convert"),
         (lambda *_, **__: 3.0, "TypeError"),
+        (lambda *_, **__: sys.exit(3), "it raised SystemExit: 3"),
         (raising, "policy walk: expected actions, it raised RuntimeError: out of order"),
     ],
 )
 def test_a_policy_that_fails_pauses_the_page_until_another_drives(tmp_path, predict, words):
     page = Page(tmp_path, policy="walk")
     page.tick(0.1)
-    page.tab.player.simulation._player = SimpleNamespace(predict=predict)
+    page.player.simulation._player = SimpleNamespace(predict=predict)
     told = []
     page.tab.wire.on_change("told", lambda attr, old, new: told.append(new))
     page.tick(0.1)
     assert words in told[0]["status"]
     assert (told[0]["kind"], told[0]["playing"]) == ("error", False)
-    assert page.tab.playing is False
+    assert page.answers.playing is False
     page.ask("step")  # may show what was simulated before
     assert words in page.ask("step")["status"]
     page.ask("reset", policy="run")
@@ -260,9 +262,9 @@ def test_a_policy_that_fails_pauses_the_page_until_another_drives(tmp_path, pred
 def test_no_error_of_a_tick_stops_the_page_without_words(page, monkeypatch, part, capfd):
     page.tick(0.1)
     with monkeypatch.context() as broken:
-        broken.setattr(page.tab.player, part, raising)
+        broken.setattr(page.player, part, raising)
         page.tick(0.1)
-    assert page.tab.playing is False
+    assert page.answers.playing is False
     assert page.tab.wire.told["status"] == "RuntimeError: out of order"
     assert "in raising" in capfd.readouterr().err  # the whole trace, for the author of what is broken
     page.ask("play", value=True)
@@ -283,21 +285,21 @@ def test_an_error_of_the_thread_that_writes_is_told(page, monkeypatch):
     page.ask("record", suffix=".csv")
     page.tick(0.1)
     told = []
-    recording = page.tab.player.recording
+    recording = page.player.recording
     recording._tell = lambda *what: told.append(what)
-    page.tab.player.recording = None
+    page.player.recording = None
     recording.write().join()
     assert told == [(f"{recording.path}: RuntimeError: out of order", "error")]
 
 
 def test_an_error_of_a_new_page_is_told_on_it(tmp_path, monkeypatch):
-    monkeypatch.setattr(tab_module, "Simulation", raising)
+    monkeypatch.setattr(answers_module, "Simulation", raising)
     refused = opened(Pages(SETUP, tmp_path))
     assert refused.template_variables["reason"] == "RuntimeError: out of order"
 
 
 def test_bars_of_the_reward_are_those_of_the_moment_that_is_shown(page):
-    player = page.tab.player
+    player = page.player
     names = [name for name, _ in player.numbers]
     first = 3 + names.index(player.simulation.terms[0])
     shown = {}
@@ -317,7 +319,7 @@ def test_the_policies_that_the_page_offers_can_be_chosen(page):
     assert {"walk", "run", "open-loop", "shipped"} <= set(offered)
     assert page.ask("reset", policy="shipped")["kind"] == "note"
     page.tick(0.1)
-    assert page.tab.playing
+    assert page.answers.playing
 
 
 def test_the_conditions_of_the_paper_are_the_paper(page):
