@@ -53,6 +53,7 @@ def test_a_tab_that_is_closed_during_a_recording_writes_it(tmp_path, capfd):
     threads = []
     recording.write = lambda: threads.append(write())
     page.tab.close()
+    page.tab._worker._thread.join()
     threads[0].join()
     (path,) = tmp_path.glob("*.csv")
     assert str(path) in capfd.readouterr().out
