@@ -115,8 +115,15 @@ class Recording:
             moved = [_from_zero(chunk.columns, self._chunks[0].columns["time"][0]) for chunk in self._chunks]
             film.write_film(film.frames(renderer, moved, FPS, 1.0, read), self.path, FPS)
         else:
-            about = simulation.about(
-                **self._played, threshold_n=THRESHOLD, bodies={}, reactions=[], parameters=self._parameters
+            about = records.describe(
+                simulation.env,
+                environment=simulation.env_id,
+                arguments=simulation.arguments,
+                **self._played,
+                threshold_n=THRESHOLD,
+                bodies={},
+                reactions=[],
+                parameters=self._parameters,
             )
             record = records.joined([c.columns for c in self._chunks], records.units_of(simulation.env))
             records.write(record, about, self.path)

@@ -285,12 +285,6 @@ class Simulation:
         """
         self._leg.push(check_number("push", impulse))
 
-    def about(self, **more: Any) -> dict[str, Any]:
-        """Return the description of a record of this simulation, see `records.describe`."""
-        settings = {"environment": self.env_id, "arguments": self.arguments}
-        played = {"policy": self.policy_name, "seed": self.seed}
-        return records.describe(self.env, **settings, **(played | more))
-
     @property
     def policy_name(self) -> str | None:
         """Name of the policy, None for the default, and the text of an object."""

@@ -15,10 +15,10 @@ from hoof_env.view.worker import Worker
 
 TICK = 1 / 30  # time between two states that are sent [s]
 LONGEST_TICK = 0.1  # time of which a late tick makes up [s]
-PATIENCE = 1.0  # time after which a page says what it waits for [s]
+PATIENCE = 2.0  # time after which a page says what it waits for [s]
 
 LATE_POLICY = f"The policy has not answered for {PATIENCE:g} s. Pause, or choose another one; all else waits."
-LATE = "This takes a while: kernels are compiled, or a policy is loaded."
+LATE = "This takes a while, as when kernels are compiled or a policy is loaded."
 
 
 class Tab:
@@ -62,10 +62,8 @@ class Tab:
         """Send what is new, and let time pass."""
         is_busy = self._worker.is_busy
         if not is_busy and self._late_since is not None:
-            waited = time.monotonic() - self._late_since
-            self.answers.outbox.appendleft(
-                ("told", {"kind": "note", "status": f"Done, after {waited:.1f} s."})
-            )
+            took = f"It took {time.monotonic() - self._late_since:.1f} s."
+            self.answers.outbox.appendleft(("told", {"kind": "note", "status": took}))
             self._late_since = None
         self._send()
         if is_busy:
