@@ -118,8 +118,8 @@ def memory_of(process: int) -> float:
 
 
 def memory_over(env_id: str, seconds: float, speed: float = 1.0) -> dict[str, Any]:
-    """Return the memory of a server by the minutes that its page has shown, and after tabs that were opened and
-    closed [MB].
+    """Return the memory of a server by the minutes that its page has shown, and after each of some tabs that
+    were opened and closed [MB].
 
     Args:
         env_id: id of an environment.

@@ -378,7 +378,7 @@ def test_a_refusal_is_told_and_the_page_plays_on(tab):
     tab.page.get_by_label("impulse at the trunk").fill("1e9")
     tab.press("Push")
     tab.page.wait_for_selector("#status[data-kind=error]")
-    tab.status("push")
+    tab.status("forward")
     tab.page.get_by_label("environment").fill("CartPole-v1")
     tab.press("Apply")
     tab.status("CartPole-v1")
@@ -418,7 +418,7 @@ def test_a_push_changes_the_speed_of_the_trunk(tab):
     page.get_by_label("impulse at the trunk").fill("1e9")
     tab.press("Push")
     page.wait_for_selector("#status[data-kind=error]")
-    tab.status("push")
+    tab.status("forward")
 
 
 def test_a_policy_that_fails_before_the_page_is_there_is_told(browser, tmp_path):

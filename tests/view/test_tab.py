@@ -175,7 +175,7 @@ def test_a_push_adds_its_impulse_over_the_mass(page):
         ({"name": "condition", "value": "fly"}, "fly"),
         ({"name": "record", "suffix": ".doc"}, "format"),
         ({"name": "push", "value": None}, "push"),
-        ({"name": "push", "value": 1e9}, "push"),
+        ({"name": "push", "value": 1e9}, "forward"),
         ({"name": "stop everything"}, "request"),
         ({"name": "touch"}, "TypeError: Answers.touch() missing"),
     ],
