@@ -60,10 +60,10 @@ def test_a_leg_with_one_foot_has_no_heel(tmp_path):
     assert 'class="heel"' in html_of(Page(tmp_path))
 
 
-def test_every_slider_of_a_setting_has_unit_and_range(page):
+def test_every_slider_of_a_setting_has_unit_and_range(tmp_path):
     for env_id, arguments in ((LEG, {"drive": "motor"}), (HORSE, {})):
-        tab = Page(page.tab._out, env_id=env_id, arguments=arguments).tab
-        sliders = [one for group in setting_sliders(tab.player.simulation).values() for one in group]
+        made = Page(tmp_path, env_id=env_id, arguments=arguments)
+        sliders = [one for group in setting_sliders(made.player.simulation).values() for one in group]
         assert len(sliders) >= 6
         for one in sliders:
             assert one.low < one.high
@@ -72,6 +72,7 @@ def test_every_slider_of_a_setting_has_unit_and_range(page):
         marks = {one.name: [text for _, text in one.marks] for one in sliders}
         assert marks["stiffness"] == ["20000"]
         assert marks["restitution"] == ["0", "1"]
+        made.tab.close()
 
 
 # Pages that stand alone
