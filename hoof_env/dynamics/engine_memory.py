@@ -39,6 +39,18 @@ from hoof_env.ground.contact import Ground
 from hoof_env.simd.layout import views
 
 
+def each_once(envs: ArrayLike | None, num_envs: int) -> NDArray[np.int64]:
+    """Return indices as `memory.which` does, of environments that are named once.
+
+    Raises:
+        ParameterError: other environments, or one twice: NumPy would add the last of its two values alone.
+    """
+    where = memory.which(envs, num_envs)
+    if np.unique(where).size < where.size:
+        raise ParameterError(f"envs: expected each environment once, got {envs!r}")
+    return where
+
+
 class EngineMemory(Mechanics):
     """State, settings and reports of the environments of a `TrunkEngine`."""
 
@@ -233,9 +245,9 @@ class EngineMemory(Mechanics):
             envs: environments that are pushed, as indices or as a mask of shape (num_envs,); None is all.
 
         Raises:
-            ParameterError: an impulse beyond `MOST_IMPULSE` or of the wrong shape, or a fixed trunk.
+            ParameterError: an impulse beyond `MOST_IMPULSE` or of wrong shape, bad `envs`, or a fixed trunk.
         """
-        where = memory.which(envs, self.num_envs)
+        where = each_once(envs, self.num_envs)
         if self.trunk.kind == "fixed":
             raise ParameterError("push: expected a trunk that moves, got a fixed one")
         pushed = {"forward": forward, "upward": upward}

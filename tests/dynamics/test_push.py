@@ -5,6 +5,7 @@ import pytest
 
 from hoof_env import Limb, Motor, Prescribed, Trunk, TrunkEngine, load_gait, load_geometry
 from hoof_env.dynamics.tally import tally_of
+from hoof_env.errors import ParameterError
 from hoof_env.ground.contact import load_ground
 
 LEG = load_geometry("identified")
@@ -84,5 +85,16 @@ def test_a_push_of_nothing_changes_nothing():
     engine = started("suspended", [Motor()], np.random.default_rng(1))
     before = engine.state
     engine.push(0.0, 0.0)
+    for name, values in engine.state.items():
+        np.testing.assert_array_equal(values, before[name])
+
+
+@pytest.mark.parametrize("drive", [Prescribed(), Motor()], ids=["prescribed", "motor"])
+def test_a_trunk_is_pushed_once_in_a_call(drive):
+    """Its momentum would take one of two impulses, and the cranks of motors both."""
+    engine = started("suspended", [drive], np.random.default_rng(1))
+    before = engine.state
+    with pytest.raises(ParameterError, match=r"envs: expected each environment once, got \[2, 0, 2\]"):
+        engine.push([1.0, 2.0, 3.0], 0.0, [2, 0, 2])
     for name, values in engine.state.items():
         np.testing.assert_array_equal(values, before[name])
