@@ -248,7 +248,7 @@ class Horse:
 
     def commanded_speeds(self, s: Settings) -> tuple[float, float]:
         """Return the lowest and highest commanded speed [m/s]."""
-        return check_range("target_speed", s.target_speed, 0.1)
+        return check_range("target_speed", s.target_speed, *OPTIONS["target_speed"])
 
     def constants(self, engine: TrunkEngine, dt: float) -> dict[str, Any]:
         """Return the body's part of the task's record: spans of actions, bounds of commands, and the

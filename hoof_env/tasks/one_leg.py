@@ -31,7 +31,7 @@ from hoof_env.simd.compile import inline_llvm
 from hoof_env.simd.math import clip
 from hoof_env.tasks.body import BodyKernels
 from hoof_env.tasks.episode import ACTIONS, Episode
-from hoof_env.tasks.leg_starts import HIGHEST, LOWEST, Start, check_options, draw_starts
+from hoof_env.tasks.leg_starts import HIGHEST, LOWEST, OPTIONS, Start, check_options, draw_starts
 from hoof_env.tasks.parameters import check_range, drive_of, ground_of, hoof_spring
 from hoof_env.tasks.settings import ResolvedSettings, Settings
 
@@ -240,7 +240,9 @@ class OneLeg:
 
     def commanded_speeds(self, s: Settings) -> tuple[float, float] | None:
         """Return the lowest and highest commanded speed [m/s], None for no command."""
-        return None if s.target_speed is None else check_range("target_speed", s.target_speed, -20.0)
+        if s.target_speed is None:
+            return None
+        return check_range("target_speed", s.target_speed, *OPTIONS["target_speed"])
 
     def reach(self, engine: TrunkEngine, dt: float) -> Floats:
         """Return the distance of the command of an action of 1 from where the gait is heading, shape (4,)

@@ -185,6 +185,7 @@ SETTINGS = {
         ({"size": "small"}, "size: expected"),
         ({"target_speed": 2.0, "target_seconds": (1.0, 2.0)}, "target_seconds: expected a range of target"),
         ({"target_speed": -2.0}, r"target_speed\[0\]: expected"),
+        ({"target_speed": (1.0, 21.0)}, r"target_speed\[1\]: expected a finite number in \[1, 20\], got 21"),
         ({"target_speed": (0.0, 2.0)}, r"target_speed\[0\]: expected"),
     ],
 }
@@ -305,6 +306,11 @@ SCHEDULES = [
         LEG,
         {"schedule": {"target_speed": [1.0, [3.0, 2.0], 5]}},
         r"schedule\['target_speed'\], last: target_speed",
+    ),
+    (
+        LEG,
+        {"schedule": {"target_speed": [1.0, 21.0, 5]}},
+        r"schedule\['target_speed'\], last: target_speed\[0\]: expected .*\[-20, 20\], got 21",
     ),
     (
         LEG,
