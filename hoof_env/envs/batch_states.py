@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from hoof_env.envs.conditions import RowConditions, conditions_of, enter, under_each
 from hoof_env.errors import ParameterError
-from hoof_env.tasks.disturbances import Push
+from hoof_env.tasks.disturbances import MOST_PUSH, Push
 from hoof_env.tasks.settings import Settings
 
 Floats = NDArray[np.float64]
@@ -223,8 +223,12 @@ def _read_plans(batch: Any, given: Any) -> list[tuple[Push, ...]]:
         plans = [tuple((int(at), float(x), float(y)) for at, x, y in plan) for plan in given]
     except (TypeError, ValueError, OverflowError):
         plans = []
-    if len(plans) != batch.num_envs or not np.isfinite([push for plan in plans for push in plan]).all():
-        raise ParameterError(f"state['pushes']: expected the pushes of each environment, got {given!r:.60}")
+    impulses = np.abs([push[1:] for plan in plans for push in plan])
+    if len(plans) != batch.num_envs or not (impulses <= MOST_PUSH).all():
+        raise ParameterError(
+            f"state['pushes']: expected the pushes of each environment, up to {MOST_PUSH:g} N s, got"
+            f" {given!r:.60}"
+        )
     return plans
 
 

@@ -340,8 +340,9 @@ def test_calls_and_options_that_cannot_be_are_refused_and_change_nothing():
     broken["observations"] = np.full((3, leg.single_observation_space.shape[0]), np.nan)
     with pytest.raises(ParameterError, match=r"state\['observations'\]"):
         leg.set_state(broken)
-    with pytest.raises(ParameterError, match=r"state\['pushes'\]"):
-        leg.set_state({**before, "pushes": [[1]]})
+    for plan in ([1], [(5, 2e5, 0.0)], [(5, 0.0, np.nan)]):
+        with pytest.raises(ParameterError, match=r"state\['pushes'\]: expected .* up to 100000 N s"):
+            leg.set_state({**before, "pushes": [plan] * 3})
     same(leg.get_state(), before)
 
 
