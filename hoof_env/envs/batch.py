@@ -113,6 +113,7 @@ class EpisodeBatch(BatchKernels, BatchChanges):
         steps_before: control steps of each row in earlier episodes, from which schedules follow, shape
             (num_envs,).
         is_push_unseen: True if a trunk was pushed since the last step, which no observation shows yet.
+        unpushed: what was measured at the end of the last step, by row, of those that were due to be pushed.
         kept_begins: values of the rows that terms keep at the start of an episode.
         schedule: courses of scheduled settings by name; `randomize` has their ranges, too.
         drawn_names: names of the parameters that any row draws, in the order of `start_values`.
@@ -204,11 +205,11 @@ class EpisodeBatch(BatchKernels, BatchChanges):
         self.steps_before = np.zeros(self.num_envs)
         self.kept_begins = np.array([row.begin for term in self.task.terms for row in term.keeps])
         self.is_push_unseen = False
+        self.unpushed: dict[int, Floats] = {}
         self.drawn_names = [*self.randomize]
         self.start_values = np.full((self.start_row_count + len(self.randomize), self.num_envs), np.nan)
-        columns = self.engine.columns
-        self.episode = np.zeros((self.layout.size, columns))
-        self.rewards = np.zeros(columns)
+        self.episode = np.zeros((self.layout.size, self.engine.columns))
+        self.rewards = np.zeros(self.engine.columns)
         make_memory(self)
         self.task_record = task_record(self)
 
@@ -296,6 +297,7 @@ class EpisodeBatch(BatchKernels, BatchChanges):
             elif put_back.size:
                 self._observe_broken(put_back)
         self.is_push_unseen = False
+        self.unpushed = {}
         rows = self.episode_rows
         each = (SOME_SWITCHED, rows.switch, draw_targets), (SOME_PUSHED, rows.push_at, push_due)
         for code, at, act in each:

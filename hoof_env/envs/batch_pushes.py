@@ -119,6 +119,8 @@ def plan_pushes(batch: Any, which: Rows, generators: Generators) -> None:
 def push_due(batch: Any, due: Rows, generators: Generators) -> None:
     """Push the trunks of some rows as planned, and plan their next pushes."""
     episode = batch.episode_rows
+    measured = batch.measurements.read(batch.engine.arrays[0][:, due])
+    batch.unpushed = dict(zip(due.tolist(), measured.T, strict=True))
     batch.engine.push(*(episode.strength[due] * episode.next_push[:, due]), due)
     batch.is_push_unseen = True
     plan_pushes(batch, due, generators)

@@ -96,6 +96,7 @@ def start(
     seed means."""
     episode = batch.episode_rows
     options = {**batch.task.start, **options}
+    batch.unpushed = {env: values for env, values in batch.unpushed.items() if env not in which}
     batch.steps_before[which] += episode.steps[which]
     of_options = options.get("parameters", {})
     parameters = batch.randomize | of_options

@@ -144,6 +144,7 @@ def _set_state(batch: Any, state: Mapping[str, Any]) -> None:
     batch.push_plans = plans
     batch.steps_before[:] = steps_before
     batch.is_push_unseen = "observations" in state
+    batch.unpushed = {}
     # The state's engine may have drawn parameters, which the next reset must replace.
     batch.has_overrides[:] = True
     if batch.conditions.differ:

@@ -39,8 +39,7 @@ class HorseLegEnv(LegBase, gym.Env[NDArray[np.float32], NDArray[np.float32]]):
 
     Attributes:
         batch: episode, a batch of one.
-        action_space, observation_space: boxes from -1 to 1, float32, of shapes (len(action_names),) and
-            (len(observation_names),).
+        action_space, observation_space: boxes from -1 to 1, float32, of `action_names`, `observation_names`.
 
     Raises:
         ParameterError: a bad argument, option or action, with what was given and what was expected.
@@ -114,8 +113,7 @@ class HorseLegEnv(LegBase, gym.Env[NDArray[np.float32], NDArray[np.float32]]):
 
         Args:
             seed: seed of the generator, a whole number from 0; None continues with the present generator.
-            options: "gait", "crank_angle" [rad], "speed" [m/s], "height" [m], "x" [m], "target_speed"
-                [m/s] for the whole episode, "parameters"; see the manual page.
+            options: values of the start and of the episode by name; the manual page has names and units.
 
         Returns:
             The observation, float32, and the info, with the values that were drawn or set.
@@ -167,10 +165,11 @@ class HorseLegEnv(LegBase, gym.Env[NDArray[np.float32], NDArray[np.float32]]):
         except (TypeError, ValueError, BufferError):
             self._read_action(action)
         happened = kernel(addresses)  # not through the batch: a call costs as much as a substep
+        measured = measure()  # before a push that is due, which changes speeds at once
         ended = happened != 0 and self._follow(happened)
         info = self._begun[0]()  # has all keys already, in the order of the reset's info
         info["gait"] = self._begun[1]()
-        info["measured"] = measure()
+        info["measured"] = measured
         if draws:
             info["parameters"] = info["parameters"].copy()  # callers may change their info
         for key, k in paid:
@@ -184,6 +183,7 @@ class HorseLegEnv(LegBase, gym.Env[NDArray[np.float32], NDArray[np.float32]]):
                 self._phase = "ended"
             info |= ending_of(self.batch, 0)
             if broken(self.batch.engine.results)[0]:  # the step was taken back: it has no sums
+                info["measured"] = measure()
                 info["measured"][self.batch.measurements.last_step] = 0.0
         if self._watched:
             self._watched[0].add()

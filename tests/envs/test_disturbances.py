@@ -265,6 +265,27 @@ def test_records_follow_pushes():
         assert record["crank_angle"][-1, 2, 0] == info["measured"]["left_hind_crank_angle"]
 
 
+def test_infos_are_of_the_end_of_a_step_and_not_of_the_push_after_it():
+    """A push changes the speed of a motor's crank at once, which a record of the step does not have."""
+    given = {"drive": "motor", "push_impulse": [20.0, 40.0], "push_seconds": 0.04, "episode_seconds": 0.14}
+    env, envs = make(LEG, **given), make(LEG, 3, autoreset_mode="SAME_STEP", **given)
+    env.reset(seed=0)
+    env.record()
+    envs.reset(seed=0)
+    changed = 0
+    for action in actions(3, 24):
+        _, _, terminated, truncated, info = env.step(action)
+        infos = envs.step(np.repeat(action[None], 3, 0))[-1]
+        rate = info["measured"]["crank_angle_rate"]
+        assert rate == env.record()["crank_angle_rate"][-1, 0, 0]
+        changed += rate != env.engine.state["crank_angle_rate"][0, 0]
+        if terminated or truncated:
+            same(infos["final_info"]["measured"][0], info["measured"])
+            info = env.reset()[1]
+        same(infos["measured"][0], info["measured"])
+    assert changed > 6
+
+
 @pytest.mark.parametrize("env_id", [LEG, HORSE])
 def test_states_pickles_and_copies_continue_with_the_same_bits(env_id):
     given = {**NOISY, "episode_seconds": 2.0}
