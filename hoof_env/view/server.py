@@ -22,6 +22,9 @@ from hoof_env.view.words import words_of
 MOST_TABS = 8
 """Largest number of tabs, each with a simulation of its own."""
 
+LINGER = 1000
+"""Time after which a tab without a browser is let go [ms]."""
+
 KEPT_SETUPS = 64
 """Number of set-ups to which tabs may go back."""
 
@@ -125,7 +128,7 @@ def start(
             port=port,
             allow_websocket_origin=[f"{name}:{port}" for name in {address, "localhost"}],
             check_unused_sessions_milliseconds=500,
-            unused_session_lifetime_milliseconds=1000,
+            unused_session_lifetime_milliseconds=LINGER,
         )
     except OSError as error:
         if error.errno == errno.EADDRINUSE:

@@ -14,6 +14,7 @@ from hoof_env.view.answers import ELSEWHERE, Answers, Setup
 from hoof_env.view.worker import Worker
 
 TICK = 1 / 30  # time between two states that are sent [s]
+LOOK = 8  # time after which a tick that came too early looks again [ms]
 LONGEST_TICK = 0.1  # time of which a late tick makes up [s]
 PATIENCE = 2.0  # time after which a page says what it waits for [s]
 
@@ -49,6 +50,7 @@ class Tab:
         self._asked: list[dict[str, Any]] = []
         self._late_since: float | None = None
         self._last = time.monotonic()
+        self._looks = False
         self.wire.on_change("asked", self._on_asked)
         doc.on_session_destroyed(lambda _: self.close())
         doc.add_periodic_callback(self._tick, round(1000 * TICK))
@@ -68,6 +70,9 @@ class Tab:
         self._send()
         if is_busy:
             self._wait()
+            if not self._looks and self._late_since is None:
+                self._looks = True
+                self._doc.add_timeout_callback(self._look, LOOK)
             return
         now = time.monotonic()
         passed = min(now - self._last, LONGEST_TICK)
@@ -75,6 +80,11 @@ class Tab:
         self._answer()
         if self.answers.playing:
             self._worker.do(partial(self.answers.go, passed))
+
+    def _look(self) -> None:
+        """Look again after a tick that came too early."""
+        self._looks = False
+        self._tick()
 
     def _send(self) -> None:
         """Send what is new."""
