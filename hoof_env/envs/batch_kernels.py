@@ -231,4 +231,6 @@ class BatchKernels:
         for rows in reports:
             kept[rows, envs] = data[rows, envs]
         data[:] = kept
+        # NaN at the point of failure, with which a state would be refused
+        self.episode_rows.x_before[envs] = self.engine.report["x"][envs]
         self.observe_kernel(self.addresses)

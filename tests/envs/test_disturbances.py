@@ -265,6 +265,20 @@ def test_records_follow_pushes():
         assert record["crank_angle"][-1, 2, 0] == info["measured"]["left_hind_crank_angle"]
 
 
+def test_states_after_a_push_beyond_what_can_be_simulated_are_taken_again():
+    given = {"drive": "motor", "pushes": [[0.04, 1e5, -1e5]]}
+    env, envs = make(LEG, strength=10.0, **given), make(LEG, 3, autoreset_mode="DISABLED", **given)
+    env.reset(seed=0)
+    envs.reset(seed=0, options={"strength": 10.0})
+    *_, (observation, _, terminated, _, info) = steps(env, 3)
+    assert terminated
+    assert "stopped being finite" in info["end"]
+    same(env.set_state(env.get_state()), observation)
+    seen = steps(envs, 3)[-1][0]
+    assert np.isfinite(seen).all()
+    same(envs.set_state(envs.get_state()), seen)
+
+
 def test_infos_are_of_the_end_of_a_step_and_not_of_the_push_after_it():
     """A push changes the speed of a motor's crank at once, which a record of the step does not have."""
     given = {"drive": "motor", "push_impulse": [20.0, 40.0], "push_seconds": 0.04, "episode_seconds": 0.14}
