@@ -59,8 +59,8 @@ def infos_of(batch: Any, ended: bool = True) -> dict[str, NDArray[Any]]:
     values = batch.start_values.copy()
     memory = batch.engine.arrays[0]
     measured = batch.measurements.read(memory[:, :n])
-    for env, values in batch.unpushed.items():
-        measured[:, env] = values
+    for env, before_push in batch.unpushed.items():
+        measured[:, env] = before_push
     # A step that failed was taken back: it has no sums.
     if ended:
         failed = broken(batch.engine.results)

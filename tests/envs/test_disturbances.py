@@ -296,7 +296,8 @@ def test_infos_are_of_the_end_of_a_step_and_not_of_the_push_after_it():
         if terminated or truncated:
             same(infos["final_info"]["measured"][0], info["measured"])
             info = env.reset()[1]
-        same(infos["measured"][0], info["measured"])
+        for name in ("measured", "gait", "crank_angle", "speed", "height"):
+            same(infos[name][0], info[name])
     assert changed > 6
 
 
