@@ -27,6 +27,7 @@ from hoof_env.dynamics.push import push_kernel
 from hoof_env.dynamics.reactions import reactions_layout
 from hoof_env.errors import (
     Floats,
+    NotStartedError,
     ParameterError,
     all_of,
     count,
@@ -237,8 +238,7 @@ class EngineMemory(Mechanics):
         self._put(kept)
 
     def push(self, forward: ArrayLike, upward: ArrayLike = 0.0, envs: ArrayLike | None = None) -> None:
-        """Push trunks at their centres of mass, which turns cranks with motors, too. Reports show the new
-        velocities from the next call on.
+        """Push trunks at their centres of mass, and so motors' cranks. Reports show it from the next call on.
 
         Args:
             forward, upward: impulses [N s], one number, or one for each environment that is pushed.
@@ -246,8 +246,11 @@ class EngineMemory(Mechanics):
 
         Raises:
             ParameterError: an impulse beyond `MOST_IMPULSE` or of wrong shape, bad `envs`, or a fixed trunk.
+            NotStartedError: no environment was ever reset.
         """
         where = each_once(envs, self.num_envs)
+        if np.isnan(self._memory.trunk).all():
+            raise NotStartedError("the engine was asked to push before reset(): expected reset() first")
         if self.trunk.kind == "fixed":
             raise ParameterError("push: expected a trunk that moves, got a fixed one")
         pushed = {"forward": forward, "upward": upward}

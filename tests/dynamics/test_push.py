@@ -5,7 +5,7 @@ import pytest
 
 from hoof_env import Limb, Motor, Prescribed, Trunk, TrunkEngine, load_gait, load_geometry
 from hoof_env.dynamics.tally import tally_of
-from hoof_env.errors import ParameterError
+from hoof_env.errors import NotStartedError, ParameterError
 from hoof_env.ground.contact import load_ground
 
 LEG = load_geometry("identified")
@@ -79,6 +79,11 @@ def test_a_push_has_the_same_bits_alone_and_among_many():
         alone.push(impulses[env], 5.0)
         np.testing.assert_array_equal(alone.column(0), many.column(env))
         assert (alone.column(0) != before[env]).any()
+
+
+def test_an_engine_that_was_never_reset_is_not_pushed():
+    with pytest.raises(NotStartedError, match="before reset"):
+        engine_on("suspended", [Motor()]).push(1.0)
 
 
 def test_a_push_of_nothing_changes_nothing():
