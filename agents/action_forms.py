@@ -30,6 +30,7 @@ from hoof_env.envs.policies import start_of
 from hoof_env.evaluation.episodes import make_rows
 from hoof_env.gait import LIMITS, FilterSettings
 from hoof_env.tasks.one_leg import lead_of, reach_per_rate
+from hoof_env.tasks.settings import Settings
 
 OUT = STOCK.with_name("actions")
 
@@ -37,14 +38,12 @@ FILTERS = FilterSettings()
 FASTEST: dict[str, Any] = {"crank_rate": FILTERS.crank_rate, "swing_rate": FILTERS.swing_rate}
 """Settings with which an action of 1 changes the gait as fast as its filters allow."""
 
-DT = 0.02
-"""Control step of the id [s]."""
-
+USUAL = Settings()
 SUBSTEP = 1e-3
-"""Substep of its engine [s]."""
+"""Substep of the id's engine [s], which its ground asks for."""
 
-LEAD = lead_of(FILTERS, DT)
-REACH = reach_per_rate(FILTERS, DT, SUBSTEP)
+LEAD = lead_of(FILTERS, USUAL.dt)
+REACH = reach_per_rate(FILTERS, USUAL.dt, SUBSTEP)
 
 NARROW = ((0.105, 0.715), (0.627, 0.780), (0.067, 0.309), (0.246, 0.511))
 """Ranges of crank speed, swing offset, sine and cosine that the shipped agent is in for 95 % of its steps, in
@@ -122,7 +121,7 @@ def ranges(seeds: range = range(20)) -> list[tuple[float, float]]:
     policy = hoof_env.load_policy(LEG)
     observation, _ = envs.reset(seed=list(seeds), options=start_of(policy))
     gaits = []
-    for _ in range(round(10.0 / DT) - 1):
+    for _ in range(round(USUAL.episode_seconds / USUAL.dt) - 1):
         observation, *_ = envs.step(policy.predict(observation, deterministic=True)[0])
         state = envs.engine.state
         gaits.append([state[name][0] for name in LIMITS])
