@@ -22,7 +22,8 @@ from hoof_env.dynamics.form import EngineLayout, engine_layout
 from hoof_env.dynamics.hoof import law_of, level_ground, lift_heel, remember_contacts
 from hoof_env.dynamics.layout import PLAIN, Features
 from hoof_env.dynamics.limits import CHECK_EVERY, check_trunk, clear_limits, joint_check_of
-from hoof_env.dynamics.mechanics import evaluate, keep_still, velocities_to_momenta
+from hoof_env.dynamics.mechanics import evaluate, keep_still
+from hoof_env.dynamics.momenta import velocities_to_momenta
 from hoof_env.dynamics.observables import count_stride, keep_account, report_leg, report_trunk
 from hoof_env.dynamics.parts import FIXED, Result
 from hoof_env.dynamics.reactions import reactions_of

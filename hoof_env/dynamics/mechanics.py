@@ -226,6 +226,19 @@ def gather_leg(trunk, leg, kind, lanes_are_legs):  # type: ignore[no-untyped-def
     trunk.relative_momentum = add(trunk.relative_momentum, drift, lanes_are_legs)
 
 
+@inline_source
+def gather_legs(trunk, legs, leg_count, model):  # type: ignore[no-untyped-def]
+    """Compute the legs' functions and frames at the present state, and their sums about the trunk's centre of
+    mass (E6): what the momentum of all bodies needs, without forces."""
+    clear_trunk(trunk, model.kind)
+    for i in range(leg_count):
+        leg = block_at(legs, i)
+        find_crank(leg, model)
+        look_up_functions(trunk, leg, model)
+        place_frame(trunk, leg, model.form.harmonics, 0.0)
+        gather_leg(trunk, leg, model.kind, model.lanes_are_legs)
+
+
 @inline_llvm
 def move_trunk(trunk, kind):  # type: ignore[no-untyped-def]
     """Compute place and velocity of the trunk from centre of mass and momentum of all (E7), on a rail along x
@@ -269,40 +282,6 @@ def move_trunk(trunk, kind):  # type: ignore[no-untyped-def]
     trunk.mass_yp = moment.real
     trunk.mass_pp = trunk.composite_inertia
     trunk.fallen = where(place.imag < trunk.settings.bottom, 1.0, trunk.fallen)
-
-
-@inline_source
-def velocities_to_momenta(trunk, legs, leg_count, model, starts):  # type: ignore[no-untyped-def]
-    """Compute centre of mass, momentum and spin of all at a start; the inverse of `move_trunk` (E7).
-
-    Their rows hold the trunk's place, velocity and pitch rate before, and keep them in lanes not in `starts`.
-    """
-    clear_trunk(trunk, model.kind)
-    for i in range(leg_count):
-        leg = block_at(legs, i)
-        find_crank(leg, model)
-        look_up_functions(trunk, leg, model)
-        place_frame(trunk, leg, model.form.harmonics, 0.0)
-        gather_leg(trunk, leg, model.kind, model.lanes_are_legs)
-    place = trunk.state.moving.centre
-    velocity = trunk.state.moving.momentum
-    rate = trunk.state.moving.spin
-    moment = trunk.first_moment
-    drift = trunk.relative_momentum
-    per_mass = trunk.settings.inverse_mass
-    centre = place + per_mass * moment
-    momentum = trunk.settings.total_mass * velocity + drift
-    spin = full_like(trunk, 0.0)
-    if model.kind == RAIL:
-        centre = vector(centre.real, place.imag)
-        momentum = vector(momentum.real, 0.0)
-    if model.kind == FREE:
-        momentum = momentum + rate * perpendicular(moment)
-        about = trunk.composite_inertia - dot(moment, moment) * per_mass
-        spin = rate * about + trunk.relative_angular_momentum - cross(moment, drift) * per_mass
-    trunk.state.moving.centre = where(starts, centre, place)
-    trunk.state.moving.momentum = where(starts, momentum, velocity)
-    trunk.state.moving.spin = where(starts, spin, rate)
 
 
 @inline_llvm

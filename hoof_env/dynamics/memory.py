@@ -396,7 +396,7 @@ def start(
     n), and of the legs, (legs, rows of a `LegState`, n). `heights` are those of the trunks at rest.
 
     The rows for centre of mass, momentum and spin of all hold the trunk's place, velocity and pitch rate,
-    from which the kernels compute the former (`mechanics.velocities_to_momenta`). `TrunkEngine.reset` says
+    from which the kernels compute the former (`momenta.velocities_to_momenta`). `TrunkEngine.reset` says
     what `trunk` holds and what is refused.
     """
     legs = len(scene.limbs)

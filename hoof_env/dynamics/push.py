@@ -10,13 +10,9 @@ from hoof_env.dynamics.layout import Features
 from hoof_env.dynamics.mechanics import (
     accelerate_crank,
     accelerate_trunk,
-    clear_trunk,
-    find_crank,
-    gather_leg,
+    gather_legs,
     load_trunk,
-    look_up_functions,
     move_trunk,
-    place_frame,
     set_up_crank,
 )
 from hoof_env.dynamics.stepping import begin_step
@@ -32,13 +28,7 @@ _KEPT = Kept()
 def push_cranks(trunk, legs, leg_count, model, impulse):  # type: ignore[no-untyped-def]
     """Add to the speeds of motors' cranks what an `impulse` [N s] on the trunk's centre of mass changes at
     once: (E8) and (E9) with impulses for forces, and jumps of speeds for accelerations."""
-    clear_trunk(trunk, model.kind)
-    for i in range(leg_count):
-        leg = block_at(legs, i)
-        find_crank(leg, model)
-        look_up_functions(trunk, leg, model)
-        place_frame(trunk, leg, model.form.harmonics, 0.0)
-        gather_leg(trunk, leg, model.kind, model.lanes_are_legs)
+    gather_legs(trunk, legs, leg_count, model)
     move_trunk(trunk, model.kind)
     for i in range(leg_count):
         leg = block_at(legs, i)
