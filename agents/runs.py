@@ -15,6 +15,8 @@ from __future__ import annotations
 import csv
 import io
 import json
+import platform
+import re
 import shlex
 import subprocess
 import sys
@@ -121,6 +123,13 @@ def versions() -> dict[str, str]:
             command, capture_output=True, text=True, check=True, timeout=10
         ).stdout.strip()
     return packages
+
+
+def processor() -> str:
+    """Return the name of this machine's processor."""
+    path = Path("/proc/cpuinfo")
+    name = re.search(r"^model name\s*: (.*)$", path.read_text() if path.exists() else "", re.M)
+    return name[1] if name else platform.processor() or "unknown"
 
 
 def write_text(path: Path, text: str) -> None:

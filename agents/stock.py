@@ -146,6 +146,7 @@ def train(job: Job) -> list[dict[str, Any]]:
     assert envs is not None
     rows: list[dict[str, Any]] = []
     commit = runs.versions().get("commit", "")
+    processor = runs.processor()
 
     class Curve(BaseCallback):
         """Callback that scores the policy every `curves.every` steps and at the end."""
@@ -171,7 +172,7 @@ def train(job: Job) -> list[dict[str, Any]]:
         means = {
             name: float(np.mean([episode[name] for episode in episodes])) for name in ("return", *FIGURES)
         }
-        figures = (steps, round(means["return"], 2), round(seconds, 1), commit)
+        figures = (steps, round(means["return"], 2), round(seconds, 1), commit, processor)
         rows.append(dict(zip(COLUMNS, (*job.key, *figures), strict=True)))
         if curves.preset:
             rows[-1] |= {name: round(means[name], 4) for name in FIGURES}

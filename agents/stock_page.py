@@ -77,7 +77,7 @@ def table(rows: Sequence[dict[str, Any]], references: dict[str, dict[str, float]
         for steps in (last // 2, last):
             values = at(own_rows, steps)
             cells.append(f"{float(iqm(values)[0]):.1f} ({min(values):.1f} to {max(values):.1f})")
-        seconds = np.median([row["train_seconds"] for row in own_rows if row["steps"] == last])
+        seconds = _seconds([row for row in own_rows if row["steps"] == last], usual_processor(rows))
         known = references[curves.env_id]
         reference_cells = [f"{known[name]:.1f}" if name in known else "" for name in ANCHORS]
         above = ""
@@ -86,7 +86,7 @@ def table(rows: Sequence[dict[str, Any]], references: dict[str, dict[str, float]
             above = f"{sum(value > known[BEST] for value in finals)} of {len(finals)}"
         seeds = str(len({row["seed"] for row in own_rows}))
         name = curves.env_id.rpartition("/")[2].removesuffix("-v0")
-        own_cells = [name, curves.algo.upper(), seeds, *cells, f"{last:,}", f"{seconds:.0f}"]
+        own_cells = [name, curves.algo.upper(), seeds, *cells, f"{last:,}", seconds]
         lines.append([*own_cells, *reference_cells, above])
     head = (
         "id",
@@ -100,6 +100,22 @@ def table(rows: Sequence[dict[str, Any]], references: dict[str, dict[str, float]
         "seeds above it at the end",
     )
     return markdown_table(head, lines)
+
+
+def usual_processor(rows: Sequence[dict[str, Any]]) -> str:
+    """Return the processor of most trainings of HorseLeg-v0, whose seconds are compared."""
+    trainings = {(row["algo"], row["seed"], row["processor"]) for row in rows if row["env_id"] == LEG}
+    processors = sorted(processor for _, _, processor in trainings)
+    return max(dict.fromkeys(processors), key=processors.count, default="")
+
+
+def _seconds(ends: Sequence[dict[str, Any]], processor: str) -> str:
+    """Return the median of the seconds of trainings on a processor; with a star those of others, if none was
+    trained on it."""
+    timed = [row["train_seconds"] for row in ends if row["processor"] == processor]
+    if timed:
+        return f"{np.median(timed):.0f}"
+    return f"{np.median([row['train_seconds'] for row in ends]):.0f}*"
 
 
 def compared(rows: Sequence[dict[str, Any]], column: str, places: Sequence[float]) -> str:
@@ -187,7 +203,8 @@ Learning curves of Stable-Baselines3's PPO, SAC and TD3 and of sb3-contrib's TQC
 defaults: one environment, no wrapper. Written by `python -m agents.stock`, which trains what is missing in
 [curves.csv](curves.csv). Returns are those of the policy without its noise on {starts} starts that no
 training meets: the interquartile mean over seeds, and the lowest and highest seed. Seconds are processor time
-of learning on one thread; other work on the machine makes them longer. Trained by the code of {commits}.
+of learning on one thread{processors}; other work on the machine makes them longer. Trained by
+the code of {commits}.
 
 ![Return against environment steps](stock.png)
 
@@ -210,6 +227,10 @@ Returns after so many seconds of the processor, on one thread:
 
 def write(out: Path, rows: Sequence[dict[str, Any]]) -> None:
     """Write table and picture of the curves that are there."""
+    usual = usual_processor(rows)
+    timed = [row for row in rows if row["processor"] == usual]
+    rest = sorted({row["processor"] for row in rows} - {usual})
+    others = f" of one kind of processor (with a star: of {', '.join(rest)})" if rest else ""
     references = {env_id: anchors(env_id) for env_id in dict.fromkeys(row["env_id"] for row in rows)}
     with staged(out) as stage:
         draw(rows, references, stage / "stock.png")
@@ -218,6 +239,7 @@ def write(out: Path, rows: Sequence[dict[str, Any]]) -> None:
             commits=", ".join(sorted({f"`{row['commit'] or 'unknown'}`" for row in rows})),
             table=table([row for row in rows if row["algo"] != TUNED], references),
             by_steps=compared(rows, "steps", AT_STEPS),
-            by_seconds=compared(rows, "train_seconds", AT_SECONDS),
+            by_seconds=compared(timed, "train_seconds", AT_SECONDS),
+            processors=others,
         )
         (stage / "README.md").write_text(text, encoding="utf-8")

@@ -58,9 +58,10 @@ HALF_RATES = {"crank_rate": 9.0, "swing_rate": 0.6}
 crank, so that its gait changes too much."""
 
 
-COLUMNS = ("env_id", "algo", "seed", "steps", "return", "train_seconds", "commit")
+COLUMNS = ("env_id", "algo", "seed", "steps", "return", "train_seconds", "commit", "processor")
 """Columns of curves.csv: a line for each score. The seconds are those of the processor for learning alone so
-far; the commit is that of the code that trained, empty if there is no git."""
+far; the commit is that of the code that trained, empty if there is no git. The processor is empty in rows
+from before it was noted."""
 
 FIGURES = ("speed_m_s", "stance_peak_n", "cost_of_transport", "weight_share")
 """Further columns for other legs: means of the episodes of the score."""
@@ -91,6 +92,7 @@ def read_curves(folder: Path) -> list[dict[str, Any]]:
                     "return": float(row["return"]),
                     "train_seconds": float(row["train_seconds"]),
                     "commit": row["commit"] or "",
+                    "processor": row.get("processor") or "",
                     **{name: float(row[name]) for name in FIGURES if name in row},
                 }
                 for row in csv.DictReader(file)

@@ -15,6 +15,7 @@ import numba
 import numpy as np
 from numba.core.registry import cpu_target
 
+from agents.runs import processor
 from hoof_env.simd import read, rows, write
 from hoof_env.simd.memory import address, doubles
 
@@ -25,7 +26,7 @@ def machine() -> dict[str, str]:
     """Return processor, vector width, system, versions, date and commit."""
     installed = {d.metadata["Name"]: d.version for d in metadata.distributions()}
     return {
-        "processor": f"{_processor()}, {os.cpu_count()} cores",
+        "processor": f"{processor()}, {os.cpu_count()} cores",
         "compiled for": f"{compiled_for()}, vectors of {vector_bits()} bits",
         "system": f"{platform.system()} {platform.machine()}, Python {platform.python_version()}",
         "versions": ", ".join(f"{package} {installed.get(package, 'not installed')}" for package in PACKAGES),
@@ -56,13 +57,6 @@ def vector_bits() -> int:
     if registers := re.findall(r"%([xyz])mm", code):  # registers of x86
         return {"x": 128, "y": 256, "z": 512}[max(registers)]
     return 128 if re.search(r"\bv\d+\.2d", code) else 64
-
-
-def _processor() -> str:
-    """Return the name of the processor."""
-    path = Path("/proc/cpuinfo")
-    name = re.search(r"^model name\s*: (.*)$", path.read_text() if path.exists() else "", re.M)
-    return name[1] if name else platform.processor() or "unknown"
 
 
 def _commit() -> str:

@@ -13,11 +13,11 @@ from hoof_env.errors import ParameterError
 from hoof_env.evaluation.episodes import FINAL_SEEDS
 
 
-def curve(env_id, algo, seed, returns, every=100):
+def curve(env_id, algo, seed, returns, every=100, processor="one"):
     """Rows of a training whose seconds are a hundredth of its steps."""
     steps = every * np.arange(len(returns))
     return [
-        dict(zip(COLUMNS, (env_id, algo, seed, int(step), value, step / 100, "abc"), strict=True))
+        dict(zip(COLUMNS, (env_id, algo, seed, int(step), value, step / 100, "abc", processor), strict=True))
         for step, value in zip(steps, returns, strict=True)
     ]
 
@@ -129,6 +129,23 @@ def test_what_is_written_is_read_back(tmp_path):
         writer.writerows(rows)
     assert read_curves(tmp_path) == rows
     assert read_curves(tmp_path / "nowhere") == []
+
+
+def test_seconds_are_compared_on_one_processor(tmp_path, monkeypatch):
+    """On the one of most trainings of HorseLeg-v0; those of other ids alone are marked."""
+    monkeypatch.setattr(stock_page, "anchors", lambda env_id: {"zero action": 0.5, stock_page.BEST: 1.5})
+    rows = [
+        row
+        for seed in range(3)
+        for row in curve(LEG, "ppo", seed, [0.0, 1.0], processor="other" if seed == 2 else "one")
+    ]
+    rows[-1] |= {"train_seconds": 900.0}
+    rail = [row | {"train_seconds": 7.0} for row in curve(RAIL, "ppo", 0, [0.0, 1.0], processor="third")]
+    assert stock_page.usual_processor(rows + rail) == "one"
+    lines = stock_page.table(rows + rail, {LEG: {}, RAIL: {}}).splitlines()[2:]
+    assert [line.split("|")[7].strip() for line in lines] == ["1", "7*"]
+    stock_page.write(tmp_path, rows)
+    assert "of one kind of processor (with a star: of other)" in (tmp_path / "README.md").read_text()
 
 
 def test_learners_are_compared_where_all_have_been():
