@@ -27,7 +27,7 @@ from tyro.conf import Positional
 
 from agents import runs
 from agents.command import run
-from hoof_env._output import staged
+from hoof_env._output import check_new, new_file
 from hoof_env.errors import DataFileError, HoofEnvError, ParameterError
 from hoof_env.policies.onnx_file import INPUT, LISTS, OUTPUT, OnnxPolicy
 from hoof_env.policies.record import about, environment_of
@@ -48,10 +48,13 @@ class Args:
     """file to write: .onnx"""
     env_id: str | None = None
     """environment of a model without run.json"""
+    overwrite: bool = False
+    """replace an existing file"""
 
 
-def export(model: Path, out: Path, env_id: str | None = None) -> float:
-    """Write the policy of a run folder or .zip to an .onnx, for `env_id` or the id in run.json.
+def export(model: Path, out: Path, env_id: str | None = None, overwrite: bool = False) -> float:
+    """Write the policy of a run folder or .zip to an .onnx, for `env_id` or the id in run.json; `overwrite`
+    replaces an existing file.
 
     Returns:
         The largest difference of an action, as in `TOLERANCE`.
@@ -59,8 +62,10 @@ def export(model: Path, out: Path, env_id: str | None = None) -> float:
     Raises:
         ParameterError: another suffix, or no environment known; others as `write_policy`.
         DataFileError: there is no such model; others as `write_policy`.
+        OutputError: the file exists already, or cannot be written.
     """
     check_place(out, [".onnx"])
+    check_new(out, overwrite)
     saved = runs.SavedModel.find(model)
     env_id, kwargs = environment_of(saved.path, saved.record, env_id)
     if env_id is None:
@@ -68,22 +73,25 @@ def export(model: Path, out: Path, env_id: str | None = None) -> float:
     with runs.make_env(env_id, **kwargs) as env:
         trained = saved.load(env, env_id)
         metadata = about(env, env_id, kwargs, saved.record)
-    return write_policy(trained, out, metadata)
+    return write_policy(trained, out, metadata, overwrite)
 
 
-def write_policy(trained: runs.TrainedPolicy, out: Path, metadata: dict[str, Any]) -> float:
-    """Write a policy to `out`, replacing an older file, and return the largest difference of an action.
+def write_policy(
+    trained: runs.TrainedPolicy, out: Path, metadata: dict[str, Any], overwrite: bool = False
+) -> float:
+    """Write a policy to `out` and return the largest difference of an action.
 
     Raises:
+        OutputError: the file exists already and `overwrite` is False, or it cannot be written.
         ParameterError: it observes or does something else than vectors, or remembers.
         DataFileError: the file does not act as the policy does; it is not kept.
         HoofEnvError: a package is missing.
     """
     observations = some_observations(trained.model.observation_space)
     module = module_of(trained)
-    with staged(out.parent) as stage:
-        write_onnx(module, observations[:2], stage / out.name, metadata)
-        off = difference(trained, OnnxPolicy(stage / out.name).predict, observations)
+    with new_file(out, overwrite) as file:
+        write_onnx(module, observations[:2], file, metadata)
+        off = difference(trained, OnnxPolicy(file).predict, observations)
         # Written so that NaN is refused as well
         if not off <= TOLERANCE:
             raise DataFileError(
@@ -228,7 +236,7 @@ def main(argv: list[str] | None = None) -> None:
     import tyro
 
     args = tyro.cli(Args, args=argv, prog="python -m agents.export", description=__doc__)
-    off = export(args.model, args.out, args.env_id)
+    off = export(args.model, args.out, args.env_id, args.overwrite)
     print(
         f"written: {args.out} ({args.out.stat().st_size / 1000:.0f} kB); on {TRIED} random observations its "
         f"actions differ from the model's by {off:.1g} of their half range at most"

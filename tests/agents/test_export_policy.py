@@ -24,7 +24,7 @@ from agents import export
 from agents.export import main, write_policy
 from agents.ppo_flat import FlatPPO
 from agents.runs import SavedModel, TrainedPolicy, make_env
-from hoof_env.errors import DataFileError
+from hoof_env.errors import DataFileError, OutputError
 from hoof_env.evaluation.episodes import play
 from hoof_env.policies.onnx_file import OnnxPolicy
 from hoof_env.policies.record import check_record, describe
@@ -161,9 +161,19 @@ def test_a_file_that_acts_otherwise_is_not_kept(tmp_path, monkeypatch):
     path = tmp_path / "policy.onnx"
     path.write_text("older")
     with pytest.raises(DataFileError, match="within 1e-05 of the model's, got 5e-05"):
-        write_policy(untrained(TD3, normalized=False), path, {"env_id": "Pendulum-v1"})
+        write_policy(untrained(TD3, normalized=False), path, {"env_id": "Pendulum-v1"}, overwrite=True)
     assert [one.name for one in tmp_path.iterdir()] == ["policy.onnx"]
     assert path.read_text() == "older"
+
+
+def test_a_file_is_replaced_on_request_alone(trained, tmp_path):
+    path = tmp_path / "policy.onnx"
+    path.write_text("older")
+    with pytest.raises(OutputError, match="exists already; name another file, or add --overwrite"):
+        export.export(trained.folder, path)
+    assert path.read_text() == "older"
+    main([str(trained.folder), "--out", str(path), "--overwrite"])
+    OnnxPolicy(path)
 
 
 def test_the_example_plays_a_policy_without_a_learning_library(env, trained, exported):
