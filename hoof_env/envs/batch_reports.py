@@ -132,7 +132,7 @@ def is_success(batch: Any, envs: Sequence[int] | NDArray[np.int64]) -> NDArray[n
 
 
 TIME_LIMIT = "time limit"
-"""Value of `info["end"]` of an episode that did not fail."""
+"""Reason in `info["end"]` of an episode that did not fail."""
 
 
 def end_of(batch: Any, env: int) -> str:
@@ -141,10 +141,14 @@ def end_of(batch: Any, env: int) -> str:
 
 
 def ending_of(batch: Any, env: int) -> dict[str, Any]:
-    """Return the entries of the info of one environment whose episode ends."""
+    """Return the entries of the info of one environment whose episode ends.
+
+    The reason is the name of a flag: where other steps lack an entry libraries pad a number with 0, but words
+    with None, which Tianshou's trainer refuses as NaN.
+    """
     summary = summary_of(batch, env)
-    ending = {"episode_summary": summary, "end": end_of(batch, env), "is_success": bool(summary["success"])}
-    return ending | ({"failure": ending["end"]} if summary["failed"] else {})
+    success = bool(summary["success"])
+    return {"episode_summary": summary, "end": {end_of(batch, env): True}, "is_success": success}
 
 
 def failure_of(batch: Any, env: int) -> str:
@@ -156,14 +160,13 @@ def failure_of(batch: Any, env: int) -> str:
     return result.message if result is not Result.OK else "the trunk left its range of heights"
 
 
-def endings_of(batch: Any, done: NDArray[np.bool_], terminated: NDArray[np.bool_]) -> dict[str, Any]:
+def endings_of(batch: Any, done: NDArray[np.bool_]) -> dict[str, Any]:
     """Return the entries of infos for episodes that end, in the form of Gymnasium's `_add_info`, which adds
     one environment after the other.
 
     Args:
         batch: an `EpisodeBatch`.
         done: True for environments that ended an episode, shape (num_envs,).
-        terminated: True for those that failed, shape (num_envs,).
     """
     figures: dict[str, Any] = NamedColumns()
     for name, values in summaries_of(batch, np.flatnonzero(done)).items():
@@ -171,14 +174,10 @@ def endings_of(batch: Any, done: NDArray[np.bool_], terminated: NDArray[np.bool_
         figures[f"_{name}"] = done.copy()
         figures[name][done] = values
     endings = {"episode_summary": figures, "_episode_summary": done.copy()}
-    ends = np.full(batch.num_envs, None, dtype=object)
+    ends: dict[str, NDArray[np.bool_]] = {}
     for env in np.flatnonzero(done).tolist():
-        ends[env] = end_of(batch, env)
+        reason = end_of(batch, env)
+        for name in (reason, f"_{reason}"):
+            ends.setdefault(name, np.zeros(batch.num_envs, bool))[env] = True
     success = is_success(batch, np.arange(batch.num_envs)) & done
-    endings |= {"end": ends, "_end": done.copy(), "is_success": success, "_is_success": done.copy()}
-    if terminated.any():
-        reasons = np.full(batch.num_envs, None, dtype=object)
-        for env in np.flatnonzero(terminated).tolist():
-            reasons[env] = ends[env]
-        endings |= {"failure": reasons, "_failure": terminated.copy()}
-    return endings
+    return endings | {"end": ends, "_end": done.copy(), "is_success": success, "_is_success": done.copy()}

@@ -130,6 +130,7 @@ class Sb3VecEnv(VecEnv):
             final = infos["final_info"]
             figures = infos["final_info"]["episode_summary"]
             names = [name for name in figures if not name.startswith("_")]
+            reasons = [reason for reason in final["end"] if not reason.startswith("_")]
             # With SAME_STEP `infos` are already those of the next episode.
             for name in self.terms:
                 self.terms[name] = np.where(dones, final[name], infos[name])
@@ -140,7 +141,7 @@ class Sb3VecEnv(VecEnv):
                     "terminal_observation": infos["final_obs"][env],
                     "TimeLimit.truncated": bool(truncated[env]),
                     "episode_summary": {name: float(figures[name][env]) for name in names},
-                    "end": final["end"][env],
+                    "end": {reason: True for reason in reasons if final["end"][reason][env]},
                     "is_success": bool(final["is_success"][env]),
                 }
         return observations, rewards.astype(np.float32), dones, each

@@ -78,7 +78,7 @@ class HorseLegVectorEnv(  # type: ignore[misc]  # generators are of all
 
     Rewards are float64, shape (num_envs,). Infos are those of the single environment as arrays. When an
     episode ends they also contain its figures as "episode_summary", one array for each figure, with masks
-    under "_episode_summary", and the reason of a failure as "failure".
+    under "_episode_summary", and the reasons as "end": by reason, an array that is True where it holds.
 
     Raises:
         ParameterError: a bad argument, option or action.
@@ -202,7 +202,7 @@ class HorseLegVectorEnv(  # type: ignore[misc]  # generators are of all
         infos = infos_of(batch, some_ended)
         rewards = batch.rewards[:n].copy()
         if done.any():
-            infos |= endings_of(batch, done, terminated)
+            infos |= endings_of(batch, done)
         if done.any() and self.autoreset_mode == AutoresetMode.SAME_STEP:
             infos = self._same_step(infos, done)
             done = np.zeros(n, bool)

@@ -154,7 +154,8 @@ class Simulation:
         self._observation, _, failed, truncated, info = self.env.step(action)
         self._starts = False
         if failed or truncated:
-            self.ended = str(info.get("failure", "time is up"))
+            (reason,) = info["end"]
+            self.ended = reason if failed else "time is up"
         # A step in which the simulation failed has no new substeps.
         if self._leg.engine.state["time"][0] <= before:
             return None

@@ -76,7 +76,7 @@ def test_infos(env_id, drawn):
     assert ("parameters" in steps) == bool(drawn)
 
 
-FALLS = {"trunk_share": 1.0, "trunk_stiffness": 0.0, "trunk_damping": 0.0, "episode_seconds": 2.0}
+FALLS = {"trunk_share": 1.0, "trunk_stiffness": 0.0, "trunk_damping": 0.0, "episode_seconds": 4.0}
 
 
 def test_falls_of_several(env_id):
@@ -86,10 +86,10 @@ def test_falls_of_several(env_id):
     torch.manual_seed(0)
     env = GymEnv(f"hoof_env:{env_id}", num_envs=2, device="cpu", **FALLS)
     env.set_seed(0)
-    steps = env.rollout(300, break_when_any_done=False)
+    steps = env.rollout(600, break_when_any_done=False)
     assert steps["next", "terminated"].sum() >= 2
     assert torch.isfinite(steps["measured"]).all()
-    assert steps["gait"].shape == (2, 300, 4)
+    assert steps["gait"].shape == (2, 600, 4)
     env.close()
 
 

@@ -123,7 +123,7 @@ def test_a_step_that_could_not_be_simulated_pays_for_nothing_but_the_failure():
     seen, reward, terminated, _, info = env.step(keep)
     assert terminated
     np.testing.assert_array_equal(seen, there)
-    assert "finite" in info["failure"]
+    assert "finite" in str(info["end"])
     rest = env.settings.episode_seconds - before["seconds"]
     assert reward == info["reward_failure"] == pytest.approx(-env.batch.weights["failure"] * rest)
     assert info["episode_summary"] == {**before, "failed": 1.0}

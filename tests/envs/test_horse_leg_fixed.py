@@ -145,7 +145,7 @@ def test_a_linkage_that_diverges_ends_the_episode_and_pays_nothing(settings):
         assert not truncated
         assert np.isfinite(observation).all()
         assert done or abs(reward) < 10
-    assert "last good" in info["failure"]
+    assert "last good" in str(info["end"])
     rest = env.settings.episode_seconds - before["seconds"]
     assert reward == info["reward_failure"] == pytest.approx(-env.batch.weights["failure"] * rest)
     assert info["episode_summary"] == {**before, "failed": 1.0}
