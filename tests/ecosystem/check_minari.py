@@ -96,7 +96,7 @@ def test_trained(env_id):
 
 def test_arguments_come_back(env_id):
     """An environment with arguments of its own is recovered with them."""
-    weights = {"reward_weights": {"failure": 0.6}}
+    weights = {"reward_weights": {"peak": 0.6}}
     _, name = scripted_policies(env_id)
     policy = hoof_env.make_policy(name, gym.make(env_id))
     look(collect(env_id, name, policy, **weights), env_id, **weights)
