@@ -13,7 +13,7 @@ from hoof_env.envs.shipped import shipped_returns
 def curve(algo, seed, returns, seconds=1.0):
     """Rows of a training with a score every 100 steps, each of which takes so many seconds."""
     return [
-        dict(zip(COLUMNS, (LEG, algo, seed, 100 * k, value, k * seconds, "abc"), strict=True))
+        dict(zip(COLUMNS, (LEG, algo, seed, 100 * k, value, k * seconds, "abc", "one"), strict=True))
         for k, value in enumerate(returns)
     ]
 

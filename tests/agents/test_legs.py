@@ -65,7 +65,7 @@ def test_trainings_that_are_there_have_a_line(tmp_path):
     folder.mkdir()
     lines = [",".join((*COLUMNS, *FIGURES))]
     for seed, value in enumerate((100.0, 120.0, 140.0)):
-        lines += [f"{LEG},ppo,{seed},{n},{n and value},1.0,abc,2.0,1500.0,0.5,0.9" for n in (0, 200_000)]
+        lines += [f"{LEG},ppo,{seed},{n},{n and value},1.0,abc,one,2.0,1500.0,0.5,0.9" for n in (0, 200_000)]
     (folder / "curves.csv").write_text("\n".join(lines) + "\n", encoding="utf-8")
     table = legs.learnt_table(tmp_path)
     assert "| `klann` | PPO, 3 seeds, 200,000 steps | 120 (100 to 140) | 2.00 | 1.50 | 0.50 | 0.90 |" in table
