@@ -139,11 +139,12 @@ def test_seconds_are_compared_on_one_processor(tmp_path, monkeypatch):
         for seed in range(3)
         for row in curve(LEG, "ppo", seed, [0.0, 1.0], processor="other" if seed == 2 else "one")
     ]
-    rows[-1] |= {"train_seconds": 900.0}
+    rows[3] |= {"train_seconds": 3.0}
+    rows[5] |= {"train_seconds": 900.0}
     rail = [row | {"train_seconds": 7.0} for row in curve(RAIL, "ppo", 0, [0.0, 1.0], processor="third")]
     assert stock_page.usual_processor(rows + rail) == "one"
     lines = stock_page.table(rows + rail, {LEG: {}, RAIL: {}}).splitlines()[2:]
-    assert [line.split("|")[7].strip() for line in lines] == ["1", "7*"]
+    assert [line.split("|")[7].strip() for line in lines] == ["2", "7*"]
     stock_page.write(tmp_path, rows)
     assert "of one kind of processor (with a star: of other)" in (tmp_path / "README.md").read_text()
 
