@@ -59,8 +59,10 @@ def mutants_of(path: Path) -> Iterator[Mutant]:
     """All mutants of a file whose change is within one line."""
     text = path.read_text()
     lines = text.splitlines()
-    skipped = {id(inner) for node in ast.walk(ast.parse(text)) for inner in _not_run(node)}
-    for node in ast.walk(ast.parse(text)):
+    # One tree for both: the nodes of a second one could have the identities of the first
+    nodes = list(ast.walk(ast.parse(text)))
+    skipped = {id(inner) for node in nodes for inner in _not_run(node)}
+    for node in nodes:
         found = _changed(node, lines)
         if found is None or id(node) in skipped:
             continue
