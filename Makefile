@@ -23,7 +23,7 @@ help:
 	@echo 'make test-peers  the engine against MuJoCo and Exudyn, which it installs'
 	@echo 'make test-oldest the wheel on the oldest dependencies that pyproject.toml names, some minutes'
 	@echo 'make test-lab    force records and datasets with OpenSim, ezc3d and Minari, in an environment under .lab/'
-	@echo 'make test-ecosystem  every RL library on every id, in environments under .ecosystem/: 6 GB, some minutes'
+	@echo 'make test-ecosystem  every RL library on every id, in environments under .ecosystem/: 6 GB, one to two hours'
 	@echo 'make bench       how fast engine and environments are beside MuJoCo, Exudyn and EnvPool'
 	@echo 'make baselines   the agents of docs/evidence/baselines.md, hours; ARGS="--subset nightly": a small part, minutes'
 	@echo 'make docs        these pages and the API as a site in build/site'

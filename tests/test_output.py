@@ -1,11 +1,13 @@
 """What commands write."""
 
+import os
 import threading
+from pathlib import Path
 
 import pytest
 
 from hoof_env import cli, records
-from hoof_env._output import markdown_table, new_file, staged
+from hoof_env._output import free_memory, markdown_table, new_file, staged
 from hoof_env.errors import OutputError
 
 
@@ -94,3 +96,17 @@ def test_a_file_that_appears_while_a_command_works_stays(command, name, tmp_path
     assert out.read_text() == "theirs"
     assert {path.name for path in tmp_path.glob("kept-*/*")} == {path.name for path in records.files_of(out)}
     assert len(list(tmp_path.iterdir())) == 2
+
+
+def test_without_proc_free_memory_is_that_of_the_machine(monkeypatch):
+    """As on macOS, where nothing tells what others have taken."""
+
+    def absent(path, *args, **options):
+        raise FileNotFoundError(path)
+
+    monkeypatch.setattr(Path, "read_text", absent)
+    sizes = {"SC_PHYS_PAGES": 3_000_000, "SC_PAGE_SIZE": 4096}
+    monkeypatch.setattr(os, "sysconf", sizes.__getitem__, raising=False)
+    assert free_memory() == 3_000_000 * 4096
+    monkeypatch.delattr(os, "sysconf")
+    assert free_memory() == float("inf")

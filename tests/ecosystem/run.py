@@ -1,7 +1,8 @@
 """Every RL library takes hoof-env unchanged: `python -m tests.ecosystem.run`, or `make test-ecosystem`.
 
 Each check of suite.toml runs in the virtual environment that it names, one after the other, whatever becomes
-of those before it. docs/evidence/ecosystem.md is written when every check has a result, old ones included.
+of those before it. Its result replaces the one in docs/evidence/ecosystem.json, from which
+docs/evidence/ecosystem.md is written: after a change, the checks that it concerns can run alone.
 """
 
 from __future__ import annotations
@@ -19,7 +20,7 @@ from typing import Any
 
 import tyro
 
-from tests.ecosystem.table import markdown, verdict
+from tests.ecosystem.table import count_tests, markdown, verdict
 from tests.ecosystem.venvs import CACHE, ROOT, Failed, Venv
 
 HERE = Path(__file__).parent
@@ -28,9 +29,10 @@ VENVS = {
     name: Venv(name, **{k: tuple(v) if isinstance(v, list) else v for k, v in table.items()})
     for name, table in SUITE["venv"].items()
 }
-RESULTS = CACHE / "results"
+LOGS = CACHE / "results"
 CHECKOUT_FOLDER = HERE
 PAGE = ROOT / "docs" / "evidence" / "ecosystem.md"
+RESULTS = PAGE.with_suffix(".json")
 VERSIONS = (
     "import sys, importlib.metadata as m; print(*(f'{n} {m.version(n)}' for n in sys.argv[1:]), sep='\\n')"
 )
@@ -56,32 +58,37 @@ def main() -> int:
         if name in (args.only or checks) and not (args.quick and "venv" in check)
     ]
     failed = []
-    RESULTS.mkdir(parents=True, exist_ok=True)
+    LOGS.mkdir(parents=True, exist_ok=True)
+    results = json.loads(RESULTS.read_text())
     for name in chosen:
         print(f"{name:18}", end=" ", flush=True)
-        result = check(name, **checks[name])
-        (RESULTS / f"{name}.json").write_text(json.dumps(result, indent=1))
-        good, told = verdict(result)
+        results[name] = check(name, **checks[name])
+        kept = {name: results[name] for name in checks if name in results}
+        RESULTS.write_text(json.dumps(kept, indent=1) + "\n")
+        good, told = verdict(results[name])
         failed += [] if good else [name]
         print(told if good else f"{told}; more in .ecosystem/results/{name}.log", flush=True)
-    stored = [RESULTS / f"{name}.json" for name in checks]
-    missing = [path.stem for path in stored if not path.exists()]
-    results = [json.loads(path.read_text()) for path in stored if path.exists()]
-    if missing:
-        print(f"docs/evidence/ecosystem.md stays as it is: no result yet of {', '.join(missing)}")
-    else:
-        PAGE.write_text(markdown(results))
-        print("written: docs/evidence/ecosystem.md")
+        PAGE.write_text(page(kept))
+    print("written: docs/evidence/ecosystem.md")
     print(f"failed: {', '.join(failed)}" if failed else f"all {len(chosen)} accept hoof-env")
     return 1 if failed else 0
+
+
+def page(results: dict[str, dict[str, Any]]) -> str:
+    """Return the page of the results of all checks."""
+    checks: dict[str, dict[str, Any]] = SUITE["check"]
+    notes = [(check["libraries"], check["note"].strip()) for check in checks.values() if "note" in check]
+    return markdown(list(results.values()), notes)
 
 
 def check(
     name: str, libraries: list[str], seconds: float, venv: str | None = None, note: str = ""
 ) -> dict[str, Any]:
-    """Run one check and return its versions, the rows of its tests, and what ended it early, if anything."""
-    result: dict[str, Any] = {"name": name, "libraries": libraries, "commit": _commit(), "rows": []}
-    result["note"] = note.strip()
+    """Run one check and return its versions, what became of its tests, and what ended it early, if anything.
+
+    `note` is of the page alone.
+    """
+    result: dict[str, Any] = {"libraries": libraries, "commit": _commit(), "tests": []}
     place = VENVS[venv] if venv else None
     try:
         if place:
@@ -93,19 +100,20 @@ def check(
     except (Failed, subprocess.CalledProcessError) as error:
         return {**result, "ended": f"not installed: {error}"}
     folder = ROOT / place.folder if place else CHECKOUT_FOLDER
-    rows = RESULTS / f"{name}.jsonl"
+    rows = LOGS / f"{name}.jsonl"
     rows.unlink(missing_ok=True)
     started = time.monotonic()
     options = ("-p", "no:cacheprovider", "-p", "record", "--record", str(rows))
     command = [python, "-m", "pytest", *options, f"{name}.py"]
-    ended = _run(command, folder, seconds, RESULTS / f"{name}.log")
+    ended = _run(command, folder, seconds, LOGS / f"{name}.log")
     lines = rows.read_text().splitlines() if rows.exists() else []
-    result |= {"rows": [json.loads(line) for line in lines], "seconds": time.monotonic() - started}
+    result["tests"] = count_tests([json.loads(line) for line in lines])
+    result["seconds"] = round(time.monotonic() - started, 1)
     return {**result, "ended": ended or ("" if lines else "no test ran")}
 
 
 def _run(command: list[str], folder: Path, seconds: float, log: Path) -> str:
-    """What ended the command, where that was not its tests; all of its processes are ended with it."""
+    """Return what ended the command, where that was not its tests; all of its processes are ended with it."""
     paths = os.pathsep.join([str(HERE), *filter(None, [os.environ.get("PYTHONPATH")])])
     environment = {**os.environ, "PYTHONPATH": paths, "HOOF_ENV_QUIET": "1", "OMP_NUM_THREADS": "1"}
     with log.open("w") as file:

@@ -21,56 +21,71 @@ times as slow ([decisions.md](../decisions.md)).
 |---|---|---|---|---|
 """
 
+OUTCOMES = ("passed", "skipped", "failed")
+"""What may become of a test."""
+
 NOTES = """
 ## What to know
 
 """
 
 
+def count_tests(rows: list[dict[str, Any]]) -> list[dict[str, Any]]:
+    """Return what became of each test function: its cases by outcome, their reasons and seconds."""
+    cases: dict[str, list[dict[str, Any]]] = {}
+    for row in rows:
+        cases.setdefault(row["what"], []).append(row)
+    return [_count(what, some) for what, some in cases.items()]
+
+
+def _count(what: str, cases: list[dict[str, Any]]) -> dict[str, Any]:
+    counted: dict[str, Any] = {"what": what, "seconds": round(sum(case["seconds"] for case in cases), 1)}
+    for outcome in OUTCOMES:
+        some = [case for case in cases if case["outcome"] == outcome]
+        if some:
+            reasons = sorted({case["reason"] for case in some if case["reason"]})
+            counted[outcome] = {"cases": len(some), "reasons": reasons}
+    return counted
+
+
 def verdict(result: dict[str, Any]) -> tuple[bool, str]:
-    """Whether a check is good, and its result in a line."""
-    count = dict.fromkeys(("passed", "skipped", "failed"), 0)
-    for row in result["rows"]:
-        count[row["outcome"]] += 1
+    """Return whether a check is good, and its result in a line."""
+    count = {
+        outcome: sum(test[outcome]["cases"] for test in result["tests"] if outcome in test)
+        for outcome in OUTCOMES
+    }
     told = ", ".join(f"{number} {outcome}" for outcome, number in count.items() if number)
     told += f" in {result['seconds']:.0f} s" if "seconds" in result else ""
     good = not result["ended"] and not count["failed"] and count["passed"] > 0
     return good, "; ".join(filter(None, [told, result["ended"]]))
 
 
-def markdown(results: list[dict[str, Any]]) -> str:
-    """The page: `HEAD`, one row for each test function of each check, and the notes."""
+def markdown(results: list[dict[str, Any]], notes: list[tuple[list[str], str]]) -> str:
+    """Return the page: `HEAD`, one row for each test function of each check, and the notes on libraries."""
     commits = ", ".join(sorted({result["commit"] for result in results}))
     system = f"Python {platform.python_version()}, {platform.system()} {platform.machine()}"
     page = HEAD.format(system=system, version=hoof_env.__version__, commits=commits)
     page += "".join(row + "\n" for result in results for row in _rows(result))
-    notes = [f"* **{', '.join(r['libraries'])}**: {r['note']}\n" for r in results if r.get("note")]
-    return page + (NOTES + "".join(notes) if notes else "")
+    told = "".join(f"* **{', '.join(libraries)}**: {note}\n" for libraries, note in notes)
+    return page + (NOTES + told if told else "")
 
 
 def _rows(result: dict[str, Any]) -> list[str]:
     packages = [line.split() for line in result.get("versions", [])]
     packages = packages or [[name, "-"] for name in result["libraries"]]
     head = [", ".join(column) for column in zip(*packages, strict=True)]
-    tests: dict[str, list[dict[str, Any]]] = {}
-    for row in result["rows"]:
-        tests.setdefault(row["what"], []).append(row)
-    rows = [
-        [*head, what, _outcome(cases), f"{sum(r['seconds'] for r in cases):.1f}"]
-        for what, cases in tests.items()
-    ]
+    rows = [[*head, test["what"], _outcome(test), f"{test['seconds']:.1f}"] for test in result["tests"]]
     if result["ended"]:
         rows.append([*head, "the whole check", f"**{result['ended']}**", ""])
     return [f"| {' | '.join(cell.replace('|', '/') for cell in row)} |" for row in rows]
 
 
-def _outcome(cases: list[dict[str, Any]]) -> str:
-    """'3 passed, 1 skipped (reason)', and the message of every failure."""
+def _outcome(test: dict[str, Any]) -> str:
+    """Return '3 passed, 1 skipped (reason)', with the message of every failure."""
     parts = []
-    for outcome in ("passed", "skipped", "failed"):
-        some = [case for case in cases if case["outcome"] == outcome]
-        reasons = "; ".join(sorted({case["reason"] for case in some if case["reason"]}))
-        if some:
-            told = f"{len(some)} {outcome}" + (f" ({reasons})" if reasons else "")
+    for outcome in OUTCOMES:
+        if outcome in test:
+            reasons = "; ".join(test[outcome]["reasons"])
+            told = f"{test[outcome]['cases']} {outcome}" + (f" ({reasons})" if reasons else "")
             parts.append(f"**{told}**" if outcome == "failed" else told)
     return ", ".join(parts)

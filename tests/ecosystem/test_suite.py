@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 from tests.ecosystem import run
-from tests.ecosystem.table import markdown, verdict
+from tests.ecosystem.table import count_tests, markdown, verdict
 
 PROGRAM = '''
 import time
@@ -38,11 +38,11 @@ def test_endless():
 def result(tmp_path, monkeypatch, request):
     """What a check comes to whose last test sleeps for the first parameter, within the second [s]."""
     sleeps, seconds = request.param
-    monkeypatch.setattr(run, "RESULTS", tmp_path)
+    monkeypatch.setattr(run, "LOGS", tmp_path)
     (tmp_path / "check_sample.py").write_text(PROGRAM.replace("WAIT", str(sleeps)))
     (tmp_path / "pytest.ini").touch()
     monkeypatch.setattr(run, "CHECKOUT_FOLDER", tmp_path)
-    return run.check("check_sample", libraries=["gymnasium"], seconds=seconds, note="Mind the gap.")
+    return run.check("check_sample", libraries=["gymnasium"], seconds=seconds)
 
 
 @pytest.mark.parametrize("result", [(0, 300)], indirect=True)
@@ -50,7 +50,7 @@ def test_a_failure_is_told_and_does_not_stop_the_rest(result):
     good, told = verdict(result)
     assert not good
     assert told.startswith("3 passed, 1 skipped, 1 failed in ")
-    page = markdown([result]).splitlines()
+    page = markdown([result], [(["gymnasium"], "Mind the gap.")]).splitlines()
     version = subprocess.check_output([sys.executable, "-c", run.VERSIONS, "gymnasium"], text=True).split()[1]
     rows = [row.rpartition(" | ")[0] for row in page if row.startswith("| gymnasium")]
     assert rows == [
@@ -67,19 +67,27 @@ def test_an_endless_test_is_ended_and_what_ran_before_it_is_kept(result):
     good, told = verdict(result)
     assert not good
     assert told.endswith("stopped after 12 s")
-    assert len(result["rows"]) == 4
-    assert "**stopped after 12 s**" in markdown([result])
+    assert len(result["tests"]) == 3
+    assert "**stopped after 12 s**" in markdown([result], [])
 
 
 def test_a_check_whose_library_is_missing_fails():
     result = run.check("test_gymnasium", libraries=["no-such-library"], seconds=1)
     assert not verdict(result)[0]
-    assert "no-such-library" in markdown([json.loads(json.dumps(result))])
+    assert "no-such-library" in markdown([json.loads(json.dumps(result))], [])
 
 
 def test_a_check_in_which_no_test_runs_fails():
     skipped = {"what": "", "case": "", "outcome": "skipped", "reason": "", "seconds": 0.0}
-    assert not verdict({"rows": [skipped], "ended": "", "seconds": 1.0})[0]
+    assert not verdict({"tests": count_tests([skipped]), "ended": "", "seconds": 1.0})[0]
+
+
+def test_the_page_is_that_of_the_stored_results():
+    stored = json.loads(run.RESULTS.read_text())
+    assert list(stored) == list(run.SUITE["check"])
+    head, table = run.PAGE.read_text().split("\n", 3)[2:]
+    assert head.startswith("Written by `make test-ecosystem`")
+    assert table == run.page(stored).split("\n", 3)[3]
 
 
 def test_every_check_has_its_file_and_every_file_its_check():

@@ -22,14 +22,14 @@ def test_the_actor_depends_on_what_it_sees_and_the_critic_on_all(tmp_path):
     assert not hidden[: (~hidden).sum()].any()
     for _ in range(2):
         policy = model.policy
-        seen = torch.rand(5, len(names), requires_grad=True)
+        seen = torch.rand(5, len(names), device=policy.device, requires_grad=True)
         policy.get_distribution(seen).distribution.mean.sum().backward()
-        by_actor = np.abs(seen.grad.numpy()).max(0)
+        by_actor = np.abs(seen.grad.cpu().numpy()).max(0)
         assert (by_actor[hidden] == 0.0).all()
         assert (by_actor[~hidden] > 0.0).all()
         again = seen.detach().requires_grad_()
         policy.predict_values(again).sum().backward()
-        assert (np.abs(again.grad.numpy()).max(0) > 0.0).all()
+        assert (np.abs(again.grad.cpu().numpy()).max(0) > 0.0).all()
         model.learn(8 * 64)
     model.save(tmp_path / "policy.zip")
     again = type(model).load(tmp_path / "policy.zip", custom_objects={"policy_class": type(model.policy)})

@@ -97,6 +97,17 @@ def zigzag(rise, width):
     return Terrain((0.0, rise) * 40, start=-40 * width, spacing=width)
 
 
+def test_a_force_through_a_knot_far_from_the_origin_meets_the_ground():
+    """There the places of knots are rounded to more than a thousandth of a micrometre."""
+    knots = 1e5 + 0.1 * np.arange(40)
+    ground = Terrain(tuple(0.01 * (k % 2) for k in range(40)), start=1e5, spacing=0.1)
+    at = knots[1:-1]
+    upward = np.ones(len(at))
+    record = {"force_x": 0.0 * at, "force_y": upward, "cop_x": at, "cop_y": 0.0 * at - 0.02}
+    found = onto_surface(record, ground)
+    np.testing.assert_allclose(found["cop_y"], np.array(ground.heights)[1:-1], rtol=0, atol=1e-8)
+
+
 @pytest.mark.parametrize("ground", [
     zigzag(0.05, 0.05), zigzag(0.05, 0.1), zigzag(0.2, 0.1), Terrain.slope(-0.6), Terrain.ramp(0.5, 0.0, 0.3),
     Terrain((0.0, 0.3), start=0.0, spacing=0.01), Terrain.flat(),

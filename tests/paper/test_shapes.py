@@ -1,5 +1,7 @@
 """Every claim of the paper on cycles made to fulfil it and on cycles made to break it."""
 
+import re
+
 import numpy as np
 import pytest
 import scipy.signal
@@ -86,6 +88,16 @@ def test_run_order(cycle, toe, heel, walk_toe, holds):
 def test_run_peaks(cycle, bump, elastic, inelastic, holds):
     traces = [cycle((0.2, 0.6), None, toe_normal=bump(*bumps)) for bumps in (elastic, inelastic)]
     assert shapes.run_peaks(*traces).holds is holds
+
+
+def test_the_verdict_on_peaks_says_when_each_force_is_highest(cycle, bump):
+    traces = [cycle((0.2, 0.6), None, toe_normal=bump(one)) for one in ((0.2, 0.6, 100), (0.2, 0.5, 150))]
+    found = shapes.run_peaks(*traces).evidence
+    times = [trace["time"][trace["normal"].argmax()] for trace in traces]
+    assert times[0] > times[1]
+    told = [float(number) for number in re.findall(r"at ([0-9.]+) s", found)]
+    assert told == pytest.approx(times, abs=1e-4)
+    assert f"{1e3 * (times[0] - times[1]):+.1f} ms later" in found
 
 
 @pytest.mark.parametrize(("run_speed", "holds"), [(-3.0, True), (-0.5, False), (3.0, False)])

@@ -19,6 +19,7 @@ from hoof_env.ground.contact import Ground
 from hoof_env.ground.terrain import Terrain
 from hoof_env.leg.geometry import load_geometry
 from hoof_env.render.brush import Brush
+from hoof_env.render.colours import COAT, HOOF
 from hoof_env.render.ground import footprint
 from hoof_env.render.instant import Instant, columns_of_engine, instants
 from hoof_env.render.kinds import find_patches
@@ -143,6 +144,19 @@ def test_the_ground_is_as_high_as_the_terrain(run):
     frame = draw(run[0], terrain=terrain)
     assert surface(frame, 10) - surface(frame, 600) == pytest.approx(0.2 * metre, abs=2)
     assert surface(level, 10) == surface(level, 600)
+
+
+def test_the_hoof_is_of_horn_and_the_leg_of_flesh(run):
+    """Horn lies between toe and heel; flesh covers more than bones are wide."""
+    frame = draw(run[0])
+    now = run[0][0]
+    metre = renderer()._scene._scale
+    rows, columns = pixels(frame, HOOF)
+    sole = abs(complex(now.toe_x - now.heel_x, now.toe_y - now.heel_y)) * metre
+    assert len(rows) > 0.05 * sole**2
+    assert 0.8 * sole < np.hypot(np.ptp(rows), np.ptp(columns)) < 1.5 * sole
+    rows, columns = pixels(frame, COAT)
+    assert len(rows) > 0.05 * metre**2
 
 
 def test_kinds_of_ground_differ_by_colour_and_are_named_in_the_key(run):

@@ -4,9 +4,11 @@ import os
 import shutil
 import subprocess
 import textwrap
+from types import SimpleNamespace
 
 import pytest
 
+from hoof_env.simd import trust
 from tests.simd.processes import CALL, CALL_OR_SAY, ended
 
 
@@ -110,3 +112,31 @@ def test_what_is_made_here_is_closed_to_others_whatever_the_umask(start, tmp_pat
     made = [tmp_path / "cache", *(tmp_path / "cache").rglob("*")]
     assert not [path for path in made if path.stat().st_mode & 0o022 and path.suffix != ".lock"]
     assert ended(start())[0] == "8.0 []"
+
+
+@pytest.mark.skipif(os.name != "posix", reason="needs groups")
+@pytest.mark.parametrize(
+    ("name", "members", "number", "is_ours"),
+    [
+        ("ann", [], 1000, True),
+        ("ann", ["ann"], 1000, True),
+        ("ann", ["ann", "ben"], 1000, False),
+        ("staff", [], 1000, False),  # the first group of all users of a system, which lists nobody
+        ("ann", [], 1001, False),  # not the user's own
+        ("root", [], 0, True),
+    ],
+)
+def test_a_group_may_write_that_has_no_other_members(monkeypatch, name, members, number, is_ours):
+    import grp
+    import pwd
+
+    monkeypatch.setattr(os, "geteuid", lambda: 1000)
+    monkeypatch.setattr(pwd, "getpwuid", lambda _: SimpleNamespace(pw_name="ann", pw_gid=1000))
+    monkeypatch.setattr(grp, "getgrgid", lambda _: SimpleNamespace(gr_name=name, gr_mem=members))
+    assert trust._is_ours(number) is is_ours
+
+
+@pytest.mark.skipif(os.name != "posix", reason="needs groups")
+def test_root_lets_no_group_write(monkeypatch):
+    monkeypatch.setattr(os, "geteuid", lambda: 0)
+    assert not trust._is_ours(0)
