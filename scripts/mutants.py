@@ -117,7 +117,7 @@ def draw(count: int, seed: int) -> list[Mutant]:
 
 def tests_of(file: str) -> list[list[str]]:
     """Arguments of pytest, one list after the other, for a file of the package."""
-    room = Path(file).parts[1]
+    room = Path(file).parts[1].removesuffix(".py")
     own = Path("tests") / room
     single = sorted(
         str(path.relative_to(ROOT)) for path in (ROOT / "tests").glob(f"test_{Path(file).stem}.py")

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import replace
 from typing import Any
 
@@ -23,6 +24,7 @@ from hoof_env.tasks.episode import ACTIONS, task_type
 from hoof_env.tasks.observation import check_groups, groups_of, observed
 from hoof_env.tasks.own_parts import own_of
 from hoof_env.tasks.parameters import extremes
+from hoof_env.tasks.schedules import drawn_names
 from hoof_env.tasks.settings import ResolvedSettings, Settings
 
 MOST_BAUMGARTE = 1e6
@@ -80,8 +82,10 @@ def make_engine(batch: Any, num_threads: int) -> TrunkEngine:
     substeps = None
     # For all episodes alike: environments with different numbers of substeps cannot run side by side.
     if batch.randomize:
-        corners = ({}, *extremes(batch.randomize))
-        substeps = max(substeps_under(batch, corner, None) for corner in corners)
+        substeps = substeps_under(batch, {}, None)
+        with name_source(batch, batch.randomize):
+            for corner in extremes(batch.randomize):
+                substeps = max(substeps, substeps_under(batch, corner, None))
     return TrunkEngine(
         limbs,
         trunk,
@@ -100,6 +104,26 @@ def make_engine(batch: Any, num_threads: int) -> TrunkEngine:
         filters=body.filters,
         limits=body.limits,
     )
+
+
+@contextmanager
+def name_source(batch: Any, parameters: Mapping[str, Any]) -> Iterator[None]:
+    """Name in an error what drawn parameters come from.
+
+    Args:
+        batch: an `EpisodeBatch`.
+        parameters: parameters by name, those of `batch.randomize` and of a reset's options.
+    """
+    try:
+        yield
+    except ParameterError as error:
+        given = {
+            "randomize": batch.settings.randomize,
+            "schedule": drawn_names(batch.schedule),
+            "options['parameters']": parameters != batch.randomize,
+        }
+        sources = " and ".join(name for name, is_given in given.items() if is_given)
+        raise ParameterError(f"{sources}: {error}") from None
 
 
 def substeps_under(batch: Any, changes: Mapping[str, float], asked: int | None) -> int:

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from hoof_env.constants import GRAVITY
 from hoof_env.dynamics.advance import LANES
 from hoof_env.envs.addresses import BEGIN, END
-from hoof_env.envs.batch_build import substeps_under
+from hoof_env.envs.batch_build import name_source, substeps_under
 from hoof_env.envs.batch_pushes import begin_disturbances, check_can_be_pushed
 from hoof_env.envs.conditions import enter
 from hoof_env.errors import ParameterError
@@ -81,8 +81,9 @@ def check_extremes(batch: Any, parameters: Mapping[str, float | tuple[float, flo
     """
     # The last ones are remembered: learners pass the same options at every reset.
     if parameters and batch.validated != (words := repr(parameters)):
-        for corner in extremes(parameters):
-            substeps_under(batch, corner, batch.engine.substeps)
+        with name_source(batch, parameters):
+            for corner in extremes(parameters):
+                substeps_under(batch, corner, batch.engine.substeps)
         batch.validated = words
 
 

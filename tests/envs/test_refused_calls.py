@@ -42,7 +42,7 @@ OPTIONS = [
     ({"height": 9.0}, r"options\['height'\]: expected 0.6 to 2 times 1.6975 m, .*got 9"),
     ({"parameters": 5}, r"options\['parameters'\]: expected a mapping with some of trunk_mass.*got 5"),
     ({"parameters": {"wings": 2}}, r"options\['parameters'\]: expected a mapping with some of trunk_mass"),
-    ({"parameters": {"trunk_mass": -5.0}}, "trunk_mass: expected.*got -5.0"),
+    ({"parameters": {"trunk_mass": -5.0}}, r"^options\['parameters'\]: trunk_mass: expected.*got -5.0"),
     ({"parameters": {"trunk_mass": (-5.0, 90.0)}}, "trunk_mass: expected.*got -5.0"),
     ({"parameters": {"trunk_mass": None}}, r"options\['parameters'\]\['trunk_mass'\]: expected.*got None"),
     ({"parameters": {"approach_floor": 1e300}}, "approach_floor: expected.*got 1e.300"),
