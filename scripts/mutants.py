@@ -5,8 +5,9 @@
     python scripts/mutants.py --list                the places alone
 
 A place is drawn at random among all arithmetic, comparisons, numbers and conditions of hoof_env. Each mutant
-runs in a checkout of its own the tests of its room, `tests/<room>`, up to the first failure; one that these
-pass runs `tests/envs`, too. What nothing notices is listed at the end: some of them compute the same.
+runs in a checkout of its own the tests of its room, `tests/<room>`, up to the first failure; a room without
+tests of its own those of the commands and `tests/test_<module>.py`. One that these pass runs `tests/envs`,
+too. What nothing notices is listed at the end: some of them compute the same.
 """
 
 from __future__ import annotations
@@ -119,10 +120,10 @@ def tests_of(file: str) -> list[list[str]]:
     """Arguments of pytest, one list after the other, for a file of the package."""
     room = Path(file).parts[1].removesuffix(".py")
     own = Path("tests") / room
-    single = sorted(
-        str(path.relative_to(ROOT)) for path in (ROOT / "tests").glob(f"test_{Path(file).stem}.py")
-    )
-    first = [str(own)] if (ROOT / own).is_dir() else [*single, "tests/test_cli.py", "tests/test_export.py"]
+    stem = Path(file).stem.lstrip("_")
+    single = sorted(str(path.relative_to(ROOT)) for path in (ROOT / "tests").glob(f"test_{stem}.py"))
+    several = dict.fromkeys([*single, "tests/test_cli.py", "tests/test_export.py"])
+    first = [str(own)] if (ROOT / own).is_dir() else [*several]
     rest = ["tests/envs"]
     return [first] if first == rest else [first, rest]
 

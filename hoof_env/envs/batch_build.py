@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+import re
+from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import replace
 from typing import Any
@@ -108,22 +109,28 @@ def make_engine(batch: Any, num_threads: int) -> TrunkEngine:
 
 @contextmanager
 def name_source(batch: Any, parameters: Mapping[str, Any]) -> Iterator[None]:
-    """Name in an error what drawn parameters come from.
+    """Name in an error the settings or options that its parameters come from.
 
     Args:
         batch: an `EpisodeBatch`.
         parameters: parameters by name, those of `batch.randomize` and of a reset's options.
+
+    Raises:
+        ParameterError: the error, named.
     """
     try:
         yield
     except ParameterError as error:
-        given = {
-            "randomize": batch.settings.randomize,
+        drawn = batch.randomize
+        sources: dict[str, Iterable[str]] = {
+            "randomize": batch.settings.randomize or (),
             "schedule": drawn_names(batch.schedule),
-            "options['parameters']": parameters != batch.randomize,
+            "options['parameters']": [n for n in parameters if parameters[n] != drawn.get(n)],
         }
-        sources = " and ".join(name for name, is_given in given.items() if is_given)
-        raise ParameterError(f"{sources}: {error}") from None
+        said = set(re.findall(r"\w+", str(error)))
+        given = [source for source, names in sources.items() if names]
+        at_fault = [source for source in given if said & {*sources[source]}]
+        raise ParameterError(f"{' and '.join(at_fault or given)}: {error}") from None
 
 
 def substeps_under(batch: Any, changes: Mapping[str, float], asked: int | None) -> int:

@@ -69,8 +69,9 @@ def test_vector(mo_id):
 
 
 def test_picture(mo_id):
-    """`render`, drawn by pygame, which MO-Gymnasium brings and which differs from pygame-ce: the letters of
-    "time" have gaps between them."""
+    """`render`, drawn by pygame, which differs from pygame-ce: letters have gaps between them.
+
+    MO-Gymnasium brings it; the word is "time"."""
     env = mo_gymnasium.make(mo_id, render_mode="rgb_array")
     env.reset(seed=0)
     word = env.render()[28:52, 654:700]

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import json
 import os
+import platform
 import signal
 import subprocess
 import sys
@@ -59,16 +60,17 @@ def main() -> int:
     ]
     failed = []
     LOGS.mkdir(parents=True, exist_ok=True)
-    results = json.loads(RESULTS.read_text())
+    results: dict[str, dict[str, Any]] = json.loads(RESULTS.read_text())
     for name in chosen:
         print(f"{name:18}", end=" ", flush=True)
         results[name] = check(name, **checks[name])
-        kept = {name: results[name] for name in checks if name in results}
-        RESULTS.write_text(json.dumps(kept, indent=1) + "\n")
+        results = {name: results[name] for name in checks if name in results}
+        RESULTS.write_text(json.dumps(results, indent=1).replace(f"{ROOT}/", "") + "\n")
         good, told = verdict(results[name])
         failed += [] if good else [name]
         print(told if good else f"{told}; more in .ecosystem/results/{name}.log", flush=True)
-        PAGE.write_text(page(kept))
+    # Also without a check, as after a change of a note
+    PAGE.write_text(page(json.loads(RESULTS.read_text())))
     print("written: docs/evidence/ecosystem.md")
     print(f"failed: {', '.join(failed)}" if failed else f"all {len(chosen)} accept hoof-env")
     return 1 if failed else 0
@@ -86,9 +88,10 @@ def check(
 ) -> dict[str, Any]:
     """Run one check and return its versions, what became of its tests, and what ended it early, if anything.
 
-    `note` is of the page alone.
+    Only the page shows `note`.
     """
-    result: dict[str, Any] = {"libraries": libraries, "commit": _commit(), "tests": []}
+    system = f"Python {platform.python_version()}, {platform.system()} {platform.machine()}"
+    result: dict[str, Any] = {"libraries": libraries, "commit": _commit(), "system": system, "tests": []}
     place = VENVS[venv] if venv else None
     try:
         if place:
@@ -133,8 +136,15 @@ def _run(command: list[str], folder: Path, seconds: float, log: Path) -> str:
 
 
 def _commit() -> str:
-    command = ["git", "describe", "--always", "--dirty", "--exclude=*"]
-    return subprocess.run(command, cwd=ROOT, capture_output=True, text=True).stdout.strip() or "unknown"
+    """Return the commit of the checkout, and whether something but the results differs from it."""
+    written = [f":!{path.relative_to(ROOT)}" for path in (RESULTS, PAGE)]
+    commit = _git("rev-parse", "--short=8", "HEAD") or "unknown"
+    changed = _git("status", "--porcelain", "--untracked-files=no", "--", ".", *written)
+    return f"{commit}-dirty" if changed else commit
+
+
+def _git(*arguments: str) -> str:
+    return subprocess.run(("git", *arguments), cwd=ROOT, capture_output=True, text=True).stdout.strip()
 
 
 if __name__ == "__main__":

@@ -2,27 +2,25 @@
 
 from __future__ import annotations
 
-import platform
 from typing import Any
-
-import hoof_env
 
 HEAD = """# Libraries that take hoof-env unchanged
 
-Written by `make test-ecosystem` ({system}, hoof-env {version}, commit {commits}). Each row is a test
-of `tests/ecosystem`, through the library's own front door, on all ids that it applies to. Libraries that
-do not fit together have virtual environments of their own (`tests/ecosystem/suite.toml`).
+Written by `make test-ecosystem` ({systems}). Each row is a test of
+`tests/ecosystem`, run at the commit of its last column, through the library's own front door, on all ids
+that it applies to. Libraries that do not fit together have virtual environments of their own
+(`tests/ecosystem/suite.toml`).
 
 In a training script of yours call `torch.set_num_threads(1)` first, or set `OMP_NUM_THREADS=1`: torch takes
 every core, and its threads spin while they wait for each other, which makes a busy machine ten to thirty
 times as slow ([decisions.md](../decisions.md)).
 
-| library | version | what was run | result | s |
-|---|---|---|---|---|
+| library | version | what was run | result | s | commit |
+|---|---|---|---|---|---|
 """
 
 OUTCOMES = ("passed", "skipped", "failed")
-"""What may become of a test."""
+"""Results that a test can have."""
 
 NOTES = """
 ## What to know
@@ -62,9 +60,7 @@ def verdict(result: dict[str, Any]) -> tuple[bool, str]:
 
 def markdown(results: list[dict[str, Any]], notes: list[tuple[list[str], str]]) -> str:
     """Return the page: `HEAD`, one row for each test function of each check, and the notes on libraries."""
-    commits = ", ".join(sorted({result["commit"] for result in results}))
-    system = f"Python {platform.python_version()}, {platform.system()} {platform.machine()}"
-    page = HEAD.format(system=system, version=hoof_env.__version__, commits=commits)
+    page = HEAD.format(systems="; ".join(sorted({result["system"] for result in results})))
     page += "".join(row + "\n" for result in results for row in _rows(result))
     told = "".join(f"* **{', '.join(libraries)}**: {note}\n" for libraries, note in notes)
     return page + (NOTES + told if told else "")
@@ -74,9 +70,12 @@ def _rows(result: dict[str, Any]) -> list[str]:
     packages = [line.split() for line in result.get("versions", [])]
     packages = packages or [[name, "-"] for name in result["libraries"]]
     head = [", ".join(column) for column in zip(*packages, strict=True)]
-    rows = [[*head, test["what"], _outcome(test), f"{test['seconds']:.1f}"] for test in result["tests"]]
+    rows = [
+        [*head, test["what"], _outcome(test), f"{test['seconds']:.1f}", result["commit"]]
+        for test in result["tests"]
+    ]
     if result["ended"]:
-        rows.append([*head, "the whole check", f"**{result['ended']}**", ""])
+        rows.append([*head, "the whole check", f"**{result['ended']}**", "", result["commit"]])
     return [f"| {' | '.join(cell.replace('|', '/') for cell in row)} |" for row in rows]
 
 

@@ -52,7 +52,7 @@ def test_a_failure_is_told_and_does_not_stop_the_rest(result):
     assert told.startswith("3 passed, 1 skipped, 1 failed in ")
     page = markdown([result], [(["gymnasium"], "Mind the gap.")]).splitlines()
     version = subprocess.check_output([sys.executable, "-c", run.VERSIONS, "gymnasium"], text=True).split()[1]
-    rows = [row.rpartition(" | ")[0] for row in page if row.startswith("| gymnasium")]
+    rows = [row.rsplit(" | ", 2)[0] for row in page if row.startswith("| gymnasium")]
     assert rows == [
         f"| gymnasium | {version} | Passes | 2 passed",
         f"| gymnasium | {version} | Fails | **1 failed (ValueError: no / such leg)**",
@@ -67,6 +67,7 @@ def test_an_endless_test_is_ended_and_what_ran_before_it_is_kept(result):
     good, told = verdict(result)
     assert not good
     assert told.endswith("stopped after 12 s")
+    assert told.startswith("2 passed, 1 skipped, 1 failed")
     assert len(result["tests"]) == 3
     assert "**stopped after 12 s**" in markdown([result], [])
 
@@ -85,9 +86,7 @@ def test_a_check_in_which_no_test_runs_fails():
 def test_the_page_is_that_of_the_stored_results():
     stored = json.loads(run.RESULTS.read_text())
     assert list(stored) == list(run.SUITE["check"])
-    head, table = run.PAGE.read_text().split("\n", 3)[2:]
-    assert head.startswith("Written by `make test-ecosystem`")
-    assert table == run.page(stored).split("\n", 3)[3]
+    assert run.PAGE.read_text() == run.page(stored)
 
 
 def test_every_check_has_its_file_and_every_file_its_check():

@@ -12,18 +12,18 @@ PARAMETERS_IN = 3  # number of the block, from 1
 
 
 def group(name, number=-1, locked=False):
-    """The entry that names a group; its description is empty."""
+    """Return the entry that names a group, without a description."""
     return {"name": name, "group": number, "rest": b"\0", "locked": locked}
 
 
 def floats(name, values, number=1, locked=False):
-    """A parameter of floats in one dimension."""
+    """Return the entry of a parameter of floats in one dimension."""
     rest = struct.pack("bB", 4, 1) + bytes([len(values)]) + b"\0" * (4 * len(values)) + b"\0"
     return {"name": name, "group": number, "rest": rest, "locked": locked}
 
 
 def chain(entries, order="<", last=0):
-    """The bytes of entries, each with the distance from its own place to the next entry."""
+    """Return the bytes of entries, each with the distance to the next one."""
     out = b""
     for k, entry in enumerate(entries):
         name = entry["name"] if isinstance(entry["name"], bytes) else entry["name"].encode()
@@ -56,7 +56,7 @@ def test_a_whole_chain_passes(tmp_path, order, last):
 DAMAGES = {
     "a name that is not printed": ([group(b"PO\x07NT"), *GOOD[1:]], "no name in byte 1029"),
     "an entry of no group": ([GOOD[0], floats("SCALE", [1.0], number=0)], "no name in byte 1039"),
-    "a link onto itself": ([GOOD[0] | {"ahead": 1}, *GOOD[1:]], "POINT leads backward"),
+    "a link into itself": ([GOOD[0] | {"ahead": 1}, *GOOD[1:]], "POINT leads backward"),
     "a link backward": ([GOOD[0] | {"ahead": -4}, *GOOD[1:]], "POINT leads backward"),
     "a link into the numbers": (
         [GOOD[0], floats("SCALE", [1.0, 2.0]) | {"ahead": 6}, GOOD[2]],

@@ -98,7 +98,7 @@ def zigzag(rise, width):
 
 
 def test_a_force_through_a_knot_far_from_the_origin_meets_the_ground():
-    """There the places of knots are rounded to more than a thousandth of a micrometre."""
+    """100 km away, where the places of knots are rounded; the ground rises and falls by 1 cm."""
     knots = 1e5 + 0.1 * np.arange(40)
     ground = Terrain(tuple(0.01 * (k % 2) for k in range(40)), start=1e5, spacing=0.1)
     at = knots[1:-1]

@@ -121,7 +121,12 @@ def test_what_is_made_here_is_closed_to_others_whatever_the_umask(start, tmp_pat
         ("ann", [], 1000, True),
         ("ann", ["ann"], 1000, True),
         ("ann", ["ann", "ben"], 1000, False),
-        ("staff", [], 1000, False),  # the first group of all users of a system, which lists nobody
+        (
+            "staff",
+            [],
+            1000,
+            False,
+        ),  # the first group of all users of a system, whose list of members is empty
         ("ann", [], 1001, False),  # not the user's own
         ("root", [], 0, True),
     ],
