@@ -8,7 +8,7 @@ import pytest
 from hoof_env.dynamics.engine import TrunkEngine
 from hoof_env.dynamics.parts import Limb, Motor, Prescribed, Trunk
 from hoof_env.dynamics.stepping import SCHEMES
-from hoof_env.gait import GaitParameters
+from hoof_env.gait import FilterSettings, GaitParameters
 from tests.dynamics.scenes import FAR, LEG, RUN, WALK
 from tests.oracle.horse import PlainHorse
 from tests.oracle.run import simulate
@@ -105,3 +105,28 @@ def test_semi_implicit_euler_moves_with_the_rates_of_the_end():
     )
     speed = after["momentum_x"] / engine.total_mass
     np.testing.assert_allclose(after["centre_x"], before["centre_x"] + 1e-3 * speed, rtol=1e-14)
+
+
+@pytest.mark.parametrize("scheme", SCHEMES)
+def test_it_converges_at_its_order_while_cranks_speed_up(scheme):
+    """The commands are so far away that the filters accelerate evenly throughout, whatever the step."""
+
+    def end_of(scheme, steps):
+        limbs, trunk = horse("free", "prescribed")
+        filters = FilterSettings(gain=1.0, crank_rate=1e3, crank_acc=1e3)
+        engine = TrunkEngine(
+            limbs, trunk, FAR, sim_dt=SECONDS / steps, integrator=scheme, substeps=1, filters=filters
+        )
+        engine.reset(GAITS, THETA, y=3.0, vx=1.0, vy=0.5, pitch_rate=-0.8)
+        far = np.array([gait.to_array() for gait in GAITS])
+        far[:, 0] += 1e3
+        assert not engine.advance(far, steps).any()
+        np.testing.assert_allclose(engine.state["crank_speed_rate"], 1e3 * SECONDS, rtol=1e-12)
+        r = engine.report
+        return np.concatenate([r["x"], r["y"], r["vx"], r["vy"], r["pitch_rate"]])
+
+    true_end = end_of("rk4", 400)
+    order = SCHEMES[scheme].order
+    finest = 12 if order > 2 else 160
+    errors = [np.abs(end_of(scheme, n) - true_end).max() for n in (finest // 2, finest)]
+    assert np.log2(errors[0] / errors[1]) == pytest.approx(order, abs=0.2)
