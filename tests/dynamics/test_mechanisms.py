@@ -97,9 +97,8 @@ def test_joint_reactions_are_those_of_eq_8(leg, theta):
     engine = TrunkEngine(Limb(leg, drive=Prescribed()), trunk, NATURAL, reactions=True)
     engine.reset(GAIT, theta)
     found = engine.reactions()
-    # The table of Jansen's leg as long as the paper's is off by 1.4e-10 of its largest reaction, and by
-    # more than 2e-10 on a processor where NumPy's sines, which it is made of, differ in the last digit.
-    accuracy = (5e-10 if leg is LEGS["jansen"] else 1e-10) * np.abs(expected.joints).max()
+    # The table of Jansen's leg as long as the paper's is off by 1.4e-10 of its largest reaction.
+    accuracy = (2e-10 if leg is LEGS["jansen"] else 1e-10) * np.abs(expected.joints).max()
     np.testing.assert_allclose(found.joints[0, :, :, 0], expected.joints, rtol=0, atol=accuracy)
     for name in ("driver", "hip"):
         assert getattr(found, name)[0, 0] == pytest.approx(getattr(expected, name), abs=accuracy)
