@@ -24,6 +24,10 @@ from tests.legs import FIRST_FIT
 inside = st.tuples(*(st.floats(low, high) for low, high in LIMITS.values()))
 
 
+def test_a_gait_has_no_second_harmonic_unless_it_is_given():
+    assert HarmonicGait(6.0, 0.1, 0.2, 0.3) == HarmonicGait(6.0, 0.1, 0.2, 0.3, (0.0, 0.0))
+
+
 @given(values=inside)
 @settings(deadline=None)
 def test_an_array_and_back(values):
