@@ -307,10 +307,7 @@ class RandomizeParameters(gym.Wrapper[Any, Any, Any, Any], RecordConstructorArgs
         leg = env.unwrapped
         if not isinstance(leg, HorseLegEnv):
             raise ParameterError(f"env: expected a leg of this package, got {type(leg).__name__}")
-        try:
-            check_options(leg.batch, {"parameters": ranges})
-        except ParameterError as error:
-            raise ParameterError(str(error).replace("options['parameters']", "ranges")) from None
+        check_options(leg.batch, {"parameters": ranges})
         RecordConstructorArgs.__init__(self, ranges=dict(ranges), enabled=enabled)
         gym.Wrapper.__init__(self, env)
         self.ranges = dict(ranges)
