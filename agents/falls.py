@@ -14,7 +14,6 @@ from __future__ import annotations
 
 import sys
 from dataclasses import dataclass
-from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -30,7 +29,7 @@ from hoof_env.evaluation.episodes import score_vector
 from hoof_env.film import frames, write_film
 from hoof_env.policies.find import find_policy, read_policy_record
 from hoof_env.policies.saved import own_id
-from hoof_env.render.renderer import new_renderer
+from hoof_env.render.renderer import Renderer
 from hoof_env.tasks.disturbances import MOST_STRENGTH, rough_ground
 from hoof_env.tasks.horse import MASS
 
@@ -132,9 +131,9 @@ def strip(policy: str, strength: float, seed: int, end: float) -> list[NDArray[n
     env_id = own_id(read_policy_record(policy).get("env_id", ENV_ID))
     with records.make_env(env_id, settings) as env:
         player = find_policy(policy, env, env_id)
-        renderer = new_renderer(records.surroundings(env), FPS, SIZE)
+        renderer = Renderer(records.surroundings(env), size=SIZE)
         episode = records.episode(env, player, seed, end + 0.5)
-        pictures = list(frames(renderer, episode, FPS, read=partial(records.instants_of, env)))
+        pictures = list(frames(renderer, episode, FPS))
     return pictures[round((end - FILMED) * FPS) :]
 
 

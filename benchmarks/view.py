@@ -108,7 +108,7 @@ def alone(env_id: str) -> float:
     for _ in range(steps):
         if simulation.step() is None:
             simulation.reset()
-    return (time.process_time() - began) / (steps * simulation.setting.dt)
+    return (time.process_time() - began) / (steps * simulation.dt)
 
 
 def memory_of(process: int) -> float:

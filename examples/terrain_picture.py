@@ -6,7 +6,7 @@ from PIL import Image
 
 from hoof_env import Limb, Prescribed, Terrain, Trunk, TrunkEngine, load_gait, load_geometry
 from hoof_env.ground.contact import load_ground
-from hoof_env.render.instant import columns_of_engine, instants
+from hoof_env.render.instant import Surroundings, columns_of_engine, instants
 from hoof_env.render.renderer import Renderer
 
 leg = load_geometry("identified")
@@ -20,7 +20,7 @@ terrain = Terrain.through(
 engine = TrunkEngine(Limb(leg, drive=Prescribed()), Trunk(height=leg.hip_height), load_ground(), terrain)
 engine.reset(run, vx=2.0)
 picture = Renderer(
-    leg, "rgb_array", 50, weight_n=engine.weight, lift_off_n=0.05 * engine.weight, terrain=terrain
+    Surroundings(leg, terrain, weight_n=engine.weight, lift_off_n=0.05 * engine.weight),
 )
 for _ in range(59):
     record = engine.run(run.to_array(), steps=20)

@@ -6,8 +6,7 @@ import os
 import shutil
 import sys
 import time
-from collections.abc import Callable, Iterable, Iterator, Sequence
-from functools import partial
+from collections.abc import Iterable, Iterator, Sequence
 from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -107,7 +106,6 @@ def frames(
     episode: Iterable[Columns],
     fps: float,
     slow: float = 1.0,
-    read: Callable[[Columns], list[Any]] = instants,
 ) -> Iterator[NDArray[np.uint8]]:
     """Draw pictures of an episode, 1 / (fps slow) of its seconds apart.
 
@@ -116,7 +114,6 @@ def frames(
         episode: columns as `records.episode` yields them.
         fps: frames a second [Hz].
         slow: factor by which the film is slower than the episode.
-        read: function that converts columns to instants.
 
     Yields:
         Pictures of shape (height, width, 3), each at the first substep at or after its time.
@@ -126,7 +123,7 @@ def frames(
     shown = 0
     news: list[Any] = []
     for columns in episode:
-        for instant in read(columns):
+        for instant in instants(columns, renderer.here.hips):
             news.append(instant)
             # Times are sums of substeps, and rounding must not delay a frame by one.
             if instant.time >= shown * step - 1e-9:
@@ -234,7 +231,7 @@ def render_episode(
     Raises:
         HoofEnvError: a subclass as in `records.make_env`, `records.find_policy` and `write_film`.
     """
-    from hoof_env.render.renderer import new_renderer
+    from hoof_env.render.renderer import Renderer
 
     records.check_place(path, FFMPEG)
     check_film(path, fps)
@@ -243,9 +240,9 @@ def render_episode(
     check_number("seconds", seconds, low=0, exclusive_low=True)
     with records.make_env(env_id, parse_pairs("--args", arguments)) as env:
         player = records.find_policy(policy, env, env_id, seed)
-        renderer = new_renderer(records.surroundings(env), fps, size)
+        renderer = Renderer(records.surroundings(env), size=size)
         played = records.episode(env, player, seed, seconds)
-        pictures = frames(renderer, played, fps, slow, partial(records.instants_of, env))
+        pictures = frames(renderer, played, fps, slow)
         count = write_film(_with_progress(pictures, round(seconds * slow * fps) + 1), path, fps)
     return count
 

@@ -21,9 +21,9 @@ from numpy.typing import NDArray
 
 import hoof_env
 from hoof_env._output import check_folder, free_memory, staged
-from hoof_env.dynamics.memory import LIFT_OFF
 from hoof_env.envs import made
 from hoof_env.envs.policies import start_of
+from hoof_env.envs.recording import surroundings_of
 from hoof_env.errors import (
     MissingExtraError,
     OutputError,
@@ -33,7 +33,6 @@ from hoof_env.errors import (
     parse_pairs,
 )
 from hoof_env.gait import PARAMETERS
-from hoof_env.ground.terrain import Terrain
 from hoof_env.lab.c3d import ezc3d, write_c3d
 from hoof_env.lab.forces import THRESHOLD, above_threshold, in_units, limbs_of, onto_surface
 from hoof_env.lab.forces import UNITS as FORCE_UNITS
@@ -41,8 +40,7 @@ from hoof_env.lab.opensim import check_bodies, loads_path, write_mot
 from hoof_env.lab.reactions import JointReactions, reaction_units
 from hoof_env.policies.find import default_policy as default_policy
 from hoof_env.policies.find import find_policy as find_policy
-from hoof_env.render import instant
-from hoof_env.render.instant import UNITS, Columns, Surroundings, columns_of, units_of_legs
+from hoof_env.render.instant import UNITS, Columns, Surroundings, body_units, columns_of
 
 RECORD = {name: unit for name, unit in UNITS.items() if name not in PARAMETERS[1:]} | {"free_moment": "N m"}
 """Units of a record's columns: fields of `Instant` without the swing's parameters, which are known at the
@@ -60,17 +58,7 @@ def surroundings(env: Any) -> Surroundings:
     steps; raise `ParameterError` for another environment."""
     leg = env.unwrapped
     try:
-        hips = leg.batch.body.hips
-        return Surroundings(
-            leg.geometry,
-            getattr(leg, "terrain", None) or Terrain.flat(),
-            leg.weight,
-            leg.engine.trunk.kind,
-            LIFT_OFF * leg.weight / max(len(hips), 1),
-            leg.dt,
-            leg.sim_dt,
-            hips,
-        )
+        return surroundings_of(leg.batch)
     except AttributeError:
         raise ParameterError(
             f"environment: expected one leg of this package behind it, got {type(leg).__name__}"
@@ -82,12 +70,8 @@ def substeps(env: Any, record: Columns | None = None) -> Columns:
     row for each substep, or one row after a reset. `record` is that of the environment, if it is known."""
     leg = env.unwrapped
     command = leg.engine.command_in(leg.engine.column(0))
-    return columns_of(leg.record() if record is None else record, leg.batch.body.hips, leg.terrain, command)
-
-
-def instants_of(env: Any, columns: Columns) -> list[Any]:
-    """Convert the rows of an environment's columns to `Instant`s, or to `HorseInstant`s of a horse."""
-    return instant.instants_of(columns, env.unwrapped.batch.body.hips)
+    said = leg.record() if record is None else record
+    return columns_of(said, leg.batch.body.hips, leg.terrain, command=command)
 
 
 def make_env(env_id: str, arguments: Mapping[str, Any] | None = None) -> gym.Env[Any, Any]:
@@ -175,9 +159,8 @@ def _with_progress(played: Iterator[Columns], longest: float) -> Iterator[Column
 
 def _named(env: gym.Env[Any, Any], reactions: NDArray[np.float64]) -> Columns:
     """Return reactions of shape (n, legs, columns) as columns by name."""
-    limbs = [f"{leg}_" for leg in surroundings(env).hips] or [""]
     columns = {}
-    for i, limb in enumerate(limbs):
+    for i, limb in enumerate(surroundings(env).hips):
         for k, name in enumerate(reaction_units(surroundings(env).geometry.mechanism)):
             columns[f"{limb}{name}"] = reactions[:, i, k]
     return columns
@@ -200,7 +183,7 @@ def record_episode(
     """
     units = units_of(env, reactions)
     longest = longest_of(env, seconds)
-    check_memory(longest / surroundings(env).sim_dt, len(units))
+    check_memory(longest / env.get_wrapper_attr("sim_dt"), len(units))
     joints = JointReactions(env) if reactions else None
     played = episode(env, policy, seed, seconds, options, joints)
     parts = list(_with_progress(played, longest) if tell else played)
@@ -222,7 +205,7 @@ def units_of(env: gym.Env[Any, Any], reactions: bool = False) -> dict[str, str]:
     its trunk, and those of each leg with its name as prefix: `left_fore_force_y`.
     """
     of_leg = RECORD | (reaction_units(surroundings(env).geometry.mechanism) if reactions else {})
-    return units_of_legs(of_leg, surroundings(env).hips)
+    return body_units(of_leg, surroundings(env).hips)
 
 
 def describe(env: gym.Env[Any, Any], **about: Any) -> dict[str, Any]:
@@ -233,7 +216,7 @@ def describe(env: gym.Env[Any, Any], **about: Any) -> dict[str, Any]:
     return {
         "hoof_env": hoof_env.__version__,
         **about,
-        "sim_dt_s": setting.sim_dt,
+        "sim_dt_s": env.get_wrapper_attr("sim_dt"),
         "weight_n": setting.weight_n,
         "axes": "x forward, y up, z to the right; angles counter-clockwise",
         "units": units_of(env),

@@ -15,7 +15,7 @@ from hoof_env import cli
 from hoof_env import film as render_clip
 from hoof_env.film import frames, write_film
 from hoof_env.records import episode, find_policy, make_env, surroundings
-from hoof_env.render.renderer import new_renderer
+from hoof_env.render.renderer import Renderer
 
 pytest.importorskip("pygame")
 iio = pytest.importorskip("imageio.v3")
@@ -48,7 +48,7 @@ def test_a_film_has_its_frames(name, options, count, tmp_path, capsys):
 
 def test_slow_motion_shows_the_substeps_between():
     with make_env(LEG) as env:
-        renderer = new_renderer(surroundings(env), 50, (480, 270))
+        renderer = Renderer(surroundings(env), size=(480, 270))
 
         def play(fps, slow):
             pictures = frames(renderer, episode(env, find_policy("run", env, LEG), 0, 0.1), fps, slow)

@@ -82,7 +82,7 @@ class BatchKernels:
         find_entries(self)
         functions = [part for entry in (*self.entries, *self.true_entries) for part in functions_of(entry)]
         self.has_own_entries = bool(from_outside(functions))
-        self.measurements = InfoLayout(self.engine.features, self.body.leg_prefixes)
+        self.measurements = InfoLayout(self.engine.features, tuple(self.body.hips))
         self.kernels = k = step_kernels(
             self.task.terms,
             self.task.entries,

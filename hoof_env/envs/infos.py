@@ -6,7 +6,7 @@ them, under the same keys at a reset and at a step: libraries that stack infos n
 
 from __future__ import annotations
 
-from collections.abc import Callable, ItemsView, KeysView, Mapping, Sequence, ValuesView
+from collections.abc import Callable, ItemsView, Iterable, KeysView, Mapping, Sequence, ValuesView
 from functools import cache
 from typing import Any
 
@@ -28,12 +28,12 @@ from hoof_env.envs.shown import html_table
 from hoof_env.gait import parameter_names
 
 
-def measured_names(features: Features = PLAIN, prefixes: tuple[str, ...] = ("",)) -> tuple[str, ...]:
+def measured_names(features: Features = PLAIN, prefixes: Iterable[str] = ("",)) -> tuple[str, ...]:
     """Return the names of the measurements in an info, in order: the trunk's, then each leg's.
 
     Args:
         features: features of the engine.
-        prefixes: prefix of the names of each leg, see `body.Body.leg_prefixes`.
+        prefixes: prefix of the names of each leg, see `body.Body.hips`.
     """
     leg = (*leg_state(features), *STRIDES, *stride_sums(features))
     command = tuple(f"command_{name}" for name in parameter_names(features.harmonics))

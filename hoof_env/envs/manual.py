@@ -123,7 +123,7 @@ def page(task: str, film: str = "", score: str = "") -> str:
         options=markdown_table(("Option", "Unit", "Range", "Meaning"), parts.options()),
         parameters=", ".join(f"`{name}`" for name in parts.parameters(s)),
         infos=markdown_table(("Key", "Unit", "Meaning"), parts.infos(s)),
-        measured=str(len(measured_names(_features(s, body), body.leg_prefixes))),
+        measured=str(len(measured_names(_features(s, body), body.hips))),
         quantities=markdown_table(("Name", "In", "Unit", "Meaning"), parts.quantities(_features(s, body))),
         leaves=Template(trunk["leaves"]).substitute(height=f"{body.height:.4g}"),
         seconds=literal(s.episode_seconds),

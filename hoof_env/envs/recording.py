@@ -18,12 +18,26 @@ from hoof_env.dynamics.memory import LIFT_OFF
 from hoof_env.dynamics.names import NamedColumns
 from hoof_env.dynamics.parts import broken
 from hoof_env.envs.batch import EpisodeBatch
-from hoof_env.render.instant import columns_of, instants_of
+from hoof_env.render.instant import Surroundings, columns_of, instants
 from hoof_env.render.renderer import USUAL_SIZE, Renderer
 
 SHOWN = 4.0  # longest time before a picture that it can show [s]
 
 Record = dict[str, NDArray[np.float64]]
+
+
+def surroundings_of(batch: EpisodeBatch, env: int = 0) -> Surroundings:
+    """Return what surrounds the motion of an environment of a batch."""
+    weight = float(batch.episode_rows.weight[env])
+    return Surroundings(
+        batch.body.geometry,
+        batch.conditions.of(env).get("terrain", batch.engine.terrain),
+        batch.settings.trunk,
+        weight,
+        LIFT_OFF * weight / batch.legs,
+        batch.body.hips,
+        batch.body.picture,
+    )
 
 
 class Recording:
@@ -128,21 +142,9 @@ class Recording:
             mode: render mode, "rgb_array" or "human".
             fps: pictures per second.
         """
-        hips = self.batch.body.hips
-        terrain = self.batch.conditions.of(self.env).get("terrain", self.batch.engine.terrain)
         if self.renderer is None:
-            weight = float(self.batch.episode_rows.weight[self.env])
-            self.renderer = Renderer(
-                self.batch.body.geometry,
-                mode,
-                fps,
-                self.size,
-                self.batch.settings.trunk,
-                weight,
-                LIFT_OFF * weight / self.batch.legs,
-                terrain,
-                hips,
-            )
+            self.renderer = Renderer(surroundings_of(self.batch, self.env), mode, fps, self.size)
+        here = self.renderer.here
         if not self._ends:
             self.begin()
         # A new episode, or more steps than are kept: the lines of the picture begin anew.
@@ -154,8 +156,8 @@ class Recording:
         for k in range(-unseen, 0):
             record = self._record(k)
             command = self._commanded(k)
-            columns = columns_of(record, hips, terrain, command)
-            self.renderer.add(instants_of(columns, hips))
+            columns = columns_of(record, here.hips, here.terrain, command=command)
+            self.renderer.add(instants(columns, here.hips))
         self._unseen = 0
         return self.renderer.frame()
 

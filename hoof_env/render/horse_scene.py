@@ -17,11 +17,10 @@ from hoof_env.leg.geometry import Geometry
 from hoof_env.render.brush import FINE, Brush, arrow, bar
 from hoof_env.render.colours import COAT, COAT_EDGE, CRANK, FORCE, GREY, HEEL, TOE
 from hoof_env.render.ground import GroundPainter
-from hoof_env.render.instant import HorseInstant
-from hoof_env.render.outline import AROUND_M, ARROW_M, BODY, EAR, HORSE_HIP_M, TAIL, LegOutline
+from hoof_env.render.instant import BodyInstant
+from hoof_env.render.outline import AROUND_M, ARROW_M, BODY, EAR, FAR, HORSE_HIP_M, TAIL, LegOutline
 from hoof_env.render.scene import Scene
 
-NEAR = (0, 2)  # the left legs
 FAR_COAT = 0.45  # how far the colour of far legs is from the sky's [-]
 WIDE_M = (1.75, 2.25)
 """Width that is seen behind and before the trunk's centre [m]."""
@@ -65,12 +64,12 @@ class HorseScene(Scene):
         self._camera = complex(now.x, level)
         canvas.blit(self._sky, (0, 0))
         self._ground.draw(canvas, self._soles(now.legs), self.corner)
-        for i in range(len(now.legs)):
-            if i not in NEAR:
-                self._draw_far_leg(canvas, self.points_of(now.legs[i]))
+        for i in FAR:
+            self._draw_far_leg(canvas, self.points_of(now.legs[i]))
         self._draw_body(canvas, now)
-        for i in NEAR:
-            self._draw_leg(canvas, self.points_of(now.legs[i]), lettered=False)
+        for i in range(len(now.legs)):
+            if i not in FAR:
+                self._draw_leg(canvas, self.points_of(now.legs[i]), lettered=False)
         for leg in now.legs:
             self._draw_forces(canvas, leg, full_scale, self._share, is_told=False)
         canvas.blit(self._key(full_scale), (0, 0), special_flags=pygame.BLEND_PREMULTIPLIED)
@@ -82,7 +81,7 @@ class HorseScene(Scene):
         far.fill((round(255 * FAR_COAT),) * 3 + (255,), special_flags=pygame.BLEND_RGBA_MULT)
         canvas.blit(far, (0, 0), special_flags=pygame.BLEND_PREMULTIPLIED)
 
-    def _draw_body(self, canvas: Any, now: HorseInstant) -> None:
+    def _draw_body(self, canvas: Any, now: BodyInstant) -> None:
         centre = complex(now.x, now.y)
         turn = np.exp(1j * now.pitch)
         metre = self._scale * self._animal

@@ -13,6 +13,7 @@ from hoof_env.dynamics.names import NamedColumns
 from hoof_env.gait import PARAMETERS
 from hoof_env.ground.terrain import Terrain
 from hoof_env.leg.geometry import Geometry
+from hoof_env.render.picture import LegPicture, Picture
 
 Columns = dict[str, NDArray[np.float64]]
 """Arrays of shape (n,) by the names of `Instant`'s fields, for n instants in the order of time."""
@@ -26,26 +27,32 @@ RadianPerSecond = Annotated[float, "rad/s"]
 Newton = Annotated[float, "N"]
 
 
+Hips = Mapping[str, tuple[float, float]]
+"""Crank centre of each leg from the trunk's own place [m], by the prefix of the leg's names."""
+
+ONE_HIP: Hips = MappingProxyType({"": (0.0, 0.0)})
+"""Hips of a single leg, whose names have no prefix and whose O is the place of the trunk."""
+
+
 class Surroundings(NamedTuple):
     """Surroundings of the motion that pictures and files show.
 
     Attributes:
         geometry, terrain: the leg and what it stands on.
-        weight_n: weight of trunk and legs [N].
         trunk: its kind, one of `dynamics.parts.TRUNKS`.
+        weight_n: weight of trunk and legs [N], 0 if it is not known.
         lift_off_n: normal force on a hoof that tells stance from swing [N].
-        dt, sim_dt: control step and substep [s].
-        hips: of a horse, the crank centres from the trunk's centre of mass [m], by the names of its legs.
+        hips: crank centres by the prefixes of the legs.
+        picture: scene, panel and drawing that show the body.
     """
 
     geometry: Geometry
-    terrain: Terrain
-    weight_n: float
-    trunk: str
-    lift_off_n: float
-    dt: float
-    sim_dt: float
-    hips: Mapping[str, tuple[float, float]] = MappingProxyType({})
+    terrain: Terrain = Terrain.flat()
+    trunk: str = "suspended"
+    weight_n: float = 0.0
+    lift_off_n: float = 0.0
+    hips: Hips = ONE_HIP
+    picture: Picture = LegPicture()
 
 
 class Instant(NamedTuple):
@@ -105,8 +112,8 @@ class Instant(NamedTuple):
         return float((self.force_x**2 + self.force_y**2) ** 0.5)
 
 
-class HorseInstant(NamedTuple):
-    """One instant of a horse: what `Instant` says of a leg is said of each, by its place in `legs`."""
+class BodyInstant(NamedTuple):
+    """One instant of a body: place, velocity and pitch of its trunk, and the instant of each leg."""
 
     time: Second
     x: Metre
@@ -114,11 +121,11 @@ class HorseInstant(NamedTuple):
     vx: MetrePerSecond
     vy: MetrePerSecond
     pitch: Radian
-    legs: tuple[Instant, ...] = ()
+    legs: tuple[Instant, ...]
 
 
-OF_TRUNK = ("time", "x", "y", "vx", "vy", "pitch")
-"""Columns of a horse besides those of its legs."""
+OF_TRUNK = BodyInstant._fields[:-1]
+"""Columns of a body besides those of its legs."""
 
 POINTS = ("toe", "heel")
 
@@ -126,63 +133,51 @@ UNITS = {name: kind.__metadata__[0] for name, kind in get_type_hints(Instant, in
 """Unit of each field of `Instant`."""
 
 
-def instants(columns: Mapping[str, NDArray[np.float64]]) -> list[Instant]:
-    """Records of the rows of `columns`, of one leg."""
-    return list(map(Instant._make, zip(*(columns[name].tolist() for name in Instant._fields), strict=True)))
+def leg_instants(columns: Mapping[str, NDArray[np.float64]], prefix: str = "") -> list[Instant]:
+    """Return the instants of the leg whose columns have this prefix, one for each row."""
+    values = (columns[f"{prefix}{name}"].tolist() for name in Instant._fields)
+    return list(map(Instant._make, zip(*values, strict=True)))
 
 
-def horse_instants(columns: Mapping[str, NDArray[np.float64]], legs: Iterable[str]) -> list[HorseInstant]:
-    """Records of the rows of `columns`, of a horse with these legs."""
-    each = [instants({name: columns[f"{leg}_{name}"] for name in Instant._fields}) for leg in legs]
+def instants(
+    columns: Mapping[str, NDArray[np.float64]], prefixes: Iterable[str] = ONE_HIP
+) -> list[BodyInstant]:
+    """Return the instants of a body whose legs' columns have these prefixes, one for each row."""
+    of_legs = zip(*(leg_instants(columns, prefix) for prefix in prefixes), strict=True)
     of_trunk = zip(*(columns[name].tolist() for name in OF_TRUNK), strict=True)
-    rows = zip(of_trunk, *each, strict=True)
-    return [HorseInstant._make((*row, tuple(now))) for row, *now in rows]
-
-
-def columns_of_horse(
-    record: Mapping[str, NDArray[Any]],
-    hips: Mapping[str, tuple[float, float]],
-    terrain: Terrain | None = None,
-    *,
-    command: NDArray[np.float64] | None = None,
-) -> Columns:
-    """Columns of a horse from what `TrunkEngine` says of one: `OF_TRUNK`, and those of each leg under its
-    name; `command` has a row for each leg."""
-    columns: Columns = {name: np.atleast_1d(record[name][..., 0]).astype(float) for name in OF_TRUNK}
-    for i, (leg, hip) in enumerate(hips.items()):
-        wanted = None if command is None else command[i, :4]
-        own = columns_of_engine(record, terrain, command=wanted, leg=i, hip=hip)
-        columns |= {f"{leg}_{name}": values for name, values in own.items()}
-    return NamedColumns(columns)
+    return [BodyInstant._make((*trunk, legs)) for trunk, legs in zip(of_trunk, of_legs, strict=True)]
 
 
 def columns_of(
     record: Mapping[str, NDArray[Any]],
-    hips: Mapping[str, tuple[float, float]],
-    terrain: Terrain | None,
-    command: NDArray[np.float64],
+    hips: Hips,
+    terrain: Terrain | None = None,
+    *,
+    command: NDArray[np.float64] | None = None,
 ) -> Columns:
-    """Return the columns of a body from what `TrunkEngine` says of it: of a horse with these hips, or of one
-    leg without; `command` has a row for each leg."""
-    if hips:
-        return columns_of_horse(record, hips, terrain, command=command)
-    return columns_of_engine(record, terrain, command=command[0])
+    """Return the columns of a body from what `TrunkEngine` says of an environment: `OF_TRUNK`, and those of
+    each leg with its prefix.
+
+    Args:
+        record: `engine.state | engine.report`, for one instant, or what `engine.run` returns.
+        hips: crank centres by the prefixes of the legs.
+        terrain: what the engine stands on; level if None.
+        command: gait parameters commanded, shape (legs, parameters); None if not known.
+    """
+    columns: Columns = {name: np.atleast_1d(record[name][..., 0]).astype(float) for name in OF_TRUNK}
+    for i, (prefix, hip) in enumerate(hips.items()):
+        wanted = None if command is None else command[i, :4]
+        own = columns_of_engine(record, terrain, command=wanted, leg=i, hip=hip)
+        columns |= {f"{prefix}{name}": values for name, values in own.items()}
+    return NamedColumns(columns)
 
 
-def instants_of(columns: Mapping[str, NDArray[np.float64]], hips: Iterable[str]) -> list[Any]:
-    """Return the records of the rows of `columns`: `HorseInstant`s of a horse with these legs, or `Instant`s
-    without."""
-    return horse_instants(columns, hips) if hips else instants(columns)
-
-
-def units_of_legs(of_leg: Mapping[str, str], hips: Iterable[str]) -> dict[str, str]:
-    """Return the columns of a body's record with their units, from those of one leg: of a horse those of the
-    trunk, and each leg's under its name."""
-    if not hips:
-        return dict(of_leg)
+def body_units(of_leg: Mapping[str, str], prefixes: Iterable[str]) -> dict[str, str]:
+    """Return the columns of a body's record with their units, from those of a single leg: those of the trunk,
+    and those of each leg with its prefix."""
     found = {name: UNITS[name] for name in OF_TRUNK}
     own = {name: unit for name, unit in of_leg.items() if name not in OF_TRUNK}
-    return found | {f"{leg}_{name}": unit for leg in hips for name, unit in own.items()}
+    return found | {f"{prefix}{name}": unit for prefix in prefixes for name, unit in own.items()}
 
 
 def columns_of_engine(
@@ -203,7 +198,7 @@ def columns_of_engine(
         hip: where its O is, from the trunk's own place [m].
     """
     ground = Terrain.flat() if terrain is None else terrain
-    of_trunk = {name: np.atleast_1d(record[name][..., 0]).astype(float) for name in _TRUNK}
+    of_trunk = {name: np.atleast_1d(record[name][..., 0]).astype(float) for name in OF_TRUNK}
     of_leg = {name: np.atleast_1d(record[name][..., leg, 0]).astype(float) for name in _LEG}
     n = len(of_trunk["time"])
     wanted = np.full(4, np.nan) if command is None else np.asarray(command, float)
@@ -236,7 +231,6 @@ def columns_of_engine(
     return NamedColumns(columns | _together(columns))
 
 
-_TRUNK = ("time", "x", "y", "vx", "vy", "pitch")
 _LEG = (
     "crank_angle",
     "crank_angle_rate",

@@ -37,6 +37,8 @@ BODY: tuple[Part, ...] = (
 EAR: Part = ((1.36, 0.86), (1.38, 1.06), 0.05, 0.015)
 TAIL: Part = ((-0.93, 0.22), (-1.15, -0.42), 0.05, 0.025)
 HORSE_HIP_M = 1.4
+FAR = (1, 3)
+"""Legs of a horse that are drawn behind its trunk, the right ones."""
 
 
 class LegOutline:

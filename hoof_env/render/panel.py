@@ -1,4 +1,4 @@
-"""The panel: numbers of the instant, the gait commanded and made, and the force of the last seconds."""
+"""The panel of one leg: numbers of the instant, gait commanded and made, force of the last seconds."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ import pygame
 from hoof_env.dynamics.observables import StanceCounter
 from hoof_env.render.brush import FINE, Brush
 from hoof_env.render.colours import CRANK, FAINT, FORCE, GREY, INK, PAPER
-from hoof_env.render.instant import Instant
+from hoof_env.render.instant import BodyInstant, Instant
 
 SECONDS = 3  # time shown [s]
 RESOLUTION = 0.01  # the curve keeps the largest force of every such interval [s]
@@ -101,7 +101,7 @@ class Stances:
 
 class Panel:
     """Numbers, gait and force curve in one box (left, top, width, height) of the picture, with the weight of
-    trunk and leg [N] as a line, if there is one, and stances from `lift_off_n` [N] on. `limits` are those of
+    trunk and leg [N] as a line, unless it is 0, and stances from `lift_off_n` [N] on. `limits` are those of
     the gait parameters, by name, see `gait.limits_of`.
 
     Its `full_scale`, the force at the top of the curve's axis [N], only grows during an episode.
@@ -111,7 +111,7 @@ class Panel:
         self,
         brush: Brush,
         box: tuple[int, int, int, int],
-        weight_n: float | None,
+        weight_n: float,
         lift_off_n: float,
         limits: Mapping[str, tuple[float, float]],
     ) -> None:
@@ -133,29 +133,31 @@ class Panel:
     def reset(self) -> None:
         self.stances = Stances(self._lift_off)
         self._curve: deque[tuple[float, float]] = deque()  # time [s], force [N]
-        self.full_scale = nice(max(4 * (self._weight or 0.0), self._least))
+        self.full_scale = nice(max(4 * self._weight, self._least))
 
-    def add(self, instants: Sequence[Instant]) -> None:
+    def add(self, instants: Sequence[BodyInstant]) -> None:
         curve = self._curve
         for now in instants:
-            self.stances.add(now)
+            (leg,) = now.legs
+            self.stances.add(leg)
             if not curve or interval_of(curve[-1][0]) != interval_of(now.time):
-                curve.append((now.time, now.grf))
-            elif now.grf > curve[-1][1]:
-                curve[-1] = now.time, now.grf
+                curve.append((now.time, leg.grf))
+            elif leg.grf > curve[-1][1]:
+                curve[-1] = now.time, leg.grf
         self.full_scale = max(self.full_scale, nice(max(self.stances.highest, self._least)))
         while curve[0][0] < instants[-1].time - SECONDS:
             curve.popleft()
 
-    def draw(self, canvas: Any, now: Instant) -> None:
+    def draw(self, canvas: Any, now: BodyInstant) -> None:
+        (leg,) = now.legs
         canvas.blit(self._card(self.full_scale), self._box, special_flags=pygame.BLEND_PREMULTIPLIED)
         stances = self.stances
-        values = now.time, now.vx, now.grf, stances.running_peak, stances.highest
+        values = now.time, now.vx, leg.grf, stances.running_peak, stances.highest
         for k, (value, (_, own, colour)) in enumerate(zip(values, NUMBERS, strict=True)):
             shown, digits = (value, 2) if own else (value / self._force.newtons, self._force.digits)
             text = f"{round(shown, digits) + 0.0:.{digits}f}"  # + 0.0 takes the sign off a zero
             self._brush.write(canvas, text, self._line(k, 210), 24, colour, "midright")
-        self._draw_gait(canvas, now)
+        self._draw_gait(canvas, leg)
         self._draw_curve(canvas, now.time)
 
     def _line(self, k: float, x: float) -> tuple[float, float]:

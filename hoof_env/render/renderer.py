@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 import os
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -16,12 +16,8 @@ from gymnasium import logger
 from gymnasium.error import DependencyNotInstalled, ResetNeeded
 from numpy.typing import NDArray
 
-from hoof_env.dynamics.parts import ONE_LEG, TRUNKS
 from hoof_env.errors import HoofEnvError, ParameterError, check_choice, check_number, count
-from hoof_env.gait import limits_of
-from hoof_env.ground.terrain import Terrain
-from hoof_env.leg.geometry import Geometry
-from hoof_env.render.instant import HorseInstant, Instant, Surroundings
+from hoof_env.render.instant import BodyInstant, Surroundings
 
 if TYPE_CHECKING:
     from hoof_env.render.panel import Stances
@@ -33,18 +29,17 @@ LARGEST_SIDE = 8192  # largest width and height [pixels]; a canvas of both takes
 
 
 class Renderer:
-    """Draws the leg, the ground, the forces on the hoof and a panel with numbers, gait and force curve.
+    """Draws a body, the ground, the forces on hooves and a panel with numbers and curves.
 
     Args:
-        geometry: the leg.
+        here: surroundings; their picture makes scene and panel. A suspended trunk is drawn on a spring, one
+            on a rail with wheels, a fixed one bolted.
         mode: one of `MODES`.
         fps: frames per second that a window is held to [Hz].
         size: width and height of the picture [pixels].
-        trunk: its kind: "suspended" is drawn on a spring, "rail" with wheels under a rail, "fixed" bolted.
-        weight_n: weight of trunk and leg [N], a line next to the force if the trunk is suspended; or None.
-        lift_off_n: normal force that tells stance from swing [N].
-        terrain: what it stands on; level if None.
-        hips: of a horse, see `instant.Surroundings`; its instants are `HorseInstant`s.
+
+    Attributes:
+        here: surroundings.
 
     Raises:
         ParameterError: an unknown mode, or a value out of range.
@@ -53,30 +48,23 @@ class Renderer:
 
     def __init__(
         self,
-        geometry: Geometry,
-        mode: str,
-        fps: float,
+        here: Surroundings,
+        mode: str = "rgb_array",
+        fps: float = 50.0,
         size: tuple[int, int] = USUAL_SIZE,
-        trunk: str = "suspended",
-        weight_n: float | None = None,
-        lift_off_n: float = 0.0,
-        terrain: Terrain | None = None,
-        hips: Mapping[str, tuple[float, float]] | None = None,
     ) -> None:
+        self.here = here
         self.mode = check_choice("render_mode", mode, MODES)
         self.fps = check_number("fps", fps, low=0, exclusive_low=True)
         self.size = _check_size(size)
-        check_choice("trunk", trunk, TRUNKS if hips else ONE_LEG)
-        if weight_n is not None:
-            check_number("weight_n", weight_n, low=0)
+        check_choice("trunk", here.trunk, here.picture.trunks)
+        check_number("weight_n", here.weight_n, low=0)
         try:
             import pygame
         except ImportError:
             hint = 'pygame is not installed, run `pip install "hoof-env[render]"`'
             raise DependencyNotInstalled(hint) from None
         from hoof_env.render.brush import Brush
-        from hoof_env.render.panel import Panel, unit_of
-        from hoof_env.render.scene import Scene
 
         self._pygame = pygame
         self._canvas = pygame.Surface(self.size, 0, 32)
@@ -85,20 +73,9 @@ class Renderer:
         self.brush = brush = Brush(self.size)
         edge = round(16 * brush.unit)
         column = round(304 * brush.unit)
-        ground = Terrain.flat() if terrain is None else terrain
         box = (self.size[0] - edge - column, edge, column, round(508 * brush.unit))
-        if hips:
-            from hoof_env.render.horse_panel import HorsePanel
-            from hoof_env.render.horse_scene import HorseScene
-
-            self._scene: Any = HorseScene(brush, geometry, ground, self.size, column + 2 * edge)
-            self._panel: Any = HorsePanel(brush, box, tuple(hips), weight_n or 0.0, lift_off_n)
-        else:
-            self._scene = Scene(
-                brush, geometry, ground, self.size, column + 2 * edge, trunk, unit_of(lift_off_n)
-            )
-            line = weight_n if trunk == "suspended" else None
-            self._panel = Panel(brush, box, line, lift_off_n, limits_of(geometry))
+        self._scene: Any = here.picture.scene(brush, here, self.size, column + 2 * edge)
+        self._panel: Any = here.picture.panel(brush, box, here)
         self._window_open = False
         self._clock = pygame.time.Clock()
         self._closed = False
@@ -127,7 +104,7 @@ class Renderer:
         self._scene.reset()
         self._panel.reset()
 
-    def add(self, news: Sequence[Instant] | Sequence[HorseInstant]) -> None:
+    def add(self, news: Sequence[BodyInstant]) -> None:
         """Take what happened since the last call, in the order of time; what is not finite is left out."""
         seen = [now for now in news if _is_finite(now)]
         if seen:
@@ -205,18 +182,10 @@ def open_window(size: tuple[int, int], title: str) -> Any:
     return window
 
 
-def _is_finite(now: Instant | HorseInstant) -> bool:
-    if isinstance(now, HorseInstant):
-        return math.isfinite(sum(now[:6])) and all(map(_is_finite, now.legs))
-    return math.isfinite(sum(now[:9]) + now.force_x + now.force_y)
-
-
-def new_renderer(here: Surroundings, fps: float, size: tuple[int, int] = (960, 540)) -> Renderer:
-    """An off-screen renderer for an environment with this setting; errors are those of `Renderer`."""
-    force = {"weight_n": here.weight_n, "lift_off_n": here.lift_off_n}
-    return Renderer(
-        here.geometry, "rgb_array", fps, size, here.trunk, **force, terrain=here.terrain, hips=here.hips
-    )
+def _is_finite(now: BodyInstant) -> bool:
+    """Return True if all that places the picture is finite."""
+    of_legs = (sum(leg[:9]) + leg.force_x + leg.force_y for leg in now.legs)
+    return math.isfinite(now.x + now.y + now.vx + now.vy + now.pitch + sum(of_legs))
 
 
 def check_side(name: str, pixels: Any) -> int:

@@ -1,4 +1,4 @@
-"""The scene: sky, ground, trunk and leg, the paths of toe and heel, the forces on the hoof.
+"""The scene: sky, ground, trunk and legs, the paths of toe and heel, the forces on the hooves.
 
 The camera follows the crank centre O along x. It keeps its height over the ground around O, and there is room
 for every angle that the leg can reach; only when O leaves its usual heights does the camera follow it up or
@@ -39,7 +39,7 @@ from hoof_env.render.colours import (
     mix,
 )
 from hoof_env.render.ground import GroundPainter
-from hoof_env.render.instant import Instant
+from hoof_env.render.instant import BodyInstant, Instant
 from hoof_env.render.outline import (
     AROUND_M,
     ARROW_M,
@@ -60,7 +60,7 @@ PATH_STEP = 0.01  # time between two places of a path [s]
 
 
 class Scene:
-    """Draws one instant into a picture of `size`, whose `right` pixels the leg leaves free.
+    """Draws one instant into a picture of `size`, whose `right` pixels the `legs` leave free.
 
     Attributes:
         small: size of what is drawn around the leg, at most 1.
@@ -78,6 +78,7 @@ class Scene:
         right: int,
         trunk: str,
         forces: Unit = KILONEWTONS,
+        legs: int = 1,
     ) -> None:
         self._unit, self._newtons, self._digits = forces
         self._brush = brush
@@ -92,7 +93,8 @@ class Scene:
         self._scale = min(size[1] / (soil + sky), self._centre / (out + MARGIN_M * self.small))
         self._level = size[1] - soil * self._scale  # of the ground [pixels] while the camera keeps its height
         self._camera = 0j
-        self._paths: deque[tuple[float, complex, complex]] = deque()  # time [s], heel, toe [m]
+        # Of each leg time [s], heel and toe [m].
+        self._paths: list[deque[tuple[float, complex, complex]]] = [deque() for _ in range(legs)]
         self._ground = GroundPainter(brush, terrain, size, self._scale, 2 * self._centre)
         self._leg = LegOutline(geometry)
         self._girth = self.small
@@ -106,16 +108,18 @@ class Scene:
         return self._scale * self.small
 
     def reset(self) -> None:
-        self._paths.clear()
+        for path in self._paths:
+            path.clear()
 
-    def add(self, instants: Sequence[Instant]) -> None:
-        """Lengthen the paths of toe and heel by instants in the order of time."""
-        paths = self._paths
-        for now in instants:
-            if not paths or now.time >= paths[-1][0] + PATH_STEP * (1 - 1e-6):
-                paths.append((now.time, complex(now.heel_x, now.heel_y), complex(now.toe_x, now.toe_y)))
-        while paths[0][0] < instants[-1].time - PATH_SECONDS:
-            paths.popleft()
+    def add(self, instants: Sequence[BodyInstant]) -> None:
+        """Lengthen the paths of toes and heels by instants in the order of time."""
+        for i, path in enumerate(self._paths):
+            for now in instants:
+                if not path or now.time >= path[-1][0] + PATH_STEP * (1 - 1e-6):
+                    leg = now.legs[i]
+                    path.append((now.time, complex(leg.heel_x, leg.heel_y), complex(leg.toe_x, leg.toe_y)))
+            while path[0][0] < instants[-1].time - PATH_SECONDS:
+                path.popleft()
 
     def _soles(self, legs: Sequence[Instant]) -> Sequence[Instant]:
         """Return legs with the heel in the toe if they have one foot: their engine has the heel at (0, 0)."""
@@ -123,17 +127,20 @@ class Scene:
             return legs
         return [leg._replace(heel_x=leg.toe_x, heel_y=leg.toe_y, heel_depth=leg.toe_depth) for leg in legs]
 
-    def draw(self, canvas: Any, now: Instant, full_scale: float) -> None:
+    def draw(self, canvas: Any, now: BodyInstant, full_scale: float) -> None:
         """Draw an instant; the arrow of a force `full_scale` [N] is `ARROW_M` long."""
-        pixels = self.look_at(now)
+        each = self.look_at(now)
         canvas.blit(self._sky, (0, 0))
-        hip = pixels[self._geometry.mechanism.centre]
+        hip = complex(self._pixels(complex(now.x, now.y)))
         self._trunk.draw_support(canvas, hip)
-        self._ground.draw(canvas, self._soles([now]), self.corner)
+        self._ground.draw(canvas, self._soles(now.legs), self.corner)
         self._trunk.draw(canvas, hip, now.pitch)
-        self._draw_paths(canvas, pixels)
-        self._draw_leg(canvas, pixels)
-        self._draw_forces(canvas, now, full_scale)
+        for path, pixels in zip(self._paths, each, strict=True):
+            self._draw_path(canvas, path, pixels)
+        for pixels in each:
+            self._draw_leg(canvas, pixels)
+        for leg in now.legs:
+            self._draw_forces(canvas, leg, full_scale)
         canvas.blit(self._key(full_scale), (0, 0), special_flags=pygame.BLEND_PREMULTIPLIED)
 
     @property
@@ -141,8 +148,8 @@ class Scene:
         """Place in the world of the picture's upper left corner [m]."""
         return self._camera + complex(-self._centre, self._level) / self._scale
 
-    def look_at(self, now: Instant) -> dict[str, complex]:
-        """Point the camera at an instant; returns where each named point of the leg lies [pixels]."""
+    def look_at(self, now: BodyInstant) -> list[dict[str, complex]]:
+        """Point the camera at an instant; return for each leg where its named points lie [pixels]."""
         usual = self._geometry.hip_height
         hip = complex(now.x, now.y)
         level = float(self._ground.height(hip.real + self.small * AROUND_M).mean())
@@ -150,7 +157,7 @@ class Scene:
         slack = HEIGHT_SLACK_M * self.small
         rise = high - min(max(high, usual - slack), usual + slack)
         self._camera = complex(hip.real, level + rise)
-        return self.points_of(now)
+        return [self.points_of(leg) for leg in now.legs]
 
     def points_of(self, now: Instant) -> dict[str, complex]:
         """Return the place of each named point of a leg [pixels]."""
@@ -214,10 +221,13 @@ class Scene:
             letter = pixels[pivot] + shift * self._metre
             self._brush.write(canvas, pivot, (letter.real, letter.imag), 18, INK, side)
 
-    def _draw_paths(self, canvas: Any, pixels: dict[str, complex]) -> None:
-        if len(self._paths) < 2:
+    def _draw_path(
+        self, canvas: Any, path: Sequence[tuple[float, complex, complex]], pixels: dict[str, complex]
+    ) -> None:
+        """Draw the path of one leg's toe and heel up to where they are."""
+        if len(path) < 2:
             return
-        times, *paths = zip(*self._paths, strict=True)
+        times, *paths = zip(*path, strict=True)
         points_now = [pixels[point] for point in reversed(self._geometry.corners)]
         for colour, places, end in zip((HEEL, TOE), paths, points_now, strict=True):
             if colour == HEEL and self._geometry.heel is None:
@@ -270,15 +280,16 @@ class Scene:
         if self._geometry.heel is None:
             del bars[1]
         words = (f"{force / self._newtons:g} {self._unit} on the hoof", *(text for text, *_ in bars))
-        rows = [20 + (20 + 20 * k) * 1j for k in range(len(words))]
-        places = [row * unit for row in rows] + [row * unit + self._centre for row in rows[: len(kinds)]]
+        left = [(20 + (20 + 20 * k) * 1j) * unit for k in range(len(words))]
+        right = [self._centre + (20 + (20 + 20 * k) * 1j) * unit for k in range(len(kinds))]
+        places = [*left, *right]
         image = pygame.Surface((round(2 * self._centre), round(100 * unit)), pygame.SRCALPHA, 32)
 
         def paint(fine: Any, place: Any) -> None:
-            arrow(fine, FORCE, place(places[0]), place(places[0] + length), 7 * unit * FINE)
-            for at, (_, colour, radius) in zip(places[1 : len(words)], bars, strict=True):
+            arrow(fine, FORCE, place(left[0]), place(left[0] + length), 7 * unit * FINE)
+            for at, (_, colour, radius) in zip(left[1:], bars, strict=True):
                 bar(fine, colour, place(at), place(at + length), radius * unit * FINE, radius * unit * FINE)
-            for at, (_, colour) in zip(places[len(words) :], kinds, strict=True):
+            for at, (_, colour) in zip(right, kinds, strict=True):
                 x, y = place(at - 6j * unit)
                 swatch = pygame.Rect(x, y, length * FINE, 12 * unit * FINE)
                 pygame.draw.rect(fine, SOIL_LINE, swatch)

@@ -17,6 +17,8 @@ from hoof_env.dynamics.parts import Limb, Limits, Trunk
 from hoof_env.gait import FilterSettings
 from hoof_env.ground.contact import Ground
 from hoof_env.leg.geometry import Geometry
+from hoof_env.render.instant import Hips
+from hoof_env.render.picture import Picture
 from hoof_env.tasks.leg_starts import Start
 from hoof_env.tasks.settings import ResolvedSettings, Settings
 
@@ -50,10 +52,11 @@ class Body(Protocol):
 
     Attributes:
         kernels: parts of the kernels of a step, see `BodyKernels`.
-        leg_prefixes: prefix of a quantity's name for each leg, "" for a single leg.
         geometry: geometry of a leg; all legs have the same linkage.
         height: nominal height of the trunk [m].
-        hips: crank centres on the trunk by the names of the legs [m]; empty where O is the trunk's place.
+        hips: crank centre of each leg from the place of the trunk [m], by the prefix of the leg's quantities,
+            which is "" for a single leg.
+        picture: how pictures and pages show the body.
         gaits: gaits by name.
         harmonics, filters, limits, step_error: arguments of the engine.
         command_step: largest change from one commanded speed to the next [m/s].
@@ -65,10 +68,10 @@ class Body(Protocol):
 
     # Fixed when a body is made: settings that change later (`conditions.CHANGEABLE`) do not affect them.
     kernels: BodyKernels
-    leg_prefixes: tuple[str, ...]
     geometry: Geometry
     height: float
-    hips: Mapping[str, tuple[float, float]]
+    hips: Hips
+    picture: Picture
     gaits: Mapping[str, Any]
     harmonics: int
     filters: FilterSettings

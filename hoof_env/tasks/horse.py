@@ -32,6 +32,8 @@ from hoof_env.ground.contact import Ground
 from hoof_env.ground.terrain import Terrain
 from hoof_env.leg.geometry import Geometry, load_geometry
 from hoof_env.leg.limb_masses import with_limb_masses
+from hoof_env.render.instant import Hips
+from hoof_env.render.picture import HorsePicture, Picture
 from hoof_env.simd.layout import Block
 from hoof_env.tasks.body import BodyKernels
 from hoof_env.tasks.disturbances import MOST_STRENGTH
@@ -157,7 +159,7 @@ class Horse:
     """
 
     kernels = HORSE_KERNELS
-    leg_prefixes: tuple[str, ...] = tuple(f"{leg}_" for leg in LEGS)
+    picture: Picture = HorsePicture()
     finite_fields: tuple[str, ...] = ("gait",)
     action_names: tuple[str, ...] = tuple(f"{leg}_{name}" for leg, name in product(LEGS, PARAMETERS))
     action_form = "offsets"
@@ -174,9 +176,7 @@ class Horse:
         self.geometry = load_geometry(s.preset)
         self.geometry = self.geometry.scaled(HIP_HEIGHT * self.size / self.geometry.hip_height)
         self.height = HIP_HEIGHT * self.size
-        self.hips: Mapping[str, tuple[float, float]] = {
-            leg: (HIPS[leg.partition("_")[2]] * self.size, 0.0) for leg in LEGS
-        }
+        self.hips: Hips = {f"{leg}_": (HIPS[leg.partition("_")[2]] * self.size, 0.0) for leg in LEGS}
         self.gaits: Mapping[str, Any] = {
             name: gait.of_size(self.size) for name, gait in horse_gaits().items()
         }
@@ -207,7 +207,7 @@ class Horse:
         drive = self._drive(s)
         spring = self._spring(s)
         fore, hind = (
-            Limb(_limb(self.geometry, pair, MASS * size**3), self.hips[f"left_{pair}"], drive, spring)
+            Limb(_limb(self.geometry, pair, MASS * size**3), self.hips[f"left_{pair}_"], drive, spring)
             for pair in HIPS
         )
         return trunk, self._ground(s, mass), (fore, fore, hind, hind)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from types import MappingProxyType
 from typing import Any
 
 import numpy as np
@@ -26,6 +25,8 @@ from hoof_env.gait import (
 )
 from hoof_env.ground.contact import Ground, load_ground
 from hoof_env.leg.geometry import load_geometry, preset_error_type, preset_label
+from hoof_env.render.instant import ONE_HIP, Hips
+from hoof_env.render.picture import LegPicture, Picture
 from hoof_env.simd import maximum, minimum, read
 from hoof_env.simd.compile import inline_llvm
 from hoof_env.simd.math import clip
@@ -184,13 +185,13 @@ class OneLeg:
     """
 
     kernels = LEG_KERNELS
-    leg_prefixes: tuple[str, ...] = ("",)
     finite_fields: tuple[str, ...] = ()
     harmonics = 1
     limits: Limits | None = None
     action_names: tuple[str, ...] = tuple(f"rate_of_{name}" for name in PARAMETERS)
     action_form = "rates"
-    hips: Mapping[str, tuple[float, float]] = MappingProxyType({})
+    hips: Hips = ONE_HIP
+    picture: Picture = LegPicture()
     step_error = 0.01
     command_step = math.inf
     start_names: tuple[str, ...] = ("crank_angle", "speed", "height", "x")

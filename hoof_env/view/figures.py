@@ -13,7 +13,7 @@ from bokeh.plotting import figure
 from hoof_env.ground.terrain import Terrain
 from hoof_env.render import colours, kinds
 from hoof_env.render.colours import Colour
-from hoof_env.view.drawing import Drawing
+from hoof_env.render.drawing import Drawing
 from hoof_env.view.history import path_columns, paths_of
 
 SECONDS = 3.0  # time that curves show [s]

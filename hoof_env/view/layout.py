@@ -14,10 +14,10 @@ from numpy.typing import NDArray
 
 from hoof_env.leg.geometry import preset_names
 from hoof_env.records import default_policy
+from hoof_env.render.drawing import HEAD
 from hoof_env.render.instant import Columns
 from hoof_env.render.outline import ARROW_M
 from hoof_env.view import controls, figures
-from hoof_env.view.drawing import HEAD
 from hoof_env.view.history import RESOLUTION, STANCE
 from hoof_env.view.player import Player
 from hoof_env.view.recording import FORMATS

@@ -8,9 +8,7 @@ import time
 import numpy as np
 from numpy.typing import NDArray
 
-from hoof_env import records
-from hoof_env.render.instant import Columns
-from hoof_env.view.drawing import drawing_of, legs_of
+from hoof_env.render.instant import Columns, instants
 from hoof_env.view.history import STANCE, History, StanceNumbers, curves_of, path_columns, thinned
 from hoof_env.view.recording import Recording
 from hoof_env.view.simulation import Chunk, Simulation
@@ -50,7 +48,7 @@ class Player:
         of_legs = [(f"{name} {k}", n) for k in range(len(self.legs)) for name, n in LEG_NUMBERS.items()]
         terms = [(name, TERM_DIGITS) for name in simulation.terms]
         self.numbers = [*FIRST_NUMBERS.items(), *of_legs, *terms]
-        self.drawing = drawing_of(simulation.setting, len(self.numbers))
+        self.drawing = simulation.setting.picture.drawing(simulation.setting, len(self.numbers))
         self.recording: Recording | None = None
         self.clock = 0.0
         self.shown = 0.0
@@ -116,7 +114,7 @@ class Player:
     def step(self) -> str:
         """Go on by one control step; see `go`."""
         self.clock = self.shown
-        return self.go(self.simulation.setting.dt)
+        return self.go(self.simulation.dt)
 
     @property
     def _simulated(self) -> float:
@@ -186,10 +184,10 @@ class Player:
     def row(self) -> NDArray[np.float64]:
         """Return the row of the present instant, and keep it."""
         simulation = self.simulation
-        (now,) = records.instants_of(simulation.env, self._now)
+        (now,) = instants(self._now, self.legs)
         target = simulation.commanded_speed
         numbers = [now.time, now.vx, np.nan if target is None else target, sum(self._totals.values())]
-        for leg, stance in zip(legs_of(now), self._stances, strict=True):
+        for leg, stance in zip(now.legs, self._stances, strict=True):
             numbers += [leg.grf, *stance.numbers.values()]
         numbers += self._totals.values()
         row = self.drawing.row(now, numbers)

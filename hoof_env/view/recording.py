@@ -6,7 +6,6 @@ from __future__ import annotations
 import threading
 from collections.abc import Callable
 from datetime import datetime
-from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -74,7 +73,7 @@ class Recording:
         if not self.is_over and not self.is_full:
             self._chunks.append(chunk)
             self._parameters = self._simulation.parameters
-            self._seconds += self._simulation.setting.dt
+            self._seconds += self._simulation.dt
 
     @property
     def is_full(self) -> bool:
@@ -108,12 +107,11 @@ class Recording:
 
             Playback.of_chunks(simulation, self._chunks).write(self.path)
         elif suffix in film.FFMPEG:
-            from hoof_env.render.renderer import new_renderer
+            from hoof_env.render.renderer import Renderer
 
-            renderer = new_renderer(simulation.setting, FPS)
-            read = partial(records.instants_of, simulation.env)
+            renderer = Renderer(simulation.setting)
             moved = [_from_zero(chunk.columns, self._chunks[0].columns["time"][0]) for chunk in self._chunks]
-            film.write_film(film.frames(renderer, moved, FPS, 1.0, read), self.path, FPS)
+            film.write_film(film.frames(renderer, moved, FPS), self.path, FPS)
         else:
             about = records.describe(
                 simulation.env,

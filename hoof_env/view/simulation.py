@@ -55,6 +55,8 @@ class Simulation:
         env_id, arguments, policy, seed: arguments; they change with the calls below.
         env: environment.
         setting: its surroundings, see `instant.Surroundings`.
+        legs: prefixes of the columns of each leg, ("",) of a single one.
+        dt: control step [s].
         parameters: physical parameters that were touched, by name.
         hand: gait that drives the leg instead of the policy, None for the policy.
         same_motion: forces that other ground would give.
@@ -79,6 +81,8 @@ class Simulation:
         self.env = records.make_env(env_id, self.arguments)
         self._leg: Any = self.env.unwrapped
         self.setting = records.surroundings(self.env)
+        self.legs = tuple(self.setting.hips)
+        self.dt: float = self.env.get_wrapper_attr("dt")
         self._player = self._find(policy, self.seed)
         self.parameters: dict[str, float] = {}
         self.hand: dict[str, float] | None = None
@@ -87,11 +91,6 @@ class Simulation:
         self.is_asking = False
         self._observation: Any = None
         self._starts = True
-
-    @property
-    def legs(self) -> tuple[str, ...]:
-        """Prefixes of the columns of each leg, ("",) of a single one."""
-        return tuple(f"{name}_" for name in self.setting.hips) or ("",)
 
     @property
     def terms(self) -> tuple[str, ...]:

@@ -3,10 +3,16 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import ClassVar
 
 import gymnasium as gym
 import numpy as np
+import pytest
 
+from hoof_env import records
+from hoof_env.render.instant import instants
+from hoof_env.render.picture import LegsPicture
+from hoof_env.render.renderer import Renderer
 from hoof_env.simd import block_at, maximum, minimum, read
 from hoof_env.simd.compile import inline_llvm
 from hoof_env.simd.math import clip
@@ -32,8 +38,9 @@ class TwoLegs(OneLeg):
     """Two legs at the same place, half a turn of their cranks apart."""
 
     kernels = BodyKernels(2, Episode, (), 1, command_both, keep_gait)
-    leg_prefixes = ("near_", "off_")
-    action_names = tuple(f"{leg}{name}" for leg in leg_prefixes for name in OneLeg.action_names)
+    hips: ClassVar = {"near_": (0.0, 0.0), "off_": (0.0, 0.0)}
+    picture = LegsPicture()
+    action_names = tuple(f"{leg}{name}" for leg in ("near_", "off_") for name in OneLeg.action_names)
 
     def parts(self, s):
         trunk, ground, (limb,) = super().parts(s)
@@ -46,10 +53,23 @@ class TwoLegs(OneLeg):
         return start
 
 
-def test_two_legs_have_the_same_bits_alone_and_in_rows(monkeypatch):
+class Still:
+    """Policy that keeps the gait of both legs."""
+
+    def predict(self, observation, **_):
+        return np.zeros(8, np.float32), None
+
+
+@pytest.fixture(autouse=True)
+def registered(monkeypatch):
+    """Register the body of two legs."""
+    monkeypatch.delitem(gym.registry, ID, raising=False)
     task = replace(registry.TASKS["leg"], name=ID, body=TwoLegs)
     monkeypatch.setitem(registry._OWN, ID, task)
     registry._add_to_gymnasium(task)
+
+
+def test_two_legs_have_the_same_bits_alone_and_in_rows():
     env, envs = gym.make(ID).unwrapped, gym.make_vec(ID, num_envs=3).unwrapped
     assert env.action_space.shape == (8,)
     first, _ = env.reset(seed=1)
@@ -62,6 +82,31 @@ def test_two_legs_have_the_same_bits_alone_and_in_rows(monkeypatch):
         np.testing.assert_array_equal(observations[1], observation)
         assert rewards[1] == reward
         np.testing.assert_array_equal(infos["measured"][1], info["measured"])
-    near, off = (info["measured"][f"{leg}crank_angle"] for leg in TwoLegs.leg_prefixes)
+    near, off = (info["measured"][f"{leg}crank_angle"] for leg in TwoLegs.hips)
     assert abs(off - near - np.pi) < 2.0
     assert near != off - np.pi  # each has actions of its own
+
+
+def test_pictures_and_records_have_both_legs():
+    """They take legs and panel from the body, whatever it is."""
+    pytest.importorskip("pygame")
+    env = gym.make(ID, render_mode="rgb_array")
+    env.reset(seed=2)
+    record = records.record_episode(env, Still(), 2, 0.4)
+    assert abs(record["off_crank_angle"][0] - record["near_crank_angle"][0]) == pytest.approx(np.pi)
+    assert {"time", "x", "near_toe_normal", "off_toe_normal"} < set(record)
+    here = records.surroundings(env)
+    renderer = Renderer(here)
+    seen = instants(records.substeps(env), here.hips)[-1:]
+    renderer.add(seen)
+    dark = renderer.frame().max(axis=-1) < 100  # the rings of joints, and links
+    near, off = renderer._scene.look_at(seen[0])
+    assert abs(near["J"] - off["J"]) > 10  # pixels
+    for pixels in (near, off):
+        x, y = round(pixels["J"].real), round(pixels["J"].imag)
+        assert dark[y - 4 : y + 5, x - 4 : x + 5].any()
+    assert [one.highest for one in renderer._panel.each] == [leg.grf for leg in seen[0].legs]
+    drawing = here.picture.drawing(here, 0)
+    (arrows,) = (place for place in drawing.places if (place.source, place.column) == ("arrows", "xs"))
+    assert arrows.pieces == 3 * 2
+    assert len(drawing.row(seen[0], [])) == drawing.length

@@ -9,7 +9,7 @@ from hoof_env.dynamics.parts import Limb, Trunk
 from hoof_env.gait import load_gait
 from hoof_env.ground.contact import Ground
 from hoof_env.leg.geometry import load_geometry
-from hoof_env.render.instant import Instant, columns_of_engine, instants
+from hoof_env.render.instant import BodyInstant, Instant, Surroundings, columns_of_engine, leg_instants
 from hoof_env.render.renderer import Renderer
 from tests.legs import FIRST_FIT
 
@@ -24,19 +24,36 @@ def simulate(seconds: float) -> list[list[Instant]]:
     engine = TrunkEngine(Limb(GEOMETRY), Trunk(height=GEOMETRY.hip_height), Ground())
     gait = load_gait("run")
     engine.reset(gait)
-    rows = instants(columns_of_engine(engine.run(gait.to_array(), round(seconds * 1000))))
+    rows = leg_instants(columns_of_engine(engine.run(gait.to_array(), round(seconds * 1000))))
     return [rows[:1], *(rows[k : k + 20] for k in range(1, len(rows), 20))]
 
 
 def renderer(mode: str = "rgb_array", trunk: str = "rail", **options) -> Renderer:
-    return Renderer(GEOMETRY, mode, 50, trunk="suspended" if "weight_n" in options else trunk, **options)
+    kept = {name: options.pop(name) for name in ("fps", "size") if name in options}
+    held = "suspended" if "weight_n" in options else trunk
+    return Renderer(Surroundings(GEOMETRY, trunk=held, **options), mode, **kept)
+
+
+def body(leg: Instant) -> BodyInstant:
+    """The instant of a trunk on one leg."""
+    return BodyInstant(*leg[:6], legs=(leg,))
+
+
+def add(picture: Renderer, step: list[Instant]) -> None:
+    """Show a renderer what happened to one leg."""
+    picture.add([body(leg) for leg in step])
+
+
+def points(picture: Renderer, leg: Instant) -> dict[str, complex]:
+    """Where a renderer draws the named points of a leg."""
+    return picture._scene.look_at(body(leg))[0]
 
 
 def draw(*steps: list[Instant], **options) -> np.ndarray:
     """A frame of a fresh renderer that has seen `steps`."""
     picture = renderer(**options)
     for step in steps:
-        picture.add(step)
+        add(picture, step)
     return picture.frame()
 
 

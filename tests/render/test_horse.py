@@ -13,8 +13,8 @@ from hoof_env import records
 from hoof_env.constants import GRAVITY
 from hoof_env.envs.policies import make_policy
 from hoof_env.film import frames
-from hoof_env.render.instant import HorseInstant
-from hoof_env.render.renderer import new_renderer
+from hoof_env.render.instant import instants
+from hoof_env.render.renderer import Renderer
 from hoof_env.tasks.horse_gaits import LEGS
 
 HORSE = "hoof_env/Horse-v0"
@@ -46,17 +46,17 @@ def test_the_forces_of_the_record_bear_the_animal(played):
 def test_hips_stand_where_they_are_on_the_trunk(played):
     env, parts = played
     record = whole(parts)
-    for leg, (x, _) in env.unwrapped.batch.body.hips.items():
-        arm = (record[f"{leg}_x"] - record["x"]) + 1j * (record[f"{leg}_y"] - record["y"])
+    for prefix, (x, _) in env.unwrapped.batch.body.hips.items():
+        arm = (record[f"{prefix}x"] - record["x"]) + 1j * (record[f"{prefix}y"] - record["y"])
         np.testing.assert_allclose(arm, x * np.exp(1j * record["pitch"]), atol=1e-12)
 
 
 def test_the_panel_counts_the_stances_that_the_forces_show(played):
     env, parts = played
     here = records.surroundings(env)
-    renderer = new_renderer(here, 50.0)
+    renderer = Renderer(here)
     for part in parts:
-        renderer.add(records.instants_of(env, part))
+        renderer.add(instants(part, here.hips))
     record = whole(parts)
     for k, leg in enumerate(LEGS):
         normal = record[f"{leg}_toe_normal"] + record[f"{leg}_heel_normal"]
@@ -71,14 +71,7 @@ def test_the_panel_counts_the_stances_that_the_forces_show(played):
 
 def test_films_show_a_horse_that_goes(played):
     env, parts = played
-    pictures = list(
-        frames(
-            new_renderer(records.surroundings(env), 25.0),
-            parts,
-            25.0,
-            read=lambda c: records.instants_of(env, c),
-        )
-    )
+    pictures = list(frames(Renderer(records.surroundings(env)), parts, 25.0))
     assert len(pictures) == 51
     assert all(picture.shape == (540, 960, 3) and picture.dtype == np.uint8 for picture in pictures)
     assert all((one != other).any() for one, other in itertools.pairwise(pictures))
@@ -87,9 +80,7 @@ def test_films_show_a_horse_that_goes(played):
 @pytest.mark.parametrize("size", [0.5, 2.0])
 def test_arrows_are_as_long_for_animals_of_all_sizes(size):
     """In the key, and of a force on a hoof that is the same part of the full scale."""
-    scenes = [
-        new_renderer(records.surroundings(gym.make(HORSE, size=each)), 25.0)._scene for each in (1.0, size)
-    ]
+    scenes = [Renderer(records.surroundings(gym.make(HORSE, size=each)))._scene for each in (1.0, size)]
     keys = [pygame.surfarray.array_alpha(scene._key(1000.0)) for scene in scenes]
     np.testing.assert_array_equal(*keys)
     assert scenes[1]._share * scenes[1]._scale == pytest.approx(scenes[0]._share * scenes[0]._scale)
@@ -98,22 +89,22 @@ def test_arrows_are_as_long_for_animals_of_all_sizes(size):
 def test_curves_leave_the_names_of_the_legs_alone(played):
     """Also those of hoofs that bear the full scale from the first instant to the last."""
     env, parts = played
-    renderer = new_renderer(records.surroundings(env), 25.0)
-    panel, instants = renderer._panel, records.instants_of(env, parts[0])
-    panel.add(instants)
+    renderer = Renderer(records.surroundings(env))
+    panel = renderer._panel
+    seen = instants(parts[0], renderer.here.hips)
+    panel.add(seen)
     for curve in panel._curves:
         curve.clear(), curve.extend((t, panel.full_scale) for t in np.linspace(-3.0, 0.0, 50))
     bare, drawn = (pygame.Surface(renderer.size, 0, 32) for _ in range(2))
     bare.blit(panel._card(panel.full_scale), panel._box)
-    now: HorseInstant = instants[-1]
-    panel.draw(drawn, now)
-    seen, expected = (pygame.surfarray.array3d(image).astype(int) for image in (drawn, bare))
+    panel.draw(drawn, seen[-1])
+    found, expected = (pygame.surfarray.array3d(image).astype(int) for image in (drawn, bare))
     for plot in panel._plots:
         name = slice(plot.right - 60, plot.right + 1), slice(plot.top - 15, plot.top - 2)
         assert expected[name].min() < 200
-        assert (seen[name] == expected[name]).all()
+        assert (found[name] == expected[name]).all()
         inside = slice(plot.left, plot.right - 1), slice(plot.top - 1, plot.top + 2)
-        assert (seen[inside] != expected[inside]).any()
+        assert (found[inside] != expected[inside]).any()
 
 
 @pytest.mark.parametrize("n", [0, 3])

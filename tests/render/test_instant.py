@@ -10,7 +10,7 @@ from hoof_env.ground.contact import Ground
 from hoof_env.ground.terrain import Terrain
 from hoof_env.leg.geometry import load_geometry
 from hoof_env.leg.kinematics import FrameMotion, pose
-from hoof_env.render.instant import POINTS, UNITS, Instant, columns_of_engine, ground_at, instants
+from hoof_env.render.instant import POINTS, UNITS, Instant, columns_of_engine, ground_at, leg_instants
 from tests.legs import FIRST_FIT
 
 LEG, RUN = load_geometry(FIRST_FIT), load_gait("run", FIRST_FIT)
@@ -31,7 +31,7 @@ def test_every_field_has_a_unit_and_every_column_is_a_field():
 
 def test_a_record_becomes_instants():
     _, record = roll(Terrain.flat())
-    rows = instants(columns_of_engine(record, command=np.arange(4.0)))
+    rows = leg_instants(columns_of_engine(record, command=np.arange(4.0)))
     assert len(rows) == len(record["time"])
     for k, now in list(enumerate(rows))[::100]:
         names = ("crank_angle", "crank_angle_rate", "swing_angle", "swing_offset", "swing_cos")
@@ -41,7 +41,7 @@ def test_a_record_becomes_instants():
         assert (now.command_crank_speed, now.command_swing_cos) == (0.0, 3.0)
         assert now.normal == record["toe_normal"][k, 0, 0] + record["heel_normal"][k, 0, 0]
         assert now.toe_depth == pytest.approx(-now.toe_y)
-    assert np.isnan(instants(columns_of_engine(record))[0].command_swing_sin)
+    assert np.isnan(leg_instants(columns_of_engine(record))[0].command_swing_sin)
 
 
 def test_the_hoof_has_no_moment_about_its_centre_of_pressure():
@@ -76,7 +76,7 @@ def test_with_equal_friction_the_centre_is_the_mean_weighted_by_load():
 def test_a_pitching_trunk_carries_its_leg_where_the_engine_has_it():
     _, record = roll(HILLS, "free", 0.2, pitch=0.2, pitch_rate=-0.5, y=LEG.hip_height + 0.15, vx=1.0)
     found = columns_of_engine(record, HILLS)
-    for now in instants(found)[::20]:
+    for now in leg_instants(found)[::20]:
         points = pose(LEG, now.crank_angle, frame=FrameMotion(phi=now.swing_angle))
         for point, corner in (("toe", LEG.toe), ("heel", LEG.heel)):
             z = complex(*points.point(corner)) * np.exp(1j * now.pitch) + complex(now.x, now.y)
@@ -102,8 +102,8 @@ def test_forces_in_the_world_add_up_to_the_engine_s_impulse_on_hills():
 
 def test_one_instant_and_a_run_are_read_alike():
     engine, record = roll(HILLS, seconds=0.05)
-    last = instants(columns_of_engine(record, HILLS))[-1]
-    (now,) = instants(columns_of_engine(engine.state | engine.report, HILLS))
+    last = leg_instants(columns_of_engine(record, HILLS))[-1]
+    (now,) = leg_instants(columns_of_engine(engine.state | engine.report, HILLS))
     np.testing.assert_array_equal(last, now)
 
 

@@ -21,8 +21,8 @@ from hoof_env.leg.geometry import load_geometry
 from hoof_env.render.brush import Brush
 from hoof_env.render.colours import COAT, HOOF
 from hoof_env.render.ground import footprint
-from hoof_env.render.instant import Instant, columns_of_engine, instants
-from hoof_env.render.kinds import find_patches
+from hoof_env.render.instant import Instant, Surroundings, columns_of_engine, leg_instants
+from hoof_env.render.kinds import find_patches, kinds_of
 from hoof_env.render.outline import TRUNK_M
 from hoof_env.render.panel import Stances
 from hoof_env.render.renderer import Renderer
@@ -33,9 +33,11 @@ from tests.render.drawn import (
     LINE,
     PURPLE,
     VERMILION,
+    add,
     draw,
     loaded,
     pixels,
+    points,
     renderer,
     simulate,
 )
@@ -45,7 +47,7 @@ pygame = pytest.importorskip("pygame")
 
 def test_a_frame_is_a_fresh_array_of_the_asked_size(run):
     picture = renderer(size=(640, 360), weight_n=856.0)
-    picture.add(run[0])
+    add(picture, run[0])
     first = picture.frame()
     assert first.shape == (360, 640, 3)
     assert first.dtype == np.uint8
@@ -60,7 +62,7 @@ def test_the_same_rows_give_the_same_frame_and_reset_forgets(run):
     for steps in (run[:60], run[60:80]):
         again.reset()
         for step in steps:
-            again.add(step)
+            add(again, step)
         again.frame()
     np.testing.assert_array_equal(again.frame(), draw(*run[60:80], weight_n=856.0))
     assert (again.frame() != draw(*run[40:80], weight_n=856.0)).any()
@@ -169,6 +171,18 @@ def test_kinds_of_ground_differ_by_colour_and_are_named_in_the_key(run):
         assert (frame[ground + 4, 80:120] != plain[ground + 4, 80:120]).any(axis=-1).mean() > 0.9
 
 
+@pytest.mark.parametrize("preset", ["identified", "jansen", "klann", "fourbar"])
+def test_the_key_has_every_kind_of_ground_under_every_leg(preset):
+    """A leg of one foot has a shorter key: it left no room for the fourth kind, and its picture failed."""
+    leg = load_geometry(preset)
+    ground = Terrain.patches([(1, 2, 0.2, 1), (2, 3, 5, 1), (3, 4, 1, 0.2), (4, 5, 1, 2)])
+    key = pygame.surfarray.array3d(Renderer(Surroundings(leg, ground))._scene._key(1000.0))
+    kinds = kinds_of(ground)
+    assert len(kinds) == 4
+    for _, colour in kinds:
+        assert (key == colour).all(axis=-1).sum() > 50
+
+
 def test_patches_are_found_where_they_are():
     patches = find_patches(Terrain.patches([(0.5, 1.0, 0.25, 1.0), (1.0, 2.0, 1.0, 3.0)], spacing=0.01))
     assert [patch[2:] for patch in patches] == [(0.25, 1.0), (1.0, 3.0)]
@@ -204,9 +218,9 @@ def test_a_leg_of_one_foot_has_no_heel_in_the_picture():
     for x in (0.0, 50.0):
         engine.reset(GaitParameters(0.0, 0.0, 0.0, 0.0), 1.5, x=x)
         assert engine.report["toe_normal"].item() > 0
-        now = instants(columns_of_engine(engine.state | engine.report))
-        picture = Renderer(leg, "rgb_array", 50, trunk="fixed")
-        picture.add(now)
+        now = leg_instants(columns_of_engine(engine.state | engine.report))
+        picture = Renderer(Surroundings(leg, trunk="fixed"))
+        add(picture, now)
         pictures.append(picture.frame())
         assert now[0].cop_x == pytest.approx(now[0].toe_x)
         assert now[0].cop_y == pytest.approx(now[0].toe_y)
@@ -224,9 +238,7 @@ def test_the_camera_follows_the_trunk_uphill(run):
     """Over ground that rises with the trunk, the leg stays where it is in the picture."""
     picture = renderer(terrain=Terrain.slope(0.2))
     (now,) = run[0]
-    places = [
-        picture._scene.look_at(now._replace(x=x, y=now.y + x * np.tan(0.2)))["O"] for x in (0.0, 3.0, 40.0)
-    ]
+    places = [points(picture, now._replace(x=x, y=now.y + x * np.tan(0.2)))["O"] for x in (0.0, 3.0, 40.0)]
     np.testing.assert_allclose(places, places[0])
 
 
@@ -238,7 +250,7 @@ def test_the_gait_shows_what_is_commanded_and_what_is_made(run):
         """Columns of the commands' marks beside crank speed and swing offset."""
         picture = renderer()
         names = [*(f"command_{name}" for name in PARAMETERS), *PARAMETERS[1:]]
-        picture.add([run[0][0]._replace(**dict(zip(names, np.concatenate(given), strict=True)))])
+        add(picture, [run[0][0]._replace(**dict(zip(names, np.concatenate(given), strict=True)))])
         frame = picture.frame()
         return np.array([np.nonzero((frame[y, 760:880] == dark).all(-1))[0].mean() for y in (184, 208)])
 
@@ -261,7 +273,7 @@ def test_the_leg_is_always_in_the_picture(height):
             phi = offset + a * np.sin(theta) + b * np.cos(theta)
             now = start._replace(crank_angle=theta, swing_angle=phi)
             for picture in PICTURES:
-                z = np.array(list(picture._scene.look_at(now).values()))
+                z = np.array(list(points(picture, now).values()))
                 assert ((z.real > 0) & (z.real < picture._panel._box.left)).all()
                 assert ((z.imag > 0) & (z.imag < picture.size[1])).all()
 
@@ -294,7 +306,7 @@ def test_a_hoof_that_never_lifts_begins_a_stance_every_turn_of_the_crank(run):
 
 def test_a_trunk_that_pitches_turns_its_leg(run):
     (now,) = run[0]
-    places = [renderer()._scene.look_at(now._replace(pitch=pitch)) for pitch in (0.0, 0.3)]
+    places = [points(renderer(), now._replace(pitch=pitch)) for pitch in (0.0, 0.3)]
     arms = [np.array([z[name] - z["O"] for name in ("C", "G", "J")]) for z in places]
     np.testing.assert_allclose(arms[1], arms[0] * np.exp(-0.3j))  # the picture's y points down
     level, pitched = (draw([now._replace(pitch=pitch)]) for pitch in (0.0, 0.3))
@@ -307,8 +319,8 @@ def test_a_trunk_that_pitches_turns_its_leg(run):
 )
 def test_a_trunk_is_drawn_as_it_is_held(run, trunk, held):
     """Above it: a spring in its middle, a rail across the whole picture, a plate as long as the trunk."""
-    scene = renderer()._scene
-    top = round(scene.look_at(run[0][0])["O"].imag - TRUNK_M[1] * scene._scale)
+    picture = renderer()
+    top = round(points(picture, run[0][0])["O"].imag - TRUNK_M[1] * picture._scene._scale)
     rows = slice(top - 46, top)
     above = draw(run[0], trunk=trunk)[rows]
     sky = above[:, 2] if trunk != "rail" else draw(run[0], trunk="fixed")[rows, 2]

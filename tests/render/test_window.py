@@ -13,8 +13,7 @@ from gymnasium.error import DependencyNotInstalled, ResetNeeded
 
 from hoof_env.errors import ParameterError
 from hoof_env.render.brush import Brush
-from hoof_env.render.renderer import Renderer
-from tests.render.drawn import GEOMETRY, VERMILION, draw, renderer
+from tests.render.drawn import VERMILION, add, draw, renderer
 
 pygame = pytest.importorskip("pygame")
 
@@ -25,7 +24,7 @@ def test_a_window_shows_the_frame_at_its_pace_and_closes(run, monkeypatch):
     try:
         started = time.perf_counter()
         for step in run[:6]:
-            window.add(step)
+            add(window, step)
             assert window.frame() is None
         assert time.perf_counter() - started > 5 / 50 * 0.9
         shown = pygame.surfarray.array3d(pygame.display.get_surface()).transpose(1, 0, 2)
@@ -40,11 +39,11 @@ def test_a_window_shows_the_frame_at_its_pace_and_closes(run, monkeypatch):
 def test_a_window_that_somebody_closed_stays_closed(run, monkeypatch):
     monkeypatch.setenv("SDL_VIDEODRIVER", "dummy")
     window = renderer("human")
-    window.add(run[0])
+    add(window, run[0])
     window.frame()
     pygame.event.post(pygame.event.Event(pygame.QUIT))
     for step in run[1:3]:
-        window.add(step)
+        add(window, step)
         assert window.frame() is None
         assert not pygame.display.get_init()
     window.close()
@@ -54,11 +53,11 @@ def test_another_environment_may_quit_pygame(run, monkeypatch):
     monkeypatch.setenv("SDL_VIDEODRIVER", "dummy")
     picture, window = renderer(), renderer("human")
     for one in (picture, window):
-        one.add(run[0])
+        add(one, run[0])
         one.frame()
     pygame.quit()
     for one in (picture, window):
-        one.add(run[1])
+        add(one, run[1])
         one.frame()
     np.testing.assert_array_equal(picture.frame(), draw(*run[:2]))
     window.close()
@@ -70,14 +69,14 @@ def test_a_window_without_a_display_is_told_not_drawn_unseen_in_silence(run, mon
     words = r'a window needs a display.*render_mode="rgb_array".*xvfb-run'
     no_display(monkeypatch)
     window = renderer("human")
-    window.add(run[0])
+    add(window, run[0])
     no_display(monkeypatch)
     with pytest.warns(UserWarning, match=words):
         window.frame()
     window.close()
     monkeypatch.setenv("SDL_VIDEODRIVER", "dummy")
     window = renderer("human")
-    window.add(run[0])
+    add(window, run[0])
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         window.frame()
@@ -140,7 +139,7 @@ def test_bad_input_is_named():
         with pytest.raises(ParameterError, match="size: expected"):
             renderer(size=size)
     with pytest.raises(ParameterError, match="fps"):
-        Renderer(GEOMETRY, "rgb_array", 0)
+        renderer(fps=0)
     with pytest.raises(ParameterError, match="weight_n"):
         renderer(weight_n=-1.0)
     with pytest.raises(ResetNeeded, match="reset"):

@@ -14,9 +14,9 @@ from hoof_env.errors import HoofEnvError, ParameterError
 from hoof_env.gait import PARAMETERS
 from hoof_env.ground.laws import FACTORS
 from hoof_env.lab.forces import THRESHOLD, above_threshold
+from hoof_env.render.instant import instants
 from hoof_env.render.outline import ARROW_M, LEAST_FORCE
 from hoof_env.view import history
-from hoof_env.view.drawing import legs_of
 from hoof_env.view.history import RESOLUTION, thinned
 from hoof_env.view.player import Player
 from hoof_env.view.recording import Recording
@@ -333,7 +333,7 @@ def test_arrows_are_the_forces_at_the_scale_that_the_page_states(env_id):
     for _ in range(60):
         player.go(0.02)
         row = player.row()
-        (now,) = records.instants_of(simulation.env, player._now)
+        (now,) = instants(player._now, simulation.legs)
         x, y = (
             row[place.start :][: place.pieces * place.length].reshape(-1, 3, place.length)
             for place in drawing.places
@@ -342,7 +342,7 @@ def test_arrows_are_the_forces_at_the_scale_that_the_page_states(env_id):
         outlines = x + 1j * y
         tips = outlines[..., 3]
         tails = (outlines[..., 0] + outlines[..., 6]) / 2
-        for k, leg in enumerate(legs_of(now)):
+        for k, leg in enumerate(now.legs):
             if leg.grf < 2 * LEAST_FORCE * drawing.full_scale:
                 continue
             seen += 1

@@ -1,17 +1,18 @@
-"""The panel of a horse: numbers of the instant, the force on each hoof, the footfall of the last seconds."""
+"""The panel of several legs: numbers of the instant, forces on the hooves, footfall of the last seconds."""
 
 from __future__ import annotations
 
 from collections import deque
 from collections.abc import Sequence
 from functools import lru_cache
+from itertools import cycle
 from typing import Any
 
 import pygame
 
 from hoof_env.render.brush import FINE, Brush
 from hoof_env.render.colours import FAINT, FORCE, GREY, INK, OF_LEGS, PAPER, Colour
-from hoof_env.render.instant import HorseInstant
+from hoof_env.render.instant import BodyInstant
 from hoof_env.render.panel import SECONDS, Stances, interval_of, nice
 
 NUMBERS = (
@@ -23,9 +24,10 @@ NUMBERS = (
 ROW = 13  # height of a row of the footfall diagram [pixels of the usual picture]
 
 
-class HorsePanel:
+class LegsPanel:
     """Numbers, a force curve for each leg and the footfall diagram in one box (left, top, width, height) of
-    the picture, with the weight of the animal [N] as a scale and stances from `lift_off_n` [N] on."""
+    the picture, with the weight of the animal [N] as a scale and stances from `lift_off_n` [N] on. `legs` are
+    the prefixes of the legs' names."""
 
     def __init__(
         self,
@@ -38,7 +40,7 @@ class HorsePanel:
         unit = brush.unit
         self._brush = brush
         self._box = pygame.Rect(box)
-        self._legs = tuple(legs)
+        self._legs = tuple(leg.removesuffix("_") for leg in legs)
         self._weight = weight_n
         self._lift_off = lift_off_n
         self._inside = self._box.inflate(-36 * unit, -28 * unit)
@@ -69,7 +71,7 @@ class HorsePanel:
         """Stances of the leg with the highest force of an open stance."""
         return max(self.each, key=lambda one: one.running_peak)
 
-    def add(self, instants: Sequence[HorseInstant]) -> None:
+    def add(self, instants: Sequence[BodyInstant]) -> None:
         for now in instants:
             for k, leg in enumerate(now.legs):
                 stances = self.each[k]
@@ -94,7 +96,7 @@ class HorsePanel:
             self.full_scale, nice(max(self._weight / 4, *(one.highest for one in self.each)))
         )
 
-    def draw(self, canvas: Any, now: HorseInstant) -> None:
+    def draw(self, canvas: Any, now: BodyInstant) -> None:
         canvas.blit(self._card(self.full_scale), self._box, special_flags=pygame.BLEND_PREMULTIPLIED)
         highest = max(one.highest for one in self.each) / 1000
         values = now.time, now.vx, now.pitch * 57.29578, highest
@@ -102,7 +104,7 @@ class HorsePanel:
             self._brush.write(
                 canvas, f"{round(value, 2) + 0.0:.2f}", self._line(k, 210), 24, colour, "midright"
             )
-        for k, colour in enumerate(OF_LEGS[: len(self._legs)]):
+        for k, colour in zip(range(len(self._legs)), cycle(OF_LEGS), strict=False):
             self._draw_curve(canvas, k, now.time, colour)
             row = self._rows[k]
             for start, end in self._stances[k]:
@@ -148,7 +150,7 @@ class HorsePanel:
             write(name, *self._line(k, 0), 20)
             write(unit_name, *self._line(k, 217), 20)
         write("force on each hoof, kN", *self._line(len(NUMBERS) + 0.2, 0), 20)
-        for plot, leg, colour in zip(self._plots, self._legs, OF_LEGS, strict=False):
+        for plot, leg, colour in zip(self._plots, self._legs, cycle(OF_LEGS), strict=False):
             for part in (0.0, 1.0):
                 y = plot.bottom - part * plot.height
                 whole.fill(FAINT, (plot.left, round(y), plot.width, 1))

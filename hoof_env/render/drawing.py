@@ -13,12 +13,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hoof_env.leg.mechanism_list import flesh_of
-from hoof_env.render.instant import HorseInstant, Instant, Surroundings
+from hoof_env.render.instant import BodyInstant, Instant, Surroundings
 from hoof_env.render.outline import (
     AROUND_M,
     ARROW_M,
     BODY,
     EAR,
+    FAR,
     HORN_SHARE,
     HORSE_HIP_M,
     LEAST_FORCE,
@@ -35,7 +36,6 @@ Points = NDArray[np.complex128]
 HEAD = 3
 """Numbers at the front of a row: time [s], x and level of the ground that the camera looks at [m]."""
 
-FAR = (1, 3)  # the right legs of a horse, which are drawn behind its trunk
 ARC = 9  # vertices of the round end of a part
 ARROW_WIDTH_M = 0.035  # of the arrow of a whole hoof [m]; those of toe and heel are half as wide
 COIL = np.linspace(0.0, 1.0, 17)
@@ -86,7 +86,7 @@ def arrows(tails: Points, forces: Points, widths: Floats) -> Points:
 
 
 class Drawing:
-    """Rows of the instants of one leg.
+    """Rows of the instants of legs under the bar of a trunk.
 
     Args:
         setting: surroundings of the environment.
@@ -119,7 +119,7 @@ class Drawing:
         self.full_scale = nice(max(self.weights * setting.weight_n, 10.0))
         self.places: list[Place] = []
         self._used = HEAD + numbers
-        legs = range(len(setting.hips) or 1)
+        legs = range(len(setting.hips))
         self._groups = {
             "far": [i for i in legs if i in self.far],
             "near": [i for i in legs if i not in self.far],
@@ -168,18 +168,17 @@ class Drawing:
         """Length of a row."""
         return self._used
 
-    def row(self, now: Instant | HorseInstant, numbers: Sequence[float]) -> Floats:
+    def row(self, now: BodyInstant, numbers: Sequence[float]) -> Floats:
         """Return the row of an instant, shape (`length`,), with the numbers of the page."""
         terrain = self._setting.terrain
-        legs = legs_of(now)
         level = float(terrain.height_at(now.x + self.size * AROUND_M).mean())
         parts: list[Any] = [(now.time, now.x, level), numbers]
-        points = [self._leg.points(leg) for leg in legs]
+        points = [self._leg.points(leg) for leg in now.legs]
         for group in self._groups.values():
             if group:
                 parts += self._legs([points[i] for i in group])
         trunk, support = self._trunk(now)
-        for outline in (trunk, support, self._arrows(legs)):
+        for outline in (trunk, support, self._arrows(now.legs)):
             parts += [outline.real.ravel(), outline.imag.ravel()]
         return np.concatenate(parts)
 
@@ -208,7 +207,7 @@ class Drawing:
         outlines = (flesh, hooves, links, whole)
         return [part.ravel() for outline in outlines for part in (outline.real, outline.imag)]
 
-    def _trunk(self, now: Any) -> tuple[Points, Points]:
+    def _trunk(self, now: BodyInstant) -> tuple[Points, Points]:
         """Return the outlines of the trunk and of what holds it."""
         hip = complex(now.x, now.y)
         turn = np.exp(1j * now.pitch)
@@ -259,7 +258,7 @@ class HorseDrawing(Drawing):
         self.high = 2.75 * self.size
         self.half_width = 2.05 * self.size
 
-    def _trunk(self, now: Any) -> tuple[Points, Points]:
+    def _trunk(self, now: BodyInstant) -> tuple[Points, Points]:
         """Return the outlines of tail, ear, barrel, neck and head; nothing holds a horse."""
         centre = complex(now.x, now.y)
         turn = np.exp(1j * now.pitch)
@@ -268,16 +267,6 @@ class HorseDrawing(Drawing):
         radii = self.size * np.array([[one, other] for _, _, one, other in parts])
         at = centre + self.size * turn * ends
         return capsules(at[:, 0], at[:, 1], *radii.T), np.full(len(COIL), np.nan + 0j)
-
-
-def drawing_of(setting: Surroundings, numbers: int) -> Drawing:
-    """Return the drawing of a leg, or of a horse, see `Drawing`."""
-    return {True: HorseDrawing, False: Drawing}[bool(setting.hips)](setting, numbers)
-
-
-def legs_of(now: Instant | HorseInstant) -> tuple[Instant, ...]:
-    """Return the instants of all legs, of one leg its own."""
-    return now.legs if isinstance(now, HorseInstant) else (now,)
 
 
 def nice(force: float) -> float:
