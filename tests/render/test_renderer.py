@@ -18,6 +18,7 @@ from hoof_env.gait import LIMITS, PARAMETERS, GaitParameters
 from hoof_env.ground.contact import Ground
 from hoof_env.ground.terrain import Terrain
 from hoof_env.leg.geometry import load_geometry
+from hoof_env.leg.mechanism_list import flesh_of
 from hoof_env.render.brush import Brush
 from hoof_env.render.colours import COAT, HOOF
 from hoof_env.render.ground import footprint
@@ -160,6 +161,33 @@ def test_the_hoof_is_of_horn_and_the_leg_of_flesh(run):
     rows, columns = pixels(frame, COAT)
     below_trunk = rows > surface(frame, 10) - 0.8 * GEOMETRY.hip_height * metre
     assert below_trunk.sum() > 0.02 * metre**2
+
+
+def test_limbs_are_as_thick_as_the_flesh_of_the_leg(run):
+    """Across the middle of each part, on an empty surface; a part that another one covers looks no thinner."""
+    picture = renderer()
+    scene = picture._scene
+    places = points(picture, run[0][0])
+    empty = (255, 0, 255)
+    canvas = pygame.Surface(picture.size, 0, 32)
+    canvas.fill(empty)
+    scene._draw_leg(canvas, places, lettered=False)
+    drawn = (pygame.surfarray.array3d(canvas) != empty).any(axis=-1)
+    flesh = flesh_of(GEOMETRY.mechanism)
+    assert flesh
+    for tail, head, one, other in flesh:
+        middle = (places[tail] + places[head]) / 2
+        across = 1j * (places[head] - places[tail]) / abs(places[head] - places[tail])
+        radius = (one + other) / 2 * scene._girth * scene._scale
+        for side in (-1, 1):
+            z = middle + side * 0.8 * radius * across
+            assert drawn[round(z.real), round(z.imag)]
+    # As much as its parts without overlaps have, at the most, and half of that at the least.
+    parts = [
+        (one + other) * scene._girth * scene._scale * abs(places[head] - places[tail])
+        for tail, head, one, other in flesh
+    ]
+    assert 0.5 * sum(parts) < drawn.sum() < 2.5 * sum(parts)
 
 
 def test_kinds_of_ground_differ_by_colour_and_are_named_in_the_key(run):
