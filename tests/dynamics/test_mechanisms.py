@@ -85,7 +85,7 @@ def test_random_mechanisms_satisfy_eq_2(seed, dyads):
         check_eq_2(leg, 0.0)
 
 
-# Every leg stands on the ground at one of these. Where a foot is about to leave it, at 0.3 in Jansen's leg, its
+# Every leg stands on the ground at one of these. Where a foot is about to leave it, as Jansen's at 0.3, its
 # force is what spring and damper leave of each other, and rounding of the table is not small then.
 @pytest.mark.parametrize("theta", [0.0, 0.35, 2.0, 3.5, 4.7])
 @pytest.mark.parametrize("leg", LEGS.values(), ids=LEGS)

@@ -190,3 +190,23 @@ def test_rates_follow_their_formulas():
     assert rates.friction == pytest.approx(0.8 * 8e4 * depth / 0.01 / 2)
     free = ContactRates(0.0, 0.0, 0.0, 1.5)
     assert set(free.longest_steps("rk4").values()) == {math.inf}
+
+
+@pytest.mark.parametrize("scheme", SCHEME_LIMITS)
+def test_decay_is_followed_to_half_of_where_a_scheme_is_stable(scheme):
+    """The factor by which a step of `h rate` multiplies what decays, by the scheme's own stages."""
+
+    def factor(x):
+        if scheme == "semi_implicit_euler":
+            return 1 - x
+        fractions, weights = STAGES[scheme]
+        slope = -x
+        mean = weights[0] * slope
+        for fraction, weight in zip(fractions[1:], weights[1:], strict=True):
+            slope = -x * (1 + fraction * slope)
+            mean += weight * slope
+        return 1 + mean
+
+    steps = np.linspace(0.01, 4, 400)
+    stable = steps[np.argmax(np.abs([factor(x) for x in steps]) > 1) - 1]
+    assert SCHEME_LIMITS[scheme].decay == pytest.approx(stable / 2, abs=0.01)

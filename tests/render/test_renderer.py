@@ -164,7 +164,7 @@ def test_the_hoof_is_of_horn_and_the_leg_of_flesh(run):
 
 
 def test_limbs_are_as_thick_as_the_flesh_of_the_leg(run):
-    """Across the middle of each part, on an empty surface; a part that another one covers looks no thinner."""
+    """Across the middle of each part; a part that another one covers looks no thinner."""
     picture = renderer()
     scene = picture._scene
     places = points(picture, run[0][0])
