@@ -22,6 +22,7 @@ from numpy.typing import NDArray
 import hoof_env
 from hoof_env._output import check_folder, free_memory, staged
 from hoof_env.envs import made
+from hoof_env.envs.batch import EpisodeBatch
 from hoof_env.envs.policies import start_of
 from hoof_env.envs.recording import surroundings_of
 from hoof_env.errors import (
@@ -54,24 +55,23 @@ COPIES = 3
 
 
 def surroundings(env: Any) -> Surroundings:
-    """Return the setting of an environment of this package, wrapped or not: leg, ground, weight and time
-    steps; raise `ParameterError` for another environment."""
+    """Return the surroundings of a single environment of this package, wrapped or not; raise `ParameterError`
+    for another environment."""
     leg = env.unwrapped
-    try:
-        return surroundings_of(leg.batch)
-    except AttributeError:
+    batch = getattr(leg, "batch", None)
+    if not isinstance(batch, EpisodeBatch) or isinstance(leg, gym.vector.VectorEnv):
         raise ParameterError(
-            f"environment: expected one leg of this package behind it, got {type(leg).__name__}"
-        ) from None
+            f"environment: expected a single one of this package behind it, got {type(leg).__name__}"
+        )
+    return surroundings_of(batch)
 
 
 def substeps(env: Any, record: Columns | None = None) -> Columns:
     """Return the columns of the last control step of an environment of this package, commands included: one
     row for each substep, or one row after a reset. `record` is that of the environment, if it is known."""
     leg = env.unwrapped
-    command = leg.engine.command_in(leg.engine.column(0))
     said = leg.record() if record is None else record
-    return columns_of(said, leg.batch.body.hips, leg.terrain, command=command)
+    return columns_of(said, leg.batch.body.hips, leg.terrain, commands=leg.recording().commands())
 
 
 def make_env(env_id: str, arguments: Mapping[str, Any] | None = None) -> gym.Env[Any, Any]:

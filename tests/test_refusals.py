@@ -37,7 +37,7 @@ REQUESTS = {
             for given in ("HorseLegRail", "horselegrail-v0", "hoof_env/HorseLegRial-v0")
         ),
         ([*CSV, "--id", "nothing/Like-v0"], "with no arguments: expected a registered id (?!.*did you mean)"),
-        ([*CSV, "--id", "CartPole-v1"], "expected one leg of this package .* got CartPole"),
+        ([*CSV, "--id", "CartPole-v1"], "expected a single one of this package .* got CartPole"),
         ([*CSV, "--args", "wings=2"], "unexpected keyword argument 'wings'(?!.*creator)"),
         *(
             ([*CSV, "--args", given], f"{PAIRS} '{given.format()}'")

@@ -227,6 +227,14 @@ class LegBase(LegProperties, SettingsChanges):
         if self._phase == "closed":
             raise ClosedEnvironmentError(f"{call}() was called after close(): make a new one")
 
+    def recording(self, env: int = 0) -> Recording:
+        """Return the recording of an environment, which the first call switches on; raise `ResetNeeded` if
+        there is no episode yet."""
+        self._check_started("record")
+        if env not in self._watched:
+            self._watched[env] = Recording(self.batch, env)
+        return self._watched[env]
+
     def _check_started(self, call: str) -> None:
         """Raise `ResetNeeded` before the first reset, too."""
         self._check_open(call)

@@ -99,10 +99,7 @@ class HorseLegEnv(LegBase, gym.Env[NDArray[np.float32], NDArray[np.float32]]):
         Raises:
             ResetNeeded: there is no episode yet.
         """
-        self._check_started("record")
-        if not self._watched:
-            self._watched[0] = Recording(self.batch)
-        return self._watched[0].last()
+        return self.recording().last()
 
     # Gymnasium
 

@@ -191,8 +191,16 @@ PAGES: Mapping[Any, BodyPage] = MappingProxyType({OneLeg: LegPage(), Horse: Hors
 
 
 def page_of_body(body: Body) -> BodyPage:
-    """Return the parts of a page for a body."""
-    return PAGES[type(body)]
+    """Return the parts of a page for a body: those of its class, or of the class that it inherits.
+
+    Raises:
+        ParameterError: a body of a class of one's own that inherits none of this package.
+    """
+    found = next((PAGES[kind] for kind in type(body).__mro__ if kind in PAGES), None)
+    if found is None:
+        known = " or ".join(kind.__name__ for kind in PAGES)
+        raise ParameterError(f"page: expected a body that inherits {known}, got {type(body).__name__}")
+    return found
 
 
 def _can_be(name: str, settings: Settings) -> bool:

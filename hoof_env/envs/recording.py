@@ -40,6 +40,17 @@ def surroundings_of(batch: EpisodeBatch, env: int = 0) -> Surroundings:
     )
 
 
+def commands_of_step(
+    batch: EpisodeBatch, before: NDArray[np.float64], after: NDArray[np.float64]
+) -> list[tuple[NDArray[np.float64], int]]:
+    """Return the commands of a control step, shape (legs, gait parameters), each with the number of substeps
+    in which it acts, from the memory of the engine before and after the step."""
+    late = batch.action_delay.substeps
+    earlier, own = (batch.engine.command_in(column) for column in (before, after))
+    # Until the step's action acts, the command before it stands.
+    return [(earlier, late), (own, batch.substeps - late)] if late else [(own, batch.substeps)]
+
+
 class Recording:
     """Substeps of one environment of a batch, and pictures of them.
 
@@ -105,20 +116,34 @@ class Recording:
         if self.batch.paper:
             of_solver: Record = end
             return of_solver
-        form = engine_layout(self.batch.engine.features)
-        # The first end has no predecessor, and a failed step did not lead to its end: no substeps.
-        if k == -len(self._ends) or broken(end[form.trunk_memory.rows("result")])[0]:
+        if not self._has_substeps(k):
             return self._run(end, None, 0)
-        commands = [self.batch.engine.command_in(each) for each in (self._ends[k - 1], end)]
-        late = self.batch.action_delay.substeps
-        # Until the step's action acts, the command before it stands.
-        parts = [(commands[0], late), (commands[1], self.batch.substeps - late)] if late else []
-        (command, steps), *rest = parts or [(commands[1], self.batch.substeps)]
+        (command, steps), *rest = commands_of_step(self.batch, self._ends[k - 1], end)
         records = [self._run(self._ends[k - 1], command, steps)]
         records += [self._go_on(*part) for part in rest]
         # Without the first instant, which is the end of the step or the part before.
         joined = {name: np.concatenate([record[name][1:] for record in records]) for name in records[0]}
         return NamedColumns(joined)
+
+    def _has_substeps(self, k: int) -> bool:
+        """Return False for the first end, which has no predecessor, and after a step that failed, which did
+        not lead to its end."""
+        form = engine_layout(self.batch.engine.features)
+        is_first = k == -len(self._ends)
+        return not is_first and not broken(self._ends[k][form.trunk_memory.rows("result")])[0]
+
+    def commands(self, k: int = -1) -> NDArray[np.float64]:
+        """Return the commands at the instants of a record, shape (n, legs, gait parameters) or (1, legs, gait
+        parameters), for the k-th end."""
+        engine = self.batch.engine
+        if not self._ends:
+            self.begin()
+        if self.batch.paper:
+            return engine.command_in(engine.column(self.env))[None]
+        if not self._has_substeps(k):
+            return engine.command_in(self._ends[k])[None]
+        parts = commands_of_step(self.batch, self._ends[k - 1], self._ends[k])
+        return np.concatenate([np.repeat(command[None], steps, axis=0) for command, steps in parts])
 
     def _run(self, column: NDArray[np.float64], command: Any, steps: int) -> Record:
         """Run substeps from a column of the engine's memory, under a command."""
@@ -154,17 +179,10 @@ class Recording:
         if self.renderer.is_empty:
             unseen = max(unseen, 1)
         for k in range(-unseen, 0):
-            record = self._record(k)
-            command = self._commanded(k)
-            columns = columns_of(record, here.hips, here.terrain, command=command)
+            columns = columns_of(self._record(k), here.hips, here.terrain, commands=self.commands(k))
             self.renderer.add(instants(columns, here.hips))
         self._unseen = 0
         return self.renderer.frame()
-
-    def _commanded(self, k: int) -> NDArray[np.float64]:
-        """Return the command of the control step of the k-th end, shape (legs, gait parameters)."""
-        engine = self.batch.engine
-        return engine.command_in(engine.column(self.env) if self.batch.paper else self._ends[k])
 
     def close(self) -> None:
         """Close the window, if any."""

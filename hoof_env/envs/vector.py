@@ -267,11 +267,7 @@ class HorseLegVectorEnv(  # type: ignore[misc]  # generators are of all
             ResetNeeded: an environment has no episode yet.
             ParameterError: there is no such environment.
         """
-        self._check_started("record")
-        count("env", env, low=0, most=self.num_envs - 1)
-        if env not in self._watched:
-            self._watched[env] = Recording(self.batch, env)
-        return self._watched[env].last()
+        return self.recording(count("env", env, low=0, most=self.num_envs - 1)).last()
 
     # Parts of reset and step
 

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hoof_env.dynamics.engine import TrunkEngine
+from hoof_env.envs.recording import commands_of_step
 from hoof_env.errors import ParameterError
 from hoof_env.leg.mechanism import FRAME, Mechanism
 
@@ -84,12 +85,11 @@ class JointReactions:
         """Compute the reactions at the `steps` substeps since `before`, shape (steps, legs, columns), with
         the columns of `reaction_units`."""
         self._engine.set_column(0, before)
-        # The command of these substeps is in the memory after them.
-        command = self._engine.command_in(self.before())
-        rows = []
-        for _ in range(steps):
-            self._engine.advance(command, 1)
-            rows.append(self._row())
+        rows: list[NDArray[np.float64]] = []
+        for command, count in commands_of_step(self._batch, before, self.before()):
+            for _ in range(min(count, steps - len(rows))):
+                self._engine.advance(command, 1)
+                rows.append(self._row())
         return np.array(rows)
 
     def _row(self) -> NDArray[np.float64]:

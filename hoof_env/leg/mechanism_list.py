@@ -344,6 +344,11 @@ def _list(where: str, given: Any) -> Sequence[Any]:
 def _name(where: str, given: Any) -> str:
     if not isinstance(given, str) or not given or given.startswith("-"):
         raise ParameterError(f"{where}: expected a name, got {given!r}")
+    # Names become columns of files, whose headers separate them by these.
+    if not given.isprintable() or any(letter in given for letter in ',;"'):
+        raise ParameterError(
+            f"{where}: expected a name that prints, without comma, semicolon and quotes, got {given!r}"
+        )
     return given
 
 

@@ -28,6 +28,16 @@ RECORD = {
 """Types of the optional entries of run.json that are checked; env_id and algo are required."""
 
 
+MOST_LETTERS = 120
+"""Number of letters of a setting in a warning."""
+
+
+def _short(value: Any) -> str:
+    """Return a setting in a warning: the begin of one that takes many lines, as a leg of one's own does."""
+    text = repr(value)
+    return text if len(text) <= MOST_LETTERS else f"{text[:MOST_LETTERS]}..."
+
+
 def describe_spaces(env: Any) -> dict[str, Any]:
     """Return both spaces of an environment or a model as text, to be saved with a policy and compared."""
     return {"observation_space": str(env.observation_space), "action_space": str(env.action_space)}
@@ -203,7 +213,7 @@ def check_record(path: Path, record: dict[str, Any], env: Any, env_id: str) -> N
     # Environments of other packages have no settings to compare.
     names = sorted({*here, *record.get("settings", {})}) if here else []
     unlike = [
-        f"{key}={there.get(key)!r}, here {here.get(key)!r}"
+        f"{key}={_short(there.get(key))}, here {_short(here.get(key))}"
         for key in names
         if there.get(key) != here.get(key)
     ]

@@ -135,6 +135,7 @@ class Drawing:
         hip = self._geometry.hip_height
         self.size = self.girth = min(1.0, hip / USUAL_HIP_M)
         out, up = reach(self._geometry)
+        out += max(abs(x) for x, _ in self._setting.hips.values())
         self.low = -max(out + 0.3 * self.size - hip, 0.4 * self.size)
         self.high = hip + up + 0.3 * self.size
         self.half_width = out + 0.1 * self.size

@@ -19,7 +19,7 @@ from hoof_env.render.colours import COAT, COAT_EDGE, CRANK, FORCE, GREY, HEEL, T
 from hoof_env.render.ground import GroundPainter
 from hoof_env.render.instant import BodyInstant
 from hoof_env.render.outline import AROUND_M, ARROW_M, BODY, EAR, FAR, HORSE_HIP_M, TAIL, LegOutline
-from hoof_env.render.scene import Scene
+from hoof_env.render.scene import LegScene
 
 FAR_COAT = 0.45  # how far the colour of far legs is from the sky's [-]
 WIDE_M = (1.75, 2.25)
@@ -30,7 +30,7 @@ SOIL_M = 0.45
 ARROW_SHARE = 0.75  # length of a full-scale arrow over that of one leg's scene, at the usual hips [-]
 
 
-class HorseScene(Scene):
+class HorseScene(LegScene):
     """Draws one instant into a picture of `size`, whose `right` pixels the animal leaves free."""
 
     def __init__(
@@ -64,12 +64,13 @@ class HorseScene(Scene):
         self._camera = complex(now.x, level)
         canvas.blit(self._sky, (0, 0))
         self._ground.draw(canvas, self._soles(now.legs), self.corner)
-        for i in FAR:
-            self._draw_far_leg(canvas, self.points_of(now.legs[i]))
+        for i, leg in enumerate(now.legs):
+            if i in FAR:
+                self._draw_far_leg(canvas, self.points_of(leg))
         self._draw_body(canvas, now)
-        for i in range(len(now.legs)):
+        for i, leg in enumerate(now.legs):
             if i not in FAR:
-                self._draw_leg(canvas, self.points_of(now.legs[i]), lettered=False)
+                self._draw_leg(canvas, self.points_of(leg), lettered=False)
         for leg in now.legs:
             self._draw_forces(canvas, leg, full_scale, self._share, is_told=False)
         canvas.blit(self._key(full_scale), (0, 0), special_flags=pygame.BLEND_PREMULTIPLIED)

@@ -153,7 +153,7 @@ def columns_of(
     hips: Hips,
     terrain: Terrain | None = None,
     *,
-    command: NDArray[np.float64] | None = None,
+    commands: NDArray[np.float64] | None = None,
 ) -> Columns:
     """Return the columns of a body from what `TrunkEngine` says of an environment: `OF_TRUNK`, and those of
     each leg with its prefix.
@@ -162,11 +162,12 @@ def columns_of(
         record: `engine.state | engine.report`, for one instant, or what `engine.run` returns.
         hips: crank centres by the prefixes of the legs.
         terrain: what the engine stands on; level if None.
-        command: gait parameters commanded, shape (legs, parameters); None if not known.
+        commands: gait parameters commanded, shape (n, legs, parameters), or (1, legs, parameters) for all
+            instants; None if not known.
     """
     columns: Columns = {name: np.atleast_1d(record[name][..., 0]).astype(float) for name in OF_TRUNK}
     for i, (prefix, hip) in enumerate(hips.items()):
-        wanted = None if command is None else command[i, :4]
+        wanted = None if commands is None else commands[:, i, :4]
         own = columns_of_engine(record, terrain, command=wanted, leg=i, hip=hip)
         columns |= {f"{prefix}{name}": values for name, values in own.items()}
     return NamedColumns(columns)
@@ -193,7 +194,7 @@ def columns_of_engine(
     Args:
         record: `engine.state | engine.report`, for one instant, or what `engine.run` returns.
         terrain: what the engine stands on; level if None.
-        command: gait parameters commanded, shape (4,); None if not known.
+        command: gait parameters commanded, shape (4,) or (n, 4); None if not known.
         leg: which.
         hip: where its O is, from the trunk's own place [m].
     """
@@ -201,19 +202,18 @@ def columns_of_engine(
     of_trunk = {name: np.atleast_1d(record[name][..., 0]).astype(float) for name in OF_TRUNK}
     of_leg = {name: np.atleast_1d(record[name][..., leg, 0]).astype(float) for name in _LEG}
     n = len(of_trunk["time"])
-    wanted = np.full(4, np.nan) if command is None else np.asarray(command, float)
+    wanted = np.broadcast_to(np.nan if command is None else np.asarray(command, float), (n, 4))
     if any(hip):
         arm = complex(*hip) * np.exp(1j * of_trunk["pitch"])
         turning = 1j * arm * np.atleast_1d(record["pitch_rate"][..., 0])
         of_trunk["x"], of_trunk["y"] = of_trunk["x"] + arm.real, of_trunk["y"] + arm.imag
         of_trunk["vx"], of_trunk["vy"] = of_trunk["vx"] + turning.real, of_trunk["vy"] + turning.imag
-    commands = zip(PARAMETERS, wanted.tolist(), strict=True)
     columns = {
         "time": of_trunk["time"],
         **{name: of_trunk[name] for name in ("x", "y", "vx", "vy", "pitch")},
         **{name: of_leg[name] for name in ("crank_angle", "crank_angle_rate", "swing_angle")},
         **{name: of_leg[name] for name in PARAMETERS[1:]},
-        **{f"command_{name}": np.full(n, value) for name, value in commands},
+        **{f"command_{name}": wanted[:, k].copy() for k, name in enumerate(PARAMETERS)},
     }
     for point in POINTS:
         x, y, normal, friction = (of_leg[f"{point}_{name}"] for name in ("x", "y", "normal", "friction"))

@@ -6,6 +6,7 @@ from collections import deque
 from collections.abc import Sequence
 from functools import lru_cache
 from itertools import cycle
+from string import ascii_letters
 from typing import Any
 
 import pygame
@@ -13,7 +14,7 @@ import pygame
 from hoof_env.render.brush import FINE, Brush
 from hoof_env.render.colours import FAINT, FORCE, GREY, INK, OF_LEGS, PAPER, Colour
 from hoof_env.render.instant import BodyInstant
-from hoof_env.render.panel import SECONDS, Stances, interval_of, nice
+from hoof_env.render.panel import SECONDS, SMALLEST_SCALE, Stances, interval_of, nice
 
 NUMBERS = (
     ("time", "s", INK),
@@ -22,6 +23,10 @@ NUMBERS = (
     ("highest force", "kN", FORCE),
 )
 ROW = 13  # height of a row of the footfall diagram [pixels of the usual picture]
+CURVE = 50  # largest height of a leg's curve [same]
+GAP = 17  # between curves, for the name of a leg [same]
+ROOM = 320  # for all curves and rows [same]
+MOST_LEGS = 9  # for which there is room
 
 
 class LegsPanel:
@@ -41,15 +46,15 @@ class LegsPanel:
         self._brush = brush
         self._box = pygame.Rect(box)
         self._legs = tuple(leg.removesuffix("_") for leg in legs)
-        self._weight = weight_n
+        self._weight = weight_n or SMALLEST_SCALE  # 0 is a weight that is not known
         self._lift_off = lift_off_n
         self._inside = self._box.inflate(-36 * unit, -28 * unit)
         left = self._inside.left + round(34 * unit)
         width = self._inside.width - round(40 * unit)
         top = self._inside.top + 126 * unit
-        high = 50 * unit
+        high = min(CURVE, (ROOM - ROW * len(legs)) / len(legs) - GAP) * unit
         self._plots = [
-            pygame.Rect(left, round(top + k * (high + 17 * unit)), width, round(high))
+            pygame.Rect(left, round(top + k * (high + GAP * unit)), width, round(high))
             for k in range(len(legs))
         ]
         first = self._plots[-1].bottom + 34 * unit
@@ -161,7 +166,7 @@ class LegsPanel:
         write("footfall", self._inside.left, first.top - 14 * unit, 20)
         for row, leg in zip(self._rows, self._legs, strict=True):
             whole.fill(FAINT, row)
-            letters = "".join(word[0].upper() for word in leg.split("_"))
+            letters = "".join(word[0].upper() + word.lstrip(ascii_letters) for word in leg.split("_") if word)
             write(letters, row.left - 7 * unit, row.centery, 16, "midright")
         for second in range(SECONDS + 1):
             x = last.right - second / SECONDS * last.width

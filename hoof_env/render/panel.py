@@ -99,7 +99,7 @@ class Stances:
             self.opened = None
 
 
-class Panel:
+class LegPanel:
     """Numbers, gait and force curve in one box (left, top, width, height) of the picture, with the weight of
     trunk and leg [N] as a line, unless it is 0, and stances from `lift_off_n` [N] on. `limits` are those of
     the gait parameters, by name, see `gait.limits_of`.

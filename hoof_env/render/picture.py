@@ -6,16 +6,55 @@ one of these, or brings another.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any, Protocol
 
 from hoof_env.dynamics.parts import ONE_LEG, TRUNKS
+from hoof_env.errors import ParameterError
 
 if TYPE_CHECKING:
     from hoof_env.render.brush import Brush
     from hoof_env.render.drawing import Drawing
-    from hoof_env.render.instant import Surroundings
+    from hoof_env.render.instant import BodyInstant, Surroundings
+    from hoof_env.render.panel import Stances
 
 # Scenes and panels need pygame, which a server or a cluster may lack: they are imported where they are made.
+
+
+class Scene(Protocol):
+    """Interface of scenes: the body on its ground."""
+
+    def reset(self) -> None:
+        """Forget what was shown: an episode begins."""
+
+    def add(self, instants: Sequence[BodyInstant]) -> None:
+        """Take what happened since the last call, in the order of time."""
+
+    def draw(self, canvas: Any, now: BodyInstant, full_scale: float) -> None:
+        """Draw an instant on a surface of pygame; `full_scale` is the force of the longest arrow [N]."""
+
+
+class Panel(Protocol):
+    """Interface of panels: numbers and curves next to the scene.
+
+    Attributes:
+        full_scale: force at the top of the curves [N], which arrows of the scene share.
+    """
+
+    full_scale: float
+
+    @property
+    def stances(self) -> Stances:
+        """Stances of the episode and their peaks; of several legs those of the one that bears most."""
+
+    def reset(self) -> None:
+        """Forget what was shown: an episode begins."""
+
+    def add(self, instants: Sequence[BodyInstant]) -> None:
+        """Take what happened since the last call, in the order of time."""
+
+    def draw(self, canvas: Any, now: BodyInstant) -> None:
+        """Draw an instant on a surface of pygame, over the scene."""
 
 
 class Picture(Protocol):
@@ -27,10 +66,10 @@ class Picture(Protocol):
 
     trunks: tuple[str, ...]
 
-    def scene(self, brush: Brush, here: Surroundings, size: tuple[int, int], right: int) -> Any:
+    def scene(self, brush: Brush, here: Surroundings, size: tuple[int, int], right: int) -> Scene:
         """Make the scene in a picture of `size`, whose `right` pixels it leaves free."""
 
-    def panel(self, brush: Brush, box: tuple[int, int, int, int], here: Surroundings) -> Any:
+    def panel(self, brush: Brush, box: tuple[int, int, int, int], here: Surroundings) -> Panel:
         """Make the panel in a box (left, top, width, height) of the picture."""
 
     def drawing(self, here: Surroundings, numbers: int) -> Drawing:
@@ -38,25 +77,32 @@ class Picture(Protocol):
 
 
 class LegPicture:
-    """Picture of a leg under the bar of a trunk, with gait and force of one hoof."""
+    """Picture of a leg under the bar of a trunk, with gait and force of one hoof.
+
+    A suspended trunk hangs on a spring, one on a rail has wheels, a fixed one is bolted.
+    """
 
     trunks: tuple[str, ...] = ONE_LEG
 
-    def scene(self, brush: Brush, here: Surroundings, size: tuple[int, int], right: int) -> Any:
+    def scene(self, brush: Brush, here: Surroundings, size: tuple[int, int], right: int) -> Scene:
         """Make the scene, see `Picture`."""
         from hoof_env.render.panel import unit_of
-        from hoof_env.render.scene import Scene
+        from hoof_env.render.scene import LegScene
 
         unit = unit_of(here.lift_off_n)
-        return Scene(brush, here.geometry, here.terrain, size, right, here.trunk, unit, len(here.hips))
+        return LegScene(brush, here.geometry, here.terrain, size, right, here.trunk, unit, here.hips)
 
-    def panel(self, brush: Brush, box: tuple[int, int, int, int], here: Surroundings) -> Any:
+    def panel(self, brush: Brush, box: tuple[int, int, int, int], here: Surroundings) -> Panel:
         """Make the panel, see `Picture`."""
         from hoof_env.gait import limits_of
-        from hoof_env.render.panel import Panel
+        from hoof_env.render.panel import LegPanel
 
+        if len(here.hips) > 1:
+            raise ParameterError(
+                f"picture: expected a LegsPicture of {len(here.hips)} legs, got a LegPicture"
+            )
         weight = here.weight_n if here.trunk == "suspended" else 0.0
-        return Panel(brush, box, weight, here.lift_off_n, limits_of(here.geometry))
+        return LegPanel(brush, box, weight, here.lift_off_n, limits_of(here.geometry))
 
     def drawing(self, here: Surroundings, numbers: int) -> Drawing:
         """Make the drawing of a page, see `Picture`."""
@@ -66,12 +112,14 @@ class LegPicture:
 
 
 class LegsPicture(LegPicture):
-    """Picture of several legs under the bar of a trunk, with forces of all hooves and their footfall."""
+    """Picture of two to nine legs under the bar of a trunk, with forces of all hooves and their footfall."""
 
-    def panel(self, brush: Brush, box: tuple[int, int, int, int], here: Surroundings) -> Any:
+    def panel(self, brush: Brush, box: tuple[int, int, int, int], here: Surroundings) -> Panel:
         """Make the panel, see `Picture`."""
-        from hoof_env.render.legs_panel import LegsPanel
+        from hoof_env.render.legs_panel import MOST_LEGS, LegsPanel
 
+        if len(here.hips) > MOST_LEGS:
+            raise ParameterError(f"picture: expected at most {MOST_LEGS} legs, got {len(here.hips)}")
         return LegsPanel(brush, box, tuple(here.hips), here.weight_n, here.lift_off_n)
 
 
@@ -80,7 +128,7 @@ class HorsePicture(LegsPicture):
 
     trunks: tuple[str, ...] = TRUNKS
 
-    def scene(self, brush: Brush, here: Surroundings, size: tuple[int, int], right: int) -> Any:
+    def scene(self, brush: Brush, here: Surroundings, size: tuple[int, int], right: int) -> Scene:
         """Make the scene, see `Picture`."""
         from hoof_env.render.horse_scene import HorseScene
 

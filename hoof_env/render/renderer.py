@@ -29,11 +29,10 @@ LARGEST_SIDE = 8192  # largest width and height [pixels]; a canvas of both takes
 
 
 class Renderer:
-    """Draws a body, the ground, the forces on hooves and a panel with numbers and curves.
+    """Renderer of a body, the ground, the forces on hooves and a panel with numbers and curves.
 
     Args:
-        here: surroundings; their picture makes scene and panel. A suspended trunk is drawn on a spring, one
-            on a rail with wheels, a fixed one bolted.
+        here: surroundings; their picture makes scene and panel.
         mode: one of `MODES`.
         fps: frames per second that a window is held to [Hz].
         size: width and height of the picture [pixels].
@@ -74,8 +73,8 @@ class Renderer:
         edge = round(16 * brush.unit)
         column = round(304 * brush.unit)
         box = (self.size[0] - edge - column, edge, column, round(508 * brush.unit))
-        self._scene: Any = here.picture.scene(brush, here, self.size, column + 2 * edge)
-        self._panel: Any = here.picture.panel(brush, box, here)
+        self._scene = here.picture.scene(brush, here, self.size, column + 2 * edge)
+        self._panel = here.picture.panel(brush, box, here)
         self._window_open = False
         self._clock = pygame.time.Clock()
         self._closed = False
@@ -84,8 +83,7 @@ class Renderer:
     @property
     def stances(self) -> Stances:
         """Stances of the episode and their peaks."""
-        found: Stances = self._panel.stances
-        return found
+        return self._panel.stances
 
     @property
     def latest(self) -> Any:

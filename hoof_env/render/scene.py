@@ -39,7 +39,7 @@ from hoof_env.render.colours import (
     mix,
 )
 from hoof_env.render.ground import GroundPainter
-from hoof_env.render.instant import BodyInstant, Instant
+from hoof_env.render.instant import ONE_HIP, BodyInstant, Hips, Instant
 from hoof_env.render.outline import (
     AROUND_M,
     ARROW_M,
@@ -59,8 +59,8 @@ PATH_SECONDS = 1.0  # length of the paths of toe and heel [s]
 PATH_STEP = 0.01  # time between two places of a path [s]
 
 
-class Scene:
-    """Draws one instant into a picture of `size`, whose `right` pixels the `legs` leave free.
+class LegScene:
+    """Scene in a picture of `size`, whose `right` pixels the legs at `hips` leave free.
 
     Attributes:
         small: size of what is drawn around the leg, at most 1.
@@ -78,7 +78,7 @@ class Scene:
         right: int,
         trunk: str,
         forces: Unit = KILONEWTONS,
-        legs: int = 1,
+        hips: Hips = ONE_HIP,
     ) -> None:
         self._unit, self._newtons, self._digits = forces
         self._brush = brush
@@ -86,6 +86,7 @@ class Scene:
         self._size = size
         self.small = min(1.0, geometry.hip_height / USUAL_HIP_M)
         out, up = reach(geometry)
+        out += max(abs(x) for x, _ in hips.values())
         spare = (HEIGHT_SLACK_M + MARGIN_M) * self.small
         soil = max(out + spare - geometry.hip_height, SOIL_M * self.small)
         sky = geometry.hip_height + up + spare
@@ -94,7 +95,7 @@ class Scene:
         self._level = size[1] - soil * self._scale  # of the ground [pixels] while the camera keeps its height
         self._camera = 0j
         # Of each leg time [s], heel and toe [m].
-        self._paths: list[deque[tuple[float, complex, complex]]] = [deque() for _ in range(legs)]
+        self._paths: list[deque[tuple[float, complex, complex]]] = [deque() for _ in hips]
         self._ground = GroundPainter(brush, terrain, size, self._scale, 2 * self._centre)
         self._leg = LegOutline(geometry)
         self._girth = self.small

@@ -30,8 +30,9 @@ from hoof_env.errors import ParameterError, check_choice, check_number, count
 from hoof_env.gait import PARAMETERS, QUICK, WIDEST, FilterSettings
 from hoof_env.ground.contact import Ground
 from hoof_env.ground.terrain import Terrain
-from hoof_env.leg.geometry import Geometry, load_geometry
+from hoof_env.leg.geometry import Geometry, Preset, load_geometry, preset_label
 from hoof_env.leg.limb_masses import with_limb_masses
+from hoof_env.leg.mechanism_list import PAPER
 from hoof_env.render.instant import Hips
 from hoof_env.render.picture import HorsePicture, Picture
 from hoof_env.simd.layout import Block
@@ -173,8 +174,7 @@ class Horse:
         self.speed_scale = math.sqrt(self.size)
         if s.trunk != TRUNKS[FREE]:
             raise ParameterError(f'trunk: expected "free" of a horse, got {s.trunk!r}')
-        self.geometry = load_geometry(s.preset)
-        self.geometry = self.geometry.scaled(HIP_HEIGHT * self.size / self.geometry.hip_height)
+        self.geometry = _leg_of(s.preset, self.size)
         self.height = HIP_HEIGHT * self.size
         self.hips: Hips = {f"{leg}_": (HIPS[leg.partition("_")[2]] * self.size, 0.0) for leg in LEGS}
         self.gaits: Mapping[str, Any] = {
@@ -391,6 +391,16 @@ class Horse:
             "action_for: expected an environment of one leg; actions of a horse lie around a gait, zeros are"
             f" that gait, and the argument gait= makes it one of {', '.join(self.gaits)}"
         )
+
+
+def _leg_of(preset: Preset, size: float) -> Geometry:
+    """Return the leg of a preset as tall as a horse of a size; `ParameterError` for another mechanism."""
+    geometry = load_geometry(preset)
+    if geometry.mechanism != PAPER:
+        raise ParameterError(
+            f"preset: expected a leg of the paper's mechanism under a horse, got {preset_label(preset)}"
+        )
+    return geometry.scaled(HIP_HEIGHT * size / geometry.hip_height)
 
 
 # Kept, because `parts` is called for every drawn set of parameters.

@@ -331,7 +331,7 @@ SCHEDULES = [
 ]
 """Changes of settings over control steps."""
 
-LEGS = [(HORSE, {"preset": "klann"}, "geometry 'klann': expected the paper's mechanism")]
+LEGS = [(HORSE, {"preset": "klann"}, "preset: expected a leg of the paper's mechanism .* got preset klann")]
 ROWS = [
     *((env_id, *row) for env_id, rows in SETTINGS.items() for row in rows),
     *(row for rows in (EFFECTS, SIZES, DISTURBANCES, DELAYS, SCHEDULES, LEGS) for row in rows),

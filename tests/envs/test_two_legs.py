@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from dataclasses import replace
 from typing import ClassVar
 
@@ -10,8 +11,12 @@ import numpy as np
 import pytest
 
 from hoof_env import records
-from hoof_env.render.instant import instants
-from hoof_env.render.picture import LegsPicture
+from hoof_env.envs import manual
+from hoof_env.errors import ParameterError
+from hoof_env.leg.geometry import load_geometry
+from hoof_env.render.horse_scene import HorseScene
+from hoof_env.render.instant import BodyInstant, Instant, Surroundings, instants
+from hoof_env.render.picture import HorsePicture, LegPicture, LegsPicture
 from hoof_env.render.renderer import Renderer
 from hoof_env.simd import block_at, maximum, minimum, read
 from hoof_env.simd.compile import inline_llvm
@@ -60,6 +65,44 @@ class Still:
         return np.zeros(8, np.float32), None
 
 
+def surroundings_of_legs(count, picture):
+    """Surroundings of legs a step apart along the trunk."""
+    hips = {f"leg{k}_": (0.2 * k, 0.0) for k in range(count)}
+    return Surroundings(load_geometry("identified"), lift_off_n=50.0, hips=hips, picture=picture)
+
+
+@pytest.mark.parametrize("picture", [LegsPicture(), HorsePicture()], ids=["legs", "horse"])
+@pytest.mark.parametrize("count", [2, 6, 9])
+def test_pictures_have_room_for_legs(picture, count):
+    """Curves, footfall and their words lie in the card, and hooves left of it."""
+    here = surroundings_of_legs(count, picture)
+    renderer = Renderer(here)
+    nowhere = Instant(*[0.0] * len(Instant._fields))
+    legs = tuple(nowhere._replace(x=0.2 * k, y=here.geometry.hip_height) for k in range(count))
+    renderer.add([BodyInstant(0.0, 0.0, here.geometry.hip_height, 0.0, 0.0, 0.0, legs)])
+    assert renderer.frame().std() > 0
+    panel = renderer._panel
+    boxes = [*panel._plots, *panel._rows]
+    assert len(boxes) == 2 * count
+    assert all(panel._box.contains(box) and box.height > 1 for box in boxes)
+    assert all(one.bottom < other.top for one, other in itertools.pairwise(boxes))
+    if isinstance(renderer._scene, HorseScene):
+        return
+    last = renderer._scene.look_at(renderer.latest)[-1]
+    assert max(z.real for z in last.values()) < panel._box.left
+
+
+def test_pictures_refuse_legs_that_they_cannot_show():
+    for count, picture, words in (
+        (2, LegPicture(), "picture: expected a LegsPicture of 2 legs, got a LegPicture"),
+        (10, LegsPicture(), "picture: expected at most 9 legs, got 10"),
+    ):
+        with pytest.raises(ParameterError, match=words):
+            Renderer(surroundings_of_legs(count, picture))
+    with pytest.raises(ParameterError, match=r"expected a single one .* got HorseLegVectorEnv"):
+        records.surroundings(gym.make_vec("hoof_env/HorseLeg-v0", 2))
+
+
 @pytest.fixture(autouse=True)
 def registered(monkeypatch):
     """Register the body of two legs."""
@@ -91,6 +134,7 @@ def test_pictures_and_records_have_both_legs():
     """They take legs and panel from the body, whatever it is."""
     pytest.importorskip("pygame")
     env = gym.make(ID, render_mode="rgb_array")
+    assert ID in manual.page(ID)
     env.reset(seed=2)
     record = records.record_episode(env, Still(), 2, 0.4)
     assert abs(record["off_crank_angle"][0] - record["near_crank_angle"][0]) == pytest.approx(np.pi)

@@ -9,7 +9,8 @@ import pytest
 from hoof_env import records
 from hoof_env.constants import GRAVITY
 from hoof_env.envs.policies import make_policy
-from hoof_env.lab.reactions import joint_columns, reaction_units
+from hoof_env.gait import PARAMETERS
+from hoof_env.lab.reactions import JointReactions, joint_columns, reaction_units
 from hoof_env.leg.mechanism_list import PAPER
 from hoof_env.tasks.horse_gaits import LEGS
 
@@ -50,6 +51,47 @@ def test_what_the_legs_do_to_the_trunk_is_its_change_of_momentum():
         expected = mass * (speed - speed[0] + gravity * record["time"])
         assert np.ptp(impulse) > 100
         np.testing.assert_allclose(impulse, expected, atol=0.005 * np.ptp(impulse))
+
+
+@pytest.mark.parametrize("delay", [0.0, 0.5, 1.0, 1.25])
+def test_the_second_engine_has_the_bits_of_the_first_with_a_delay(delay):
+    """Until an action acts within a step, the command before it stands: the second engine went on with that
+    of the whole step, and joints were off by as much as they bear."""
+    with gym.make("hoof_env/HorseLeg-v0", action_delay=delay) as env:
+        env.action_space.seed(0)
+        leg = env.unwrapped
+        joints = JointReactions(env)
+        env.reset(seed=0)
+        for _ in range(15):
+            before = joints.before()
+            env.step(env.action_space.sample())
+            joints.after(before, 20)
+            for name, value in leg.engine.state.items():
+                np.testing.assert_array_equal(joints._engine.state[name], value, err_msg=name)
+
+
+def test_records_have_the_command_that_acts():
+    """The commands of an action that acts half a step late begin in the middle of the step."""
+    now, late = (gym.make("hoof_env/HorseLeg-v0", action_delay=delay) for delay in (0.0, 0.5))
+    taken = np.random.default_rng(3).uniform(-1, 1, (4, 4)).astype(np.float32)
+    for env in (now, late):
+        env.reset(seed=1)
+        assert records.substeps(env)["command_crank_speed"].shape == (1,)
+    before = records.substeps(late)["command_crank_speed"][0]
+    for action in taken:
+        late.step(action)
+        commands = late.unwrapped.recording().commands()
+        assert commands.shape == (20, 1, 4)
+        columns = records.substeps(late)
+        for k, name in enumerate(PARAMETERS):
+            np.testing.assert_array_equal(columns[f"command_{name}"], commands[:, 0, k])
+        speeds = columns["command_crank_speed"]
+        assert (speeds[:10] == before).all()
+        assert (speeds[10:] == speeds[-1]).all()
+        assert speeds[-1] != before
+        before = speeds[-1]
+    now.step(taken[0])
+    assert len(np.unique(records.substeps(now)["command_crank_speed"])) == 1
 
 
 def test_names_say_joint_and_bodies():

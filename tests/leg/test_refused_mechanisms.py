@@ -57,6 +57,13 @@ WRONG = {
         changed(bodies=[*JANSEN["bodies"], {"name": "BE", "tail": "B", "head": "E"}]),
         r"mechanism.bodies\[11\]: 'BE' needs ends whose distance is a length of the list \(B-C, .*'B'",
     ),
+    **{
+        f"a name with {letter!r}": (
+            changed(feet=[f"a{letter}b"]),
+            r"mechanism.feet\[0\]: expected a name that prints, without comma, semicolon and quotes, got",
+        )
+        for letter in (",", ";", '"', "\t", "\n", "\x00")
+    },
     "another length": (
         changed(bodies=[JANSEN["bodies"][0] | {"length": "PB"}, *JANSEN["bodies"][1:]]),
         r"mechanism.bodies\[0\]: the ends of 'OP' are 'OP' apart by the points.* give 'length': 'OP'",

@@ -365,12 +365,13 @@ def test_what_is_around_a_small_leg_is_as_small():
     """The trunk of a robot at 0.2 was as long as that of the whole leg, over key and panel. Up to the scale
     all is the same picture, so that the same leg, made smaller, is drawn as large."""
     from hoof_env.render.outline import USUAL_HIP_M
-    from hoof_env.render.scene import Scene
+    from hoof_env.render.scene import LegScene
 
     size, right = (960, 540), 336
     usual = GEOMETRY.scaled(USUAL_HIP_M / GEOMETRY.hip_height)
     large, small = (
-        Scene(Brush(size), usual.scaled(factor), Terrain.flat(), size, right, "rail") for factor in (1.0, 0.2)
+        LegScene(Brush(size), usual.scaled(factor), Terrain.flat(), size, right, "rail")
+        for factor in (1.0, 0.2)
     )
     assert small._scale == pytest.approx(5 * large._scale)
     assert small._trunk._image.get_size() == large._trunk._image.get_size()
