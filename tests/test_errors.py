@@ -5,10 +5,11 @@ from fractions import Fraction
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from hoof_env.errors import (
+    LEAST,
     DataFileError,
     GeometryError,
     HoofEnvError,
@@ -24,11 +25,15 @@ numbers = st.floats(allow_nan=True, allow_infinity=True) | st.integers()
 
 
 @given(value=numbers, bounds=st.tuples(st.integers(-9, 9), st.integers(-9, 9)), exclusive=st.booleans())
+@example(value=2e-296, bounds=(0, 1), exclusive=True)
 @settings(deadline=None)
 def test_a_number_is_returned_or_named(value, bounds, exclusive):
     low, high = sorted(bounds)
     fits = -1e300 < value < 1e300 and low <= value <= high and not (exclusive and value == low)
-    if fits:
+    if fits and exclusive and low == 0 and value < LEAST:
+        with pytest.raises(ParameterError, match=f"^x: expected {LEAST:g} or more, got {value!r}$"):
+            check_number("x", value, low=low, high=high, exclusive_low=exclusive)
+    elif fits:
         result = check_number("x", value, low=low, high=high, exclusive_low=exclusive)
         assert type(result) is float
         assert result == value
