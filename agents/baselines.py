@@ -1,6 +1,6 @@
 """The table of baselines: many trainings, one process each, and the page that they make.
 
-    python -m agents.baselines                        all of docs/evidence/baselines.md: hours on two cores
+    python -m agents.baselines                        all of agents/plans/full.yml: hours on two cores
     python -m agents.baselines --subset nightly       a small one in minutes, into a folder of its own
     python -m agents.baselines --only sac td3         some rows of it
     python -m agents.baselines --subset trainers --workers 1      how fast PPO and PPO_FLAT train, by turns
