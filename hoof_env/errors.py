@@ -6,6 +6,7 @@ Each message names the value that was given and what was expected.
 from __future__ import annotations
 
 import json
+import math
 from collections.abc import Iterable, Sequence
 from typing import Any, TypeVar
 
@@ -78,7 +79,7 @@ def check_number(
         number = float(value) if is_number(value) else np.nan
     except (TypeError, ValueError, OverflowError):
         number = np.nan
-    if not (np.isfinite(number) and low <= number <= high) or (exclusive_low and number == low):
+    if not (math.isfinite(number) and low <= number <= high) or (exclusive_low and number == low):
         bounds = f"{'(' if exclusive_low else '['}{low:g}, {high:g}]"
         raise ParameterError(f"{name}: expected a finite number in {bounds}, got {value!r}")
     if exclusive_low and low == 0 and number < LEAST:

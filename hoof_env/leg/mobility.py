@@ -6,6 +6,7 @@ name a point of a body that goes its own way. The numbers of a leg tell: `check_
 
 from __future__ import annotations
 
+from functools import lru_cache
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -29,6 +30,8 @@ ROUNDING = 1e-8
 """Part of a length, or of the largest singular value, that is rounding."""
 
 
+# Each environment makes its leg anew, mostly one that was looked at before.
+@lru_cache(maxsize=32)
 def check_motion(geometry: Geometry) -> None:
     """Raise `GeometryError` unless a leg turns fully, if it must, the points of each body keep their places
     on it, and the rows of joints, welds and crank leave no body free.

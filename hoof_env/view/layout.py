@@ -110,8 +110,6 @@ def fill(doc: Any, player: Player) -> Wire:
     bars, bars_figure = figures.bars_figure(lines)
     # Models that only the script knows belong to the document by this list alone.
     scene.figure.tags = [wire]
-    for each in (scene.figure, *(one.figure for one in shown), bars_figure):
-        doc.add_root(each)
     doc.title = f"{simulation.env_id.rpartition('/')[2]} - hoof-env view"
     doc.template = template("live.html")
     doc.template_variables.update(variables(player, shown))
@@ -128,6 +126,10 @@ def fill(doc: Any, player: Player) -> Wire:
         "shown": [{"source": c.source, "window": c.window, "master": c.master} for c in shown],
         "seconds": figures.SECONDS,
     }
+    # Last: Bokeh looks through all models of a document after each change of one.
+    with doc.models.freeze():
+        for each in (scene.figure, *(one.figure for one in shown), bars_figure):
+            doc.add_root(each)
     doc.js_on_event("document_ready", CustomJS(args=arguments, code=script("scene.js", "live.js")))
     return wire
 
