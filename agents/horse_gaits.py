@@ -29,6 +29,7 @@ from hoof_env.constants import GRAVITY
 from hoof_env.envs.policies import make_policy
 from hoof_env.errors import parse_json
 from hoof_env.evaluation.episodes import make_rows
+from hoof_env.simd.threads import limit_threads
 from hoof_env.tasks.horse import HIP_HEIGHT
 from hoof_env.tasks.horse_gaits import LEGS, LIMITS, PAIRS, Stride, bounds
 
@@ -114,7 +115,7 @@ class BatchRollout:
         envs: Any = gym.make_vec(
             "hoof_env/Horse-v0",
             num_envs,
-            num_threads=2,
+            num_threads=limit_threads(2),
             target_speed=speed,
             autoreset_mode=AutoresetMode.SAME_STEP,
             reward_weights=weights,

@@ -3,13 +3,16 @@ nobody computes in threads: there is a process on each processor, and threads th
 
 Where PyTorch cannot be had, what needs it is left out, and a line at the end says so."""
 
+import gc
 import os
+import pickle
 import signal
 import sys
 from importlib.util import find_spec
 from pathlib import Path
 
 import pytest
+from filelock import FileLock
 
 import hoof_env
 from hoof_env.simd.compile import QUIET
@@ -25,29 +28,36 @@ if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
 
 LONGEST = (
     "envs/test_bits.py",
-    "test_packaging.py",
     "envs/test_own_task.py",
-    "test_docs.py",
-    "test_site.py",
-    "dynamics/test_hoof_spring.py",
-    "envs/test_hoof_stiffness.py",
-    "envs/test_rewards_of_tasks.py",
     "benchmarks/test_speed.py",
+    "dynamics/test_mechanisms.py",
+    "view/test_server.py",
+    "envs/test_own_parts.py",
     "agents/test_resume.py",
     "test_setup.py",
-    "agents/test_horse_gaits.py",
+    "test_site.py",
     "envs/test_refused_tasks.py",
-    "test_typing.py",
-    "simd/test_cache.py",
-    "paper/test_figures.py",
-    "dynamics/test_animal.py",
-    "dynamics/test_reactions.py",
-    "envs/test_conformance.py",
+    "test_packaging.py",
+    "agents/test_soft_landing.py",
     "agents/test_demo.py",
-    "test_cli.py",
+    "view/test_tab.py",
+    "paper/test_figures.py",
+    "simd/test_cache.py",
+    "dynamics/test_animal.py",
+    "test_typing.py",
     "ecosystem/test_gymnasium.py",
-    "test_make_test.py",
+    "agents/test_stock.py",
+    "test_cli.py",
+    "envs/test_rewards_of_tasks.py",
+    "paper/test_legs_that_fit.py",
+    "dynamics/test_strokes.py",
+    "agents/test_horse_gaits.py",
     "agents/test_examples.py",
+    "test_make_test.py",
+    "ecosystem/test_wrappers.py",
+    "test_docs.py",
+    "ecosystem/test_suite.py",
+    "simd/test_trusted_files.py",
 )
 """Files that take longest, the longest first. They begin: one that began last would keep one processor busy
 while the others have nothing left to do."""
@@ -84,6 +94,21 @@ if not HAS_TORCH:
     hoof_env.Sb3VecEnv = _AbsentVecEnv
 
 
+@pytest.fixture(scope="session")
+def reproduction(request, tmp_path_factory):
+    """Return the paper's four conditions by every solver, which one process computes for all."""
+    from hoof_env.paper.reproduce import reproduce
+
+    folder = tmp_path_factory.getbasetemp()
+    if hasattr(request.config, "workerinput"):
+        folder = folder.parent  # of all processes of this run
+    path = folder / "reproduction.pickle"
+    with FileLock(folder / "reproduction.lock"):
+        if not path.exists():
+            path.write_bytes(pickle.dumps(reproduce()))
+    return pickle.loads(path.read_bytes())
+
+
 def pytest_ignore_collect(collection_path):
     here = Path(__file__).parent
     if not HAS_TORCH and collection_path in [here / name for name in LEFT_OUT]:
@@ -96,6 +121,12 @@ def pytest_collection_modifyitems(items):
     here = Path(__file__).parent
     places = {here / name: place for place, name in enumerate(LONGEST)}
     items.sort(key=lambda item: places.get(item.path, len(places)))
+
+
+def pytest_collection_finish():
+    """Keep what was collected and imported out of the garbage collector's way: it would go through it again
+    and again and find nothing."""
+    gc.freeze()
 
 
 def pytest_terminal_summary(terminalreporter):

@@ -124,7 +124,7 @@ class Playback:
 
     def document(self) -> Document:
         """Return the page as a document of Bokeh."""
-        doc = Document()
+        roots = []
         views = []
         for k, record in enumerate(self.records):
             scene = figures.Scene(
@@ -135,7 +135,7 @@ class Playback:
             paths.data = {name: record.curves[name] for name in paths.data}
             data = ColumnDataSource({"row": np.ascontiguousarray(record.rows).ravel()})
             views.append({"parts": parts, "rows": data, "count": len(record.rows)})
-            doc.add_root(scene.figure)
+            roots.append(scene.figure)
         shown = self._figures()
         end = max(float(record.curves["time"][-1]) for record in self.records)
         begin = min(float(record.curves["time"][0]) for record in self.records)
@@ -145,7 +145,12 @@ class Playback:
             cursor = Span(location=begin, dimension="height", line_color=figures.INK, line_width=1)
             each.figure.add_layout(cursor)
             cursors.append(cursor)
-            doc.add_root(each.figure)
+            roots.append(each.figure)
+        doc = Document()
+        # Together: Bokeh looks through all models of a document after each addition.
+        with doc.models.freeze():
+            for root in roots:
+                doc.add_root(root)
         doc.title = self.title
         step = 1 / ROWS
         arguments = {"views": views, "cursors": cursors, "begin": begin, "step": step}

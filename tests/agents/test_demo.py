@@ -57,9 +57,11 @@ class Page(HTMLParser):
 
 
 @pytest.fixture(scope="module")
-def folder(tmp_path_factory) -> Path:
+def folder(tmp_path_factory, reproduction) -> Path:
     out = tmp_path_factory.mktemp("runs") / "demo"
-    assert demo.demo(demo.Args(out=out, quick=True)) == out / "report.html"
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(shared, "reproduce", lambda say: reproduction)
+        assert demo.demo(demo.Args(out=out, quick=True)) == out / "report.html"
     return out
 
 

@@ -335,6 +335,15 @@ def test_an_edit_of_the_users_file_compiles_anew_and_nothing_else_does(tmp_path)
 # The page
 
 
+def test_the_example_has_the_same_bits_alone_and_among_many():
+    example = Path(__file__).parents[2] / "examples" / "own_task.py"
+    run = subprocess.run([sys.executable, str(example)], capture_output=True, text=True)
+    assert run.returncode == 0, run.stderr
+    found = re.fullmatch(r"reward .*, of which (.*) for friction and (.*) for comfort\n", run.stdout)
+    assert found
+    assert float(found[1]) < 0.0 < float(found[2])
+
+
 def rows_under(heading):
     """Names in the first column of the tables of a section."""
     part = PAGE.split(heading, 1)[1].split("\n## ", 1)[0]

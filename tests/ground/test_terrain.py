@@ -9,6 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numba import njit
 
+from hoof_env.errors import ParameterError
 from hoof_env.ground import terrain as lanes
 from hoof_env.ground.terrain import LONG_WAY, Terrain
 
@@ -43,6 +44,20 @@ def test_it_is_linear_between_the_knots_and_level_beyond(terrain, x):
     assert Terrain.from_dict(json.loads(json.dumps(terrain.to_dict()))) == terrain
     assert nx**2 + ny**2 == pytest.approx(np.ones(len(x)))
     assert (ny > 0).all()
+
+
+def outcome(height):
+    """The checked heights, or the words of the refusal."""
+    try:
+        return Terrain(height).height
+    except ParameterError as error:
+        return str(error)
+
+
+@given(st.lists(st.floats(-1e4, 1e4) | st.floats(), min_size=1, max_size=6), st.sampled_from([tuple, list]))
+def test_a_row_that_is_checked_at_once_is_taken_or_refused_as_one_by_one(heights, kind):
+    one_by_one = np.array(heights, dtype=object)
+    assert outcome(kind(heights)) == outcome(one_by_one)
 
 
 @given(terrains())

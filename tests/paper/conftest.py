@@ -1,17 +1,9 @@
-"""One reproduction for all tests of the session, and cycles made by hand."""
+"""Cycles made by hand."""
 
 import numpy as np
 import pytest
 
 from hoof_env.paper.measure import CYCLE
-
-
-@pytest.fixture(scope="session")
-def reproduction():
-    """The real thing, every solver."""
-    from hoof_env.paper.reproduce import reproduce
-
-    return reproduce()
 
 
 @pytest.fixture(scope="session")
