@@ -122,6 +122,7 @@ print(hoof_env.__file__, env.step([0.0] * 4)[4]["reward_mine"])
 """
 
 
+@pytest.mark.slow
 def test_a_task_of_ones_own_is_compiled_with_the_package_from_the_wheel(wheel, tmp_path):
     """In another project's folder, with nothing that was compiled before."""
     wheel.extractall(tmp_path / "site")

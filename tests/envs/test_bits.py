@@ -102,7 +102,7 @@ CASES = {
         {"crank_angle": 1.5},
         steps=13,
         alone=3,
-        sizes=((9, 2),),
+        sizes=((5, 2),),
         ends=3,
         halves=(AutoresetMode.DISABLED,),
     ),
