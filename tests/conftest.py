@@ -101,11 +101,13 @@ def reproduction(request, tmp_path_factory):
 
     folder = tmp_path_factory.getbasetemp()
     if hasattr(request.config, "workerinput"):
-        folder = folder.parent  # of all processes of this run
+        folder = folder.parent  # all processes of this run share it
     path = folder / "reproduction.pickle"
     with FileLock(folder / "reproduction.lock"):
         if not path.exists():
-            path.write_bytes(pickle.dumps(reproduce()))
+            unfinished = folder / "reproduction.unfinished"
+            unfinished.write_bytes(pickle.dumps(reproduce()))
+            unfinished.replace(path)
     return pickle.loads(path.read_bytes())
 
 

@@ -253,9 +253,9 @@ def _plain_row(values: Any, low: float, high: float, count: int | None) -> tuple
     if len(values) > MOST_KNOTS or (count is not None and len(values) != count):
         return None
     row = np.array(values)
-    # NaN is within no bounds.
-    within = (low <= row) & (row <= high)
-    return tuple(values) if within.all() else None
+    # Bounds may be infinite, and values may not.
+    is_good = np.isfinite(row) & (low <= row) & (row <= high)
+    return tuple(values) if is_good.all() else None
 
 
 def _short(value: Any) -> str:

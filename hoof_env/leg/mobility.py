@@ -6,6 +6,7 @@ name a point of a body that goes its own way. The numbers of a leg tell: `check_
 
 from __future__ import annotations
 
+from dataclasses import dataclass, field
 from functools import lru_cache
 from typing import TYPE_CHECKING
 
@@ -30,14 +31,48 @@ ROUNDING = 1e-8
 """Part of a length, or of the largest singular value, that is rounding."""
 
 
-# Each environment makes its leg anew, mostly one that was looked at before.
-@lru_cache(maxsize=32)
+@dataclass(frozen=True)
+class _Motion:
+    """Parts of a leg on which its motion depends, and the leg itself."""
+
+    mechanism: Mechanism
+    lengths: tuple[tuple[str, float], ...]
+    fixed: tuple[tuple[str, complex], ...]
+    assembly: tuple[tuple[str, int], ...]
+    full_turn: bool
+    geometry: Geometry = field(compare=False)
+
+
 def check_motion(geometry: Geometry) -> None:
     """Raise `GeometryError` unless a leg turns fully, if it must, the points of each body keep their places
     on it, and the rows of joints, welds and crank leave no body free.
 
     Bodies of the paper's mechanism are not looked at, nor are those of a leg that no angle assembles.
     """
+    motion = _Motion(
+        geometry.mechanism,
+        tuple(geometry.lengths.items()),
+        tuple(geometry.fixed.items()),
+        tuple(geometry.assembly.items()),
+        geometry.full_turn,
+        geometry,
+    )
+    try:
+        hash(motion)
+    except TypeError:  # a mechanism that was made of lists
+        _check(geometry)
+    else:
+        _check_once(motion)
+
+
+# Each environment makes its leg anew, and most legs were checked before. An error is not kept: it is raised
+# each time.
+@lru_cache(maxsize=32)
+def _check_once(motion: _Motion) -> None:
+    _check(motion.geometry)
+
+
+def _check(geometry: Geometry) -> None:
     if geometry.full_turn:
         check_full_revolution(geometry)
     if geometry.mechanism == PAPER:

@@ -126,7 +126,7 @@ def fill(doc: Any, player: Player) -> Wire:
         "shown": [{"source": c.source, "window": c.window, "master": c.master} for c in shown],
         "seconds": figures.SECONDS,
     }
-    # Last and together: Bokeh looks through all models of a document after each change of one.
+    # The figures are added last and together, because Bokeh looks through all models after each change.
     with doc.models.freeze():
         for each in (scene.figure, *(one.figure for one in shown), bars_figure):
             doc.add_root(each)

@@ -147,7 +147,7 @@ class Playback:
             cursors.append(cursor)
             roots.append(each.figure)
         doc = Document()
-        # Together: Bokeh looks through all models of a document after each addition.
+        # The figures are added together, because Bokeh looks through all models after each addition.
         with doc.models.freeze():
             for root in roots:
                 doc.add_root(root)

@@ -8,7 +8,10 @@ EXAMPLE = Path(__file__).parents[2] / "examples" / "first_curve.py"
 
 
 def test_first_curve(tmp_path):
-    short = EXAMPLE.read_text().replace("200_000", "4_096").replace("episodes=20", "episodes=2")
+    short = EXAMPLE.read_text()
+    for long, less in (("200_000", "4_096"), ("episodes=20", "episodes=2")):
+        assert long in short
+        short = short.replace(long, less)
     done = subprocess.run(
         [sys.executable, "-W", "error::UserWarning:stable_baselines3", "-c", short],
         cwd=tmp_path, capture_output=True, text=True, timeout=300,

@@ -1,9 +1,12 @@
 """Numbers of bodies, the roles that they have and points on them, as a list of a mechanism may give them."""
 
 import copy
+from dataclasses import dataclass
 
 import pytest
 
+from hoof_env.errors import GeometryError
+from hoof_env.leg import mobility
 from hoof_env.leg.geometry import Geometry, load_geometry
 from hoof_env.leg.mechanism_list import PAPER
 from tests.legs import FOUR_BAR, FOUR_BAR_LEG
@@ -49,3 +52,34 @@ def test_roles_are_written_with_the_leg():
     leg = load_geometry().replace(mechanism=given)
     assert leg == load_geometry()
     assert Geometry.from_dict(leg.to_dict()).mechanism.bodies[0].role == "driver"
+
+
+def test_a_leg_that_locks_is_refused_each_time():
+    lengths = FOUR_BAR_LEG["lengths"] | {"OA": 2.0}
+    rocks = Geometry(**FOUR_BAR_LEG | {"lengths": lengths, "full_turn": False})
+    for _ in range(2):
+        with pytest.raises(GeometryError, match="does not close"):
+            rocks.replace(full_turn=True)
+
+
+def test_legs_that_move_alike_are_checked_once(monkeypatch):
+    checked = []
+    monkeypatch.setattr(mobility, "check_full_revolution", checked.append)
+    mobility._check_once.cache_clear()
+    for height in (0.8, 0.9):
+        Geometry(**FOUR_BAR_LEG | {"hip_height": height})
+    Geometry(**FOUR_BAR_LEG | {"mechanism": listed(mass=2.0)})
+    assert len(checked) == 1
+    Geometry(**FOUR_BAR_LEG | {"lengths": FOUR_BAR_LEG["lengths"] | {"CD": 0.6}})
+    assert len(checked) == 2
+
+
+@dataclass(frozen=True)
+class Noted(Geometry):
+    """A user's leg, which has no hash: that of a `Geometry` is not inherited."""
+
+    note: str = ""
+
+
+def test_a_class_of_ones_own_may_lack_a_hash():
+    assert Noted(**FOUR_BAR_LEG, note="mine").note == "mine"
