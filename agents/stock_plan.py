@@ -35,7 +35,7 @@ OTHERS = (RAIL, SPEED, TERRAIN, HORSE, FIXED)
 PLAN = (
     Curves(LEG, "ppo", 10, 400_000, 20_480),
     Curves(LEG, "sac", 10, 60_000, 6_000),
-    *(Curves(env_id, "ppo", 5, 300_000, 20_480) for env_id in OTHERS),
+    *(Curves(env_id, "ppo", 10 if env_id == RAIL else 5, 300_000, 20_480) for env_id in OTHERS),
     Curves(LEG, "td3", 5, 60_000, 6_000),
     Curves(LEG, "tqc", 5, 60_000, 6_000),
     Curves(LEG, TUNED, 10, 3_000_000, 40_960),
