@@ -102,7 +102,7 @@ CASES = {
         {"crank_angle": 1.5},
         steps=13,
         alone=3,
-        sizes=((7, 2),),  # more than MAX_SCALAR_ENVS, with an idle column
+        sizes=((9, 2),),
         ends=3,
         halves=(AutoresetMode.DISABLED,),
     ),

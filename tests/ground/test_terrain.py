@@ -5,7 +5,7 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from numba import njit
 
@@ -59,6 +59,9 @@ def outcome(heights, bound):
     st.sampled_from([tuple, list]),
     st.sampled_from([1e4, math.inf]),
 )
+@example([0.0, math.inf], list, math.inf)
+@example([0.0, math.nan], tuple, math.inf)
+@example([0.0, -1.1e4], tuple, 1e4)
 def test_a_row_that_is_checked_at_once_is_taken_or_refused_as_one_by_one(heights, kind, bound):
     one_by_one = np.array(heights, dtype=object)
     assert outcome(kind(heights), bound) == outcome(one_by_one, bound)

@@ -1,4 +1,5 @@
-"""Numbers of bodies, the roles that they have and points on them, as a list of a mechanism may give them."""
+"""Numbers of bodies, the roles that they have and points on them, as a list of a mechanism may give them; and
+when the motion of a leg is checked."""
 
 import copy
 from dataclasses import dataclass
