@@ -152,20 +152,23 @@ class Task:
         return settings
 
 
-RACING: Mapping[str, Any] = MappingProxyType(
-    {
-        "target_speed": None,
-        "reward_weights": {
-            "progress": 1.0,
-            "peak": 0.3,
-            "energy": 0.1,
-            "slip": 0.0,
-            "support": 0.0,
-            "loading": 0.0,
-        },
+def _racing(scale: float) -> Mapping[str, Any]:
+    """Return settings of a task that rewards every metre at any speed, and no bearing of weight: by 1 for a
+    metre, times the `scale` of all weights."""
+    weights = {
+        "progress": 1.0,
+        "peak": 0.3,
+        "energy": 0.1,
+        "failure": 25.0,
+        "slip": 0.0,
+        "support": 0.0,
+        "loading": 0.0,
     }
-)
-"""Settings of a task that rewards every metre at any speed, and no bearing of weight."""
+    return {
+        "target_speed": None,
+        "reward_weights": {name: scale * weight for name, weight in weights.items()},
+    }
+
 
 _SUSPENDED = (
     "The trunk moves along x and y. The leg must bear `trunk_share` of the weight of trunk and leg. A"
@@ -204,7 +207,8 @@ TASKS: Mapping[str, Task] = MappingProxyType(
             "HorseLegRail",
             "A horse's leg that pulls its trunk along a rail.",
             "The trunk slides along x at a fixed height: the leg need not carry it, only move it.",
-            {"trunk": "rail", **RACING},
+            # Stock PPO beats the best open-loop gait with this scale, and with 1 in two seeds of three.
+            {"trunk": "rail", **_racing(5.0)},
         ),
         "speed": Task(
             "HorseLegSpeed",
@@ -244,7 +248,7 @@ TASKS: Mapping[str, Task] = MappingProxyType(
             {
                 "gait": "walk",
                 "trunk": "fixed",
-                **RACING,
+                **_racing(1.0),
                 "restitution": 1.0,
                 "approach_floor": 1e-4,
                 "friction_fast": 1e-2,

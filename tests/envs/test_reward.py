@@ -132,7 +132,7 @@ def test_bearing_without_a_commanded_speed_pays_at_any():
     expected = pace * borne(impulses_of(trace, env.unwrapped.weight))
     found = [info["reward_support"] for info in infos]
     np.testing.assert_allclose(found, 2.0 * expected, rtol=1e-9, atol=1e-12)
-    assert sum(info["reward_progress"] for info in infos) == pytest.approx(trace["x"][-1], rel=1e-9)
+    assert sum(info["reward_progress"] for info in infos) == pytest.approx(5.0 * trace["x"][-1], rel=1e-9)
     assert all(info["reward_overspeed"] == 0.0 for info in infos)
 
 
