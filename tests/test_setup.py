@@ -249,7 +249,7 @@ def test_what_needs_pytorch_is_known(ours):
     """What is left brings no PyTorch."""
     asked = [one for one in ours.requirements("all") if not ours.needs_torch(one)]
     assert len(asked) == len(ours.requirements("all")) - len(ours.NEED_TORCH)
-    uv_pip_compile(ours, stdin="cycler\n")  # whether there is an index
+    check_wheels(ours, stdin="cycler\n")  # whether there is an index
     command = [sys.executable, "-m", "uv", "pip", "compile", "--quiet", "--only-binary", ":all:", "-"]
     environment = {**os.environ, **ours.uv_settings()}
     found = subprocess.run(
@@ -282,14 +282,19 @@ def test_uv_is_told_what_pip_is_told(setup, tmp_path, monkeypatch):
 
 
 def uv_pip_compile(setup, *options, stdin):
-    """Fail where what is asked for cannot be had as wheels; skip where no index can be reached."""
+    """Run `uv pip compile` for wheels alone; return the process that has ended."""
     command = [sys.executable, "-m", "uv", "pip", "compile", "--only-binary", ":all:", *options, "-"]
     command += ["--python", sys.executable]  # no other Python is looked for, nor downloaded
     macos = {"MACOSX_DEPLOYMENT_TARGET": "14.0"}  # the oldest that PyTorch has a wheel for
     environment = {**os.environ, **setup.uv_settings(), **macos}
-    ended = subprocess.run(
+    return subprocess.run(
         command, input=stdin, env=environment, capture_output=True, text=True, cwd=setup.ROOT
     )
+
+
+def check_wheels(setup, *options, stdin):
+    """Fail where what is asked for cannot be had as wheels; skip where no index can be reached."""
+    ended = uv_pip_compile(setup, *options, stdin=stdin)
     if ended.returncode != 0:
         reason = setup.why(ended.stderr.splitlines(keepends=True))
         if "No solution found" not in ended.stderr:  # the index is not there, or busy
@@ -297,12 +302,22 @@ def uv_pip_compile(setup, *options, stdin):
         pytest.fail(ended.stderr)
 
 
+@pytest.fixture(scope="module")
+def known():
+    """What the tests of this file have found out: the settings of pip, which takes half a second to say them,
+    and that uv has just fetched the lists of the index."""
+    return {}
+
+
 @pytest.fixture
-def ours(setup, monkeypatch):
+def ours(setup, monkeypatch, known):
     """Set-up that asks the pip of the tests' own environment for its settings."""
     monkeypatch.setattr(
         setup, "venv", lambda path: Path(sys.executable) if path == "bin/python" else setup.ROOT / path
     )
+    if "settings" not in known:
+        known["settings"] = setup.uv_settings()
+    monkeypatch.setattr(setup, "uv_settings", lambda: known["settings"])
     return setup
 
 
@@ -310,20 +325,25 @@ def ours(setup, monkeypatch):
     "platform", ["x86_64-manylinux_2_28", "aarch64-manylinux_2_28", "aarch64-apple-darwin"]
 )
 @pytest.mark.parametrize("minor", [11, 12, 13, 14])
-def test_everything_that_is_locked_has_a_wheel(ours, minor, platform):
+def test_everything_that_is_locked_has_a_wheel(ours, minor, platform, known):
     assert ours.OLDEST <= (3, minor) <= ours.NEWEST
     place = ("--python-version", f"3.{minor}", "--python-platform", platform)
+    locked = (*place, "--constraints", "constraints.txt")
     asked = "\n".join(ours.requirements("all"))
-    uv_pip_compile(ours, *place, "--constraints", "constraints.txt", stdin=asked)
+    # A list of the index has the wheels of every place: those that were just fetched need not be asked for
+    is_kept = "lists" in known and not uv_pip_compile(ours, *locked, "--offline", stdin=asked).returncode
+    if not is_kept:
+        check_wheels(ours, *locked, stdin=asked)
+    known["lists"] = True
 
 
 def test_what_has_no_wheel_is_refused(ours):
     with pytest.raises(pytest.fail.Exception, match="rliable"):
-        uv_pip_compile(ours, "--python-version", "3.12", stdin="rliable==1.2.0\n")
+        check_wheels(ours, "--python-version", "3.12", stdin="rliable==1.2.0\n")
 
 
 def test_the_lock_is_what_its_command_writes(ours):
-    uv_pip_compile(ours, stdin="hatchling\n")  # whether there is an index
+    check_wheels(ours, stdin="hatchling\n")  # whether there is an index
     command = [sys.executable, "scripts/lock.py"]
     subprocess.run(command, cwd=ours.ROOT, check=True, env={**os.environ, **ours.uv_settings()})
     assert (ours.ROOT / "constraints.txt").read_text() == (ROOT / "constraints.txt").read_text()
@@ -413,7 +433,7 @@ def test_uv_refuses_another_file_than_the_locked_one(ours, tmp_path, monkeypatch
     if is_changed:
         text = f"{text[:at]}{'01'[text[at] == '0']}{text[at + 1 :]}"
     (ours.ROOT / ours.LOCKED_FILES).write_text(text)
-    uv_pip_compile(ours, stdin="cycler\n")  # whether there is an index
+    check_wheels(ours, stdin="cycler\n")  # whether there is an index
 
     def install():
         ours.packages("uv", "one", *ours.ONLY_WHEELS, "--no-cache", "--target", str(tmp_path), "cycler")
