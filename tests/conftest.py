@@ -127,8 +127,9 @@ def pytest_collection_modifyitems(items):
 
 def pytest_collection_finish():
     """Keep what was collected and imported out of the garbage collector's way: it would go through it again
-    and again and find nothing."""
+    and again and find nothing. It also runs less often, for it took a seventh of the time of all tests."""
     gc.freeze()
+    gc.set_threshold(100_000, 20, 100)
 
 
 def pytest_terminal_summary(terminalreporter):
