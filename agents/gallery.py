@@ -1,7 +1,6 @@
 """Stills and returns that the manual's pages show of each id, besides the scores of its policy.
 
-    python -m agents.gallery        what is missing in agents/policies
-    python -m agents.gallery --again    everything anew, as after new policies
+    python -m agents.gallery
 
 Stills are cut out of the films of the policies. Returns are those of random actions, and of stock PPO where
 docs/evidence/stock has its curves, in the episodes of the published scores. Ids with curves also have
@@ -45,8 +44,6 @@ UNLEARNT = ("open-loop", "reference")
 class Args:
     """Arguments of the command."""
 
-    again: bool = False
-    """replace what is there, too"""
     out: Path = POLICIES
     """folder of the policies"""
 
@@ -111,13 +108,16 @@ def learning_of(rows: Sequence[dict[str, Any]], bar: float) -> dict[str, Any]:
     return min(found, key=lambda pair: pair[0])[1] if found else {}
 
 
-def returns_of(env_id: str, known: dict[str, Any]) -> dict[str, Any]:
-    """Return the returns that the page of an id compares with, and how fast it is learnt; `known` are those
-    of before."""
+def random_return(env_id: str) -> float:
+    """Return the mean return of random actions in the episodes of all scores."""
     played = STANDS_FOR.get(env_id, env_id)
-    random = known.get("random")
-    if random is None:
-        random = float(np.mean([one["return"] for one in score_vector("random", played, FINAL_SEEDS)]))
+    return float(np.mean([one["return"] for one in score_vector("random", played, FINAL_SEEDS)]))
+
+
+def returns_of(env_id: str, random: float) -> dict[str, Any]:
+    """Return the returns that the page of an id compares with, and how fast it is learnt; `random` is that of
+    random actions."""
+    played = STANDS_FOR.get(env_id, env_id)
     found = {"random": round(random, 4), **{k: round(v, 4) for k, v in stock_return(played).items()}}
     scored = shipped_returns(env_id.rpartition("/")[2])
     bar = max(scored[name] for name in UNLEARNT if name in scored)
@@ -131,13 +131,12 @@ def main(argv: list[str] | None = None) -> None:
 
     args = tyro.cli(Args, args=argv, prog="python -m agents.gallery", description=__doc__)
     path = args.out / RETURNS
-    known = json.loads(path.read_text(encoding="utf-8")) if path.is_file() and not args.again else {}
     returns = {}
     for folder in sorted(card.parent for card in args.out.glob("*/card.md")):
-        if (folder / FILM).is_file() and (args.again or not (folder / STILL).is_file()):
+        if (folder / FILM).is_file():
             write_still(folder)
         env_id = f"hoof_env/{folder.name}"
-        returns[env_id] = returns_of(env_id, known.get(env_id, {}))
+        returns[env_id] = returns_of(env_id, random_return(env_id))
         print(env_id, returns[env_id], flush=True)
     runs.write_text(path, json.dumps(returns, indent=1) + "\n")
     print("next: hoof-env manual --out docs/environments --films agents/policies")
