@@ -1,10 +1,6 @@
 """Training, evaluation and the demonstration, run from a checkout (`python -m agents.train`)."""
 
-import gc
 import os
-
-# Before torch is imported: its collections find nothing in modules, and took a fifth of the time of imports.
-gc.set_threshold(100_000, 20, 100)
 
 # Before torch is imported: one thread unless more are asked for, and threads that sleep while they wait. By
 # default they spin, which on cores that others use too takes ten times as long or more (docs/decisions.md).
