@@ -304,8 +304,8 @@ def check_wheels(setup, *options, stdin):
 
 @pytest.fixture(scope="module")
 def known():
-    """What the tests of this file have found out: pip's settings, for which it takes half a second, and that uv
-    has just fetched the lists of the index."""
+    """What the tests of this file have found out: pip's settings, for which it takes half a second, and that
+    uv has just fetched the lists of the index."""
     return {}
 
 
