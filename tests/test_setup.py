@@ -304,8 +304,8 @@ def check_wheels(setup, *options, stdin):
 
 @pytest.fixture(scope="module")
 def known():
-    """What the tests of this file have found out: pip's settings, for which it takes half a second, and that
-    uv has just fetched the lists of the index."""
+    """Facts for all tests of this file: "settings", what pip needs half a second to say, and "lists" once uv
+    has fetched those of the index."""
     return {}
 
 
