@@ -30,6 +30,7 @@ from stable_baselines3.common.vec_env import VecNormalize
 from torch import nn
 
 from agents.perceptrons import ACTIONS, ADVANTAGE, CHUNK, Floats, Weights, compiled_gradient
+from hoof_env._collector import paused
 from hoof_env.errors import ParameterError
 from hoof_env.simd.threads import check_threads, limit_threads, run_together
 
@@ -209,6 +210,7 @@ class FlatPPO(OnPolicyAlgorithm):
             self.scale.restart()
         return setup
 
+    @paused()
     def _load_kernels(self) -> None:
         """Have the kernels compiled, or loaded, before a training's clock starts; nothing is learned."""
         inputs = self.weights.actor.matrices[0].shape[1]

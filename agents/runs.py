@@ -30,6 +30,7 @@ import gymnasium as gym
 import numpy as np
 from numpy.typing import NDArray
 
+from hoof_env._collector import paused
 from hoof_env._output import check_folder, staged
 from hoof_env.envs.made import make_env as make_env
 from hoof_env.errors import OutputError
@@ -82,6 +83,7 @@ def alone(folder: Path) -> Iterator[None]:
         lock.release()
 
 
+@paused()
 def make_vec_env(env_id: str, n_envs: int, num_threads: int = 1, **kwargs: Any) -> Any:
     """Return environments side by side as Stable-Baselines3's `VecEnv`.
 

@@ -11,6 +11,7 @@ from typing import Any, Literal
 import numpy as np
 import yaml
 
+from hoof_env._collector import paused
 from hoof_env.errors import DataFileError
 from hoof_env.policies.saved import ALGORITHMS as ALGORITHMS
 from hoof_env.policies.saved import algorithm_class as library_class
@@ -22,7 +23,8 @@ def algorithm_class(name: str) -> Any:
     """Return the class of an algorithm: those of `saved.algorithm_class`, and `agents.ppo_flat`."""
     if name != "ppo_flat":
         return library_class(name)
-    from agents.ppo_flat import FlatPPO
+    with paused():
+        from agents.ppo_flat import FlatPPO
 
     return FlatPPO
 

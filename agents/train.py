@@ -127,7 +127,8 @@ def _train(
     if start:
         warn_of_bits(folder, earlier, record)
         record = {**earlier, "resumed": [*earlier.get("resumed", []), int(start.name)]}
-    import torch  # which takes seconds
+    algorithm_class(args.algo)  # imports its library, which takes seconds
+    import torch
 
     if args.device.startswith("cuda") and not torch.cuda.is_available():  # the library would take the CPU
         raise ParameterError(f"device: expected one that torch finds here, got {args.device!r}")

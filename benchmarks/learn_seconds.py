@@ -21,12 +21,15 @@ from pathlib import Path  # noqa: E402
 from typing import Any  # noqa: E402
 
 import numpy as np  # noqa: E402
+
+from agents.settings import FOLDER, algorithm_class, load_settings, model_arguments  # noqa: E402
+
+FlatPPO = algorithm_class("ppo_flat")  # imports torch as a training does
+
 from stable_baselines3.common.callbacks import BaseCallback  # noqa: E402
 from stable_baselines3.common.vec_env import VecMonitor  # noqa: E402
 
 from agents import runs  # noqa: E402
-from agents.ppo_flat import FlatPPO  # noqa: E402
-from agents.settings import FOLDER, load_settings, model_arguments  # noqa: E402
 from benchmarks.history import RESULTS, write  # noqa: E402
 from benchmarks.machine import machine, vector_bits  # noqa: E402
 from hoof_env._output import markdown_table  # noqa: E402

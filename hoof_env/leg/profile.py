@@ -148,7 +148,8 @@ class LegProfile:
         self.geometry = one_of("geometry", geometry, Geometry)
         finest = CELLS if geometry.full_turn else CELLS[-1:]  # a rocking crank: as near to its ends as can be
         for tried in finest if cells is None else (count("cells", cells, most=MOST_CELLS),):
-            self.cells, self.table = tried, _fit(geometry, tried)
+            self.cells = tried
+            self.table = _fit(geometry, tried)
             error = self._errors()
             while not geometry.full_turn and np.nanmax(error, initial=0.0) > DERIVATIVE_ERROR:
                 self.table[~(error <= DERIVATIVE_ERROR)] = np.nan

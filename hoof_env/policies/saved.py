@@ -23,6 +23,7 @@ from typing import Any
 
 import gymnasium as gym
 
+from hoof_env._collector import paused
 from hoof_env.errors import (
     DataFileError,
     MissingExtraError,
@@ -76,7 +77,8 @@ def algorithm_class(name: str) -> Any:
     """Return the class of an algorithm of `ALGORITHMS`; raise `ParameterError` if its library is missing."""
     module = ALGORITHMS[check_choice("algo", name, ALGORITHMS)]
     try:
-        return getattr(import_module(module), name.upper())
+        with paused():
+            return getattr(import_module(module), name.upper())
     except ModuleNotFoundError as error:
         raise ParameterError(
             f"algo {name}: expected {module} to be installed (pip install 'hoof-env[train]'): {error}"
@@ -159,8 +161,9 @@ class SavedModel:
         """
         check_record(self.path, self.record, env, env_id)
         try:
-            for library in ("stable_baselines3", "safetensors.torch"):
-                import_module(library)
+            with paused():
+                for library in ("stable_baselines3", "safetensors.torch"):
+                    import_module(library)
         except ModuleNotFoundError as error:
             raise MissingExtraError(
                 f'policy {self.path}: reading it needs pip install "hoof-env[train]" ({error})'

@@ -10,7 +10,6 @@ The files are pickles, which can run any code. They are read only if no other us
 
 from __future__ import annotations
 
-import gc
 import hashlib
 import os
 import pickle
@@ -20,15 +19,19 @@ import tempfile
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from functools import cache
+from importlib import import_module
 from pathlib import Path
 from typing import Any, ClassVar
 
 import numba.core.caching
 import numba.core.config
 from filelock import FileLock, Timeout
+from numba.core import entrypoints
 from numba.core.compiler_lock import global_compiler_lock
+from numba.core.runtime import rtsys
 from numba.core.utils import _dynamic_module
 
+from hoof_env._collector import paused
 from hoof_env.errors import OutputError
 from hoof_env.simd import trust
 
@@ -206,7 +209,9 @@ class KernelCache(_caching.FunctionCache):
         # pickles of functions without a module name this one, which numba does not add to `sys.modules`
         sys.modules.setdefault(_dynamic_module.__name__, _dynamic_module)
         try:
-            return super().load_overload(sig, target_context)
+            _define_symbols(target_context)
+            with self._guard_against_spurious_io_errors():
+                return self._load_overload(sig, target_context)
         except OutputError:
             raise
         except OSError:  # no such folder
@@ -265,17 +270,24 @@ def keep(dispatcher: Any, say: Callable[[str], None], identity: str = "") -> Non
         with global_compiler_lock:
             if files is None:
                 files = dispatcher._cache = KernelCache(dispatcher.py_func, say, identity)
-            collects = gc.isenabled()
-            # the collector would take a seventh of the time and find nothing
-            gc.disable()
             try:
-                return compile_now(signature)
+                with paused():
+                    return compile_now(signature)
             finally:
                 files.release()
-                if collects:
-                    gc.enable()
 
     dispatcher.compile = compile_once
+
+
+def _define_symbols(target_context: Any) -> None:
+    """Define all symbols that machine code may refer to.
+
+    numba would import, in half a second, all that it can compile, too (`refresh` of a target context); it does
+    before it compiles.
+    """
+    rtsys.initialize(target_context)
+    import_module("numba.cpython.hashing")
+    entrypoints.init_all()  # other packages' extensions of numba
 
 
 def _no_folder(folder: str, error: Exception) -> OutputError:
