@@ -35,7 +35,8 @@ from hoof_env.errors import DataFileError
 from hoof_env.evaluation.episodes import FINAL_SEEDS, make_rows, play_rows
 from hoof_env.evaluation.statistics import iqm
 from hoof_env.gait import GaitParameters
-from hoof_env.leg.geometry import DEFAULT_PRESET, Geometry, load_geometry
+from hoof_env.leg.geometry import Geometry, load_geometry
+from hoof_env.leg.presets import DEFAULT_PRESET
 
 COMPARED = (DEFAULT_PRESET, *LEGS)
 

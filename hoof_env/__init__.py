@@ -42,7 +42,7 @@ if TYPE_CHECKING:
     from hoof_env.ground.terrain import Terrain as Terrain
     from hoof_env.leg.geometry import Geometry as Geometry
     from hoof_env.leg.geometry import load_geometry as load_geometry
-    from hoof_env.leg.geometry import read_preset as read_preset
+    from hoof_env.leg.presets import read_preset as read_preset
     from hoof_env.policies.find import load_policy as load_policy
     from hoof_env.policies.onnx_file import stamp_onnx as stamp_onnx
     from hoof_env.tasks.horse_gaits import HorseGait as HorseGait
@@ -74,7 +74,8 @@ _MODULES = {
     "gait": "GaitParameters HarmonicGait load_gait",
     "ground.contact": "Ground",
     "ground.terrain": "Terrain",
-    "leg.geometry": "Geometry load_geometry read_preset",
+    "leg.geometry": "Geometry load_geometry",
+    "leg.presets": "read_preset",
 }
 _PUBLIC = {name: f"hoof_env.{module}" for module, names in _MODULES.items() for name in names.split()}
 

@@ -192,7 +192,8 @@ def mjcf(
     from hoof_env.dynamics.parts import Motor, Trunk
     from hoof_env.ground.contact import load_ground
     from hoof_env.leg.checks import checked_path
-    from hoof_env.leg.geometry import DEFAULT_PRESET, load_geometry
+    from hoof_env.leg.geometry import load_geometry
+    from hoof_env.leg.presets import DEFAULT_PRESET
 
     made = check_new(out, overwrite)
     checked_path(out, ".xml")

@@ -14,15 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hoof_env.errors import ParameterError, check_choice, check_number
-from hoof_env.leg.geometry import (
-    DEFAULT_PRESET,
-    Geometry,
-    Preset,
-    load_geometry,
-    preset_error_type,
-    preset_label,
-    read_preset,
-)
+from hoof_env.leg.geometry import Geometry, load_geometry
+from hoof_env.leg.presets import DEFAULT_PRESET, Preset, preset_error_type, preset_label, read_preset
 from hoof_env.simd.compile import kernel
 from hoof_env.simd.math import clip
 

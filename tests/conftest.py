@@ -17,6 +17,10 @@ from filelock import FileLock
 import hoof_env
 from hoof_env.simd.compile import QUIET
 
+# Until all tests are collected: what is imported for them stays, and the collector would go through it again
+# and again.
+gc.disable()
+
 os.environ.setdefault(QUIET, "1")
 os.environ["SDL_VIDEODRIVER"] = "dummy"
 for library in ("OMP", "OPENBLAS", "MKL"):
@@ -126,9 +130,9 @@ def pytest_collection_modifyitems(items):
 
 
 def pytest_collection_finish():
-    """Keep what was collected and imported out of the garbage collector's way: it would go through it again
-    and again and find nothing."""
+    """Let the garbage collector begin, and leave out what was collected and imported."""
     gc.freeze()
+    gc.enable()
 
 
 def pytest_terminal_summary(terminalreporter):

@@ -16,7 +16,7 @@ from hoof_env.dynamics.names import NamedColumns
 from hoof_env.dynamics.parts import broken
 from hoof_env.errors import NotStartedError, ParameterError, count
 from hoof_env.simd.threads import run_together
-from hoof_env.simd.user_functions import what_cannot_be_compiled
+from hoof_env.simd.user_functions import NotCompiledError, what_cannot_be_compiled
 
 MOST_STEPS = 10**12
 """Largest number of substeps of a call: they are counted in 64 bits."""
@@ -156,7 +156,7 @@ class EngineMotion(EngineMemory):
             common = (*self.arrays, self.substep, substeps, account)
             calls = [(*common, block.start, block.stop) for block in self.blocks]
             run_together(self._run, calls, self.num_threads)
-        except NumbaError as error:
+        except (NumbaError, NotCompiledError) as error:
             if self.contact_law is None:
                 raise
             raise ParameterError(f"contact_law: {what_cannot_be_compiled(error)}") from error

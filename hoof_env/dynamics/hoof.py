@@ -10,7 +10,7 @@ from hoof_env.ground.terrain import surface
 from hoof_env.simd import absolute, any_lane, cross, dot, full_like, maximum, perpendicular, vector, where
 from hoof_env.simd.compile import inline_llvm
 from hoof_env.simd.math import clip, root_power
-from hoof_env.simd.user_functions import function_name, number_of
+from hoof_env.simd.user_functions import function_name, inline_foreign, number_of
 
 
 @inline_llvm
@@ -247,7 +247,7 @@ def law_of(contact_law: Callable[..., Any] | None) -> Any:
     """
     if contact_law is None:
         return contact_force
-    force = inline_llvm(contact_law)
+    force = inline_foreign(contact_law)
     number = number_of(f"the contact law {function_name(contact_law)}")
 
     @inline_llvm

@@ -11,7 +11,7 @@ from hoof_env.simd import full_like, read, rows, write
 from hoof_env.simd.compile import inline_llvm, inline_source
 from hoof_env.simd.math import clip
 from hoof_env.simd.memory import singles_at
-from hoof_env.simd.user_functions import number_of, numbers_of
+from hoof_env.simd.user_functions import inline_foreign, number_of, numbers_of
 from hoof_env.tasks.body import BodyKernels
 from hoof_env.tasks.episode import ACTIONS, Memories
 from hoof_env.tasks.own_parts import ActionMap
@@ -60,7 +60,7 @@ def converter(action_map: ActionMap | None, layouts: Memories, body: BodyKernels
             """Do nothing: `mapped` is `acted`."""
 
         return nothing
-    compute = inline_llvm(action_map.compute)
+    compute = inline_foreign(action_map.compute)
     given = len(action_map.names)
     of_body = body.legs * ACTIONS
     all_of = numbers_of(action_map.title, of_body)

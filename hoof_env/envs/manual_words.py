@@ -14,7 +14,7 @@ from hoof_env.envs.batch_reports import SUMMARY
 from hoof_env.eq8.integrators import INTEGRATORS
 from hoof_env.gait import WIDEST, FilterSettings
 from hoof_env.ground.laws import FRICTION_LAWS, NORMAL_LAWS
-from hoof_env.leg.geometry import preset_names, presets_of_paper
+from hoof_env.leg.presets import preset_names, presets_of_paper
 from hoof_env.tasks import horse, leg_starts
 from hoof_env.tasks.body_settings import About
 from hoof_env.tasks.horse_gaits import FASTEST, FOLLOWED, SIZES, horse_gaits

@@ -21,7 +21,7 @@ from hoof_env.simd.memory import address, doubles, matrix_at, offset, record_at,
 from hoof_env.simd.noise import uniform
 from hoof_env.simd.reach import fingerprint
 from hoof_env.simd.unrolled import Traced, call, unrolled, when
-from hoof_env.simd.user_functions import number_of
+from hoof_env.simd.user_functions import inline_foreign, number_of
 from hoof_env.tasks.body import BodyKernels
 from hoof_env.tasks.episode import Memories, memories_of, task_type
 from hoof_env.tasks.observation import Entry, ObservationInputs
@@ -98,10 +98,10 @@ def _put_foreign(
 ) -> Callable[..., Any]:
     """Return the same for an entry from outside this package, with checks that its functions return numbers;
     lane by lane if they take no lanes."""
-    measure = inline_llvm(entry.measure)
+    measure = inline_foreign(entry.measure)
     given = constants_reader(tuple(constants.index(one.name) for one in entry.constants))
     apply = entry.scale.apply
-    scale = inline_llvm(apply) if scaled and apply is not None else inline_llvm(lambda x, scene: x)
+    scale = inline_foreign(apply) if scaled and apply is not None else inline_llvm(lambda x, scene: x)
     number = number_of(entry.title)
     scaled_number = number_of(f"the scale of {entry.title}")
 

@@ -14,7 +14,7 @@ from hoof_env.simd import columns, where
 from hoof_env.simd.compile import inline_llvm
 from hoof_env.simd.memory import COLUMNS, doubles_at
 from hoof_env.simd.unrolled import Traced, call, unrolled
-from hoof_env.simd.user_functions import number_of
+from hoof_env.simd.user_functions import inline_foreign, number_of
 from hoof_env.tasks.episode import Memories
 from hoof_env.tasks.reward import Term
 
@@ -110,7 +110,7 @@ def _keepers(layouts: Memories) -> tuple[Callable[..., Any], Callable[..., Any]]
 def _foreign_term(term: Term, k: int, layouts: Memories, constants: tuple[str, ...]) -> Callable[..., Any]:
     """Return the same for a term from outside this package, which may have constants and keep rows, with a
     check that its function returns a number; lane by lane if it takes no lanes."""
-    compute = inline_llvm(term.compute)
+    compute = inline_foreign(term.compute)
     number = number_of(term.title)
     given = constants_reader(tuple(constants.index(one.name) for one in term.constants))
     keep, put_back = _keepers(layouts) if term.keeps else (_do_nothing, _do_nothing)

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from hoof_env.errors import ParameterError, check_choice, check_number
 from hoof_env.ground.laws import FRICTION_LAWS, NORMAL_LAWS, damping, friction_part, normal_force
-from hoof_env.leg.geometry import DEFAULT_PRESET, Preset, preset_error_type, preset_label, read_preset
+from hoof_env.leg.presets import DEFAULT_PRESET, Preset, preset_error_type, preset_label, read_preset
 from hoof_env.simd.compile import kernel
 from hoof_env.simd.math import EXPONENT_UNIT
 

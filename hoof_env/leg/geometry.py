@@ -9,7 +9,6 @@ from __future__ import annotations
 import json
 from collections.abc import Mapping
 from dataclasses import MISSING, dataclass, field, fields, replace
-from importlib import resources
 from pathlib import Path
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
@@ -18,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hoof_env._output import staged
-from hoof_env.errors import DataFileError, ParameterError, check_choice, check_number, flag
+from hoof_env.errors import ParameterError, check_choice, check_number, flag
 from hoof_env.leg.checks import (
     check_feet,
     check_keys,
@@ -37,19 +36,11 @@ from hoof_env.leg.checks import (
 from hoof_env.leg.mechanism import Mechanism
 from hoof_env.leg.mechanism_list import PAPER
 from hoof_env.leg.mobility import check_motion
+from hoof_env.leg.presets import DEFAULT_PRESET, Preset, preset_error_type, preset_label, read_preset
 
 if TYPE_CHECKING:
     from hoof_env.leg.kinematics import Pose
     from hoof_env.leg.mjcf import GroundLike, MotorLike, TrunkLike
-
-DEFAULT_PRESET = "identified"
-"""The leg of the paper's reproduction."""
-
-Preset = str | Path | Mapping[str, Any]
-"""Preset of a leg: its name, the path of a file, or the content of such a file."""
-
-PARTS = ("provenance", "units", "geometry", "ground", "gaits", "gait_provenance")
-"""Parts of a preset; docs/own_task.md describes each."""
 
 LINEAR_DENSITY = 1.0
 """Default mass per length of a link [kg/m]. The paper prints no masses. One kilogram a metre gives the
@@ -370,54 +361,6 @@ def _check_entries(data: Any) -> None:
         [name for name, has in has_default.items() if has is kind] for kind in (False, True)
     )
     check_keys("geometry", data, required, optional)
-
-
-def preset_names() -> list[str]:
-    """Names accepted by `load_geometry`."""
-    files = resources.files("hoof_env").joinpath("data").iterdir()
-    return sorted(f.name.removesuffix(".json") for f in files if f.name.endswith(".json"))
-
-
-def presets_of_paper() -> list[str]:
-    """Return the names of the presets with the paper's mechanism, read without solving their legs."""
-    return [name for name in preset_names() if "mechanism" not in read_preset(name)["geometry"]]
-
-
-def preset_label(preset: Preset) -> str:
-    """Return the name of a preset in an error."""
-    return "preset" if isinstance(preset, Mapping) else f"preset {preset}"
-
-
-def preset_error_type(preset: Preset) -> type[ParameterError] | type[DataFileError]:
-    """Return the type of an error in a preset: of an argument, or of a file."""
-    return ParameterError if isinstance(preset, Mapping) else DataFileError
-
-
-def read_preset(source: Preset) -> dict[str, Any]:
-    """The content of a preset by name, or of a file by path (ends in .json); content comes back as it is."""
-    data = source if isinstance(source, Mapping) else _read_file(source)
-    if unknown := sorted(str(name) for name in data if name not in PARTS):
-        said = f"unknown entries {', '.join(unknown)}; expected some of {', '.join(PARTS)}"
-        raise preset_error_type(source)(f"{preset_label(source)}: {said}")
-    return dict(data)
-
-
-def _read_file(source: str | Path) -> dict[str, Any]:
-    if isinstance(source, Path) or str(source).endswith(".json"):
-        path: Any = Path(source)
-    else:
-        check_choice("preset", source, preset_names())
-        path = resources.files("hoof_env").joinpath("data", f"{source}.json")
-    try:
-        data = json.loads(path.read_text(encoding="utf-8"))
-    except OSError as error:
-        raise DataFileError(f"cannot read {path}: {error.strerror or error}") from None
-    except (ValueError, RecursionError) as error:
-        raise DataFileError(f"{path}: expected a JSON preset file, but it does not parse: {error}") from None
-    if not isinstance(data, dict):
-        got = type(data).__name__
-        raise DataFileError(f"{path}: expected a JSON object with 'geometry' and 'gaits', got {got}")
-    return data
 
 
 def load_geometry(source: Preset = DEFAULT_PRESET) -> Geometry:

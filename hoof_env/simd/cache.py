@@ -25,10 +25,10 @@ from typing import Any, ClassVar
 
 import numba.core.caching
 import numba.core.config
+import numba.core.runtime
 from filelock import FileLock, Timeout
 from numba.core import entrypoints
 from numba.core.compiler_lock import global_compiler_lock
-from numba.core.runtime import rtsys
 from numba.core.utils import _dynamic_module
 
 from hoof_env._collector import paused
@@ -55,6 +55,7 @@ environment that needs it, too."""
 
 _caching: Any = numba.core.caching
 _config: Any = numba.core.config
+_runtime: Any = numba.core.runtime
 _Given: Any = getattr(_caching, "UserProvidedCacheLocator", None) or _caching._UserProvidedCacheLocator
 
 
@@ -282,10 +283,10 @@ def keep(dispatcher: Any, say: Callable[[str], None], identity: str = "") -> Non
 def _define_symbols(target_context: Any) -> None:
     """Define all symbols that machine code may refer to.
 
-    numba would import, in half a second, all that it can compile, too (`refresh` of a target context); it does
-    before it compiles.
+    Before numba loads it refreshes its target context, which in half a second imports all that it can
+    compile; it does so before it compiles, too.
     """
-    rtsys.initialize(target_context)
+    _runtime.rtsys.initialize(target_context)
     import_module("numba.cpython.hashing")
     entrypoints.init_all()  # other packages' extensions of numba
 

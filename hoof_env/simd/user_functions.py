@@ -13,12 +13,39 @@ from types import FunctionType, MappingProxyType
 from typing import Any
 
 from numba.core import types
-from numba.core.errors import TypingError
+from numba.core.errors import ForceLiteralArg, NumbaError
 
 from hoof_env.errors import ParameterError
+from hoof_env.simd.compile import inline_llvm
 from hoof_env.simd.types import Mask, Plane, instruction, is_real
 
 PACKAGE = Path(__file__).parents[1]
+
+
+class NotCompiledError(Exception):
+    """Reason why a function from outside this package cannot be part of a kernel.
+
+    numba passes it on at once. After an error of its own it goes on, and compiles the functions that failed
+    again, which for functions in functions takes many times as long.
+    """
+
+
+def inline_foreign(function: Callable[..., Any]) -> Any:
+    """Return a function from outside this package as `inline_llvm` does, with `NotCompiledError` where numba
+    cannot compile it."""
+    compiled: Any = inline_llvm(function)
+    compile_now = compiled.compile
+
+    def compile_once(signature: Any) -> Any:
+        try:
+            return compile_now(signature)
+        except ForceLiteralArg:  # a request to compile it again for a constant
+            raise
+        except NumbaError as error:
+            raise NotCompiledError(str(error)) from error
+
+    compiled.compile = compile_once
+    return compiled
 
 
 def number_of(what: str) -> Any:
@@ -30,7 +57,7 @@ def number_of(what: str) -> Any:
         if not is_real(x):
             kinds = (name for kind, name in names.items() if isinstance(x, kind))
             given = "nothing in some cases" if isinstance(x, types.Optional) else next(kinds, str(x))
-            raise TypingError(f"{{{what} returns {given}; expected a number}}")
+            raise NotCompiledError(f"{what} returns {given}; expected a number")
         return x(x)
 
     return instruction(typed)(lambda code, x: x)
@@ -43,7 +70,7 @@ def numbers_of(what: str, count: int) -> Any:
     def typed(x: Any) -> Any:
         if not isinstance(x, types.BaseTuple) or len(x) != count:
             given = f"a tuple of {len(x)}" if isinstance(x, types.BaseTuple) else str(x)
-            raise TypingError(f"{{{what} returns {given}; expected a tuple of {count} numbers}}")
+            raise NotCompiledError(f"{what} returns {given}; expected a tuple of {count} numbers")
         return x(x)
 
     return instruction(typed)(lambda code, x: x)
@@ -65,13 +92,12 @@ def what_cannot_be_compiled(error: Exception, moved: Mapping[str, str] = Mapping
     line.
 
     Args:
-        error: numba's.
+        error: numba's, or `NotCompiledError`.
         moved: present names of attributes that had other ones, or were elsewhere.
     """
     text = str(error)
-    # the message of `number_of` or `numbers_of`, which numba has put among its own
-    if refused := re.search(r"\{([^{}]* returns [^{}]*; expected a (?:number|tuple of \d+ numbers))\}", text):
-        return refused[1]
+    if isinstance(error, NotCompiledError) and error.__cause__ is None:  # of `number_of` or `numbers_of`
+        return text
     where = next((place for place in map(_place, re.findall(r'File "(.*?)", line (\d+)', text)) if place), "")
     return (
         f"cannot compile {_operation(text, moved)}{where}; expected + - * /, comparisons and the functions "

@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Annotated, Any, NamedTuple
 
-from hoof_env.leg.geometry import DEFAULT_PRESET, Preset
+from hoof_env.leg.presets import DEFAULT_PRESET, Preset
 
 Range = float | Sequence[float]
 """Lowest and highest value, or one number for both."""

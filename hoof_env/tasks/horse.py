@@ -30,9 +30,10 @@ from hoof_env.errors import ParameterError, check_choice, check_number, count
 from hoof_env.gait import PARAMETERS, QUICK, WIDEST, FilterSettings
 from hoof_env.ground.contact import Ground
 from hoof_env.ground.terrain import Terrain
-from hoof_env.leg.geometry import Geometry, Preset, load_geometry, preset_label
+from hoof_env.leg.geometry import Geometry, load_geometry
 from hoof_env.leg.limb_masses import with_limb_masses
 from hoof_env.leg.mechanism_list import PAPER
+from hoof_env.leg.presets import Preset, preset_label
 from hoof_env.render.instant import Hips
 from hoof_env.render.picture import HorsePicture, Picture
 from hoof_env.simd.layout import Block

@@ -24,7 +24,8 @@ from hoof_env.gait import (
     speed_scale_of,
 )
 from hoof_env.ground.contact import Ground, load_ground
-from hoof_env.leg.geometry import load_geometry, preset_error_type, preset_label
+from hoof_env.leg.geometry import load_geometry
+from hoof_env.leg.presets import preset_error_type, preset_label
 from hoof_env.render.instant import ONE_HIP, Hips
 from hoof_env.render.picture import LegPicture, Picture
 from hoof_env.simd import maximum, minimum, read

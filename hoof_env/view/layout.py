@@ -12,7 +12,7 @@ from bokeh.models import ColumnDataSource, CustomJS
 from jinja2 import Environment, FileSystemLoader, Template
 from numpy.typing import NDArray
 
-from hoof_env.leg.geometry import preset_names
+from hoof_env.leg.presets import preset_names
 from hoof_env.records import default_policy
 from hoof_env.render.drawing import HEAD
 from hoof_env.render.instant import Columns

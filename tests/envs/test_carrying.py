@@ -9,7 +9,7 @@ from family import substeps
 from hoof_env.envs.horse_leg import HorseLegEnv
 from hoof_env.envs.policies import make_policy, policy_names
 from hoof_env.gait import gait_names, load_gait
-from hoof_env.leg.geometry import preset_names, read_preset
+from hoof_env.leg.presets import preset_names, read_preset
 
 FOUND = "carrying_walk"
 SETTLE, WINDOW = 10.0, 10.0

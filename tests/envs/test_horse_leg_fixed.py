@@ -15,7 +15,7 @@ from hoof_env.envs.policies import make_policy
 from hoof_env.errors import DataFileError, ParameterError
 from hoof_env.gait import PARAMETERS
 from hoof_env.ground.contact import Ground, load_ground
-from hoof_env.leg.geometry import preset_names, read_preset
+from hoof_env.leg.presets import preset_names, read_preset
 from hoof_env.records import record_episode
 from hoof_env.tasks.settings import Settings
 

@@ -17,7 +17,7 @@ from gymnasium.envs.registration import EnvSpec
 from hoof_env import Geometry, read_preset
 from hoof_env.gait import LIMITS
 from hoof_env.ground import contact as ground
-from hoof_env.leg.geometry import PARTS
+from hoof_env.leg.presets import PARTS
 from hoof_env.leg.profile import by_name, functions
 from tests.linkage import DYADS, LENGTHS
 

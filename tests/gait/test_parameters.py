@@ -18,7 +18,8 @@ from hoof_env.gait import (
     load_gait,
     paper_gaits,
 )
-from hoof_env.leg.geometry import load_geometry, read_preset
+from hoof_env.leg.geometry import load_geometry
+from hoof_env.leg.presets import read_preset
 from tests.legs import FIRST_FIT
 
 inside = st.tuples(*(st.floats(low, high) for low, high in LIMITS.values()))

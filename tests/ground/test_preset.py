@@ -5,7 +5,7 @@ import json
 import pytest
 
 from hoof_env.ground.contact import SETTINGS, Ground, load_ground
-from hoof_env.leg.geometry import preset_names, read_preset
+from hoof_env.leg.presets import preset_names, read_preset
 
 
 def with_ground(ground):

@@ -6,7 +6,8 @@ import numpy as np
 
 from hoof_env.gait import load_gait
 from hoof_env.ground.contact import Ground, load_ground
-from hoof_env.leg.geometry import Geometry, load_geometry, preset_names, read_preset
+from hoof_env.leg.geometry import Geometry, load_geometry
+from hoof_env.leg.presets import preset_names, read_preset
 
 LEG = load_geometry()
 

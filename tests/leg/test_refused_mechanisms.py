@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from hoof_env.errors import ParameterError
-from hoof_env.leg.geometry import read_preset
 from hoof_env.leg.mechanism_list import PAPER, read_mechanism
+from hoof_env.leg.presets import read_preset
 from tests.leg.mechanisms import EVERYTHING
 from tests.legs import FOUR_BAR
 

@@ -7,7 +7,8 @@ import pytest
 
 from hoof_env.errors import DataFileError, GeometryError, ParameterError
 from hoof_env.gait import load_gait
-from hoof_env.leg.geometry import load_geometry, read_preset
+from hoof_env.leg.geometry import load_geometry
+from hoof_env.leg.presets import read_preset
 
 CONTENT = read_preset("identified")
 BARE = {name: value for name, value in CONTENT["geometry"].items() if name != "pivot"}
