@@ -330,24 +330,25 @@ def store_trunk(trunk, account, memory, good, keeps_account, form):  # type: ign
 
 
 def advance_of(
-    lanes: int, lanes_are_legs: bool, reacts: bool, law: Any, form: EngineLayout, joints: Joints
+    legs: int, lanes: int, lanes_are_legs: bool, reacts: bool, law: Any, form: EngineLayout, joints: Joints
 ) -> Callable[..., None]:
-    """Return the body of a kernel: a function that advances environments `begin` to `end` by substeps of h
-    [s]; if their number is negative, environments with the result `RESET_REQUESTED` are started.
+    """Return the function of a kernel, which advances environments `begin` to `end` by substeps of h [s]; if
+    their number is negative, environments with the result `RESET_REQUESTED` are started.
 
     Args:
+        legs: number of legs, 0 for any.
         lanes: number of environments side by side or, if `lanes_are_legs`, of legs of one environment.
         reacts: false for a kernel without code for joint reactions.
         law, form: law of contact, see `hoof.law_of`, and layouts of the engine.
         joints: kernels of the legs' structure.
     """
 
-    @inline_source
-    def run(  # type: ignore[no-untyped-def]
-        data, model, tables, ground, constants, reactions, h, steps, keeps_account, begin, end, leg_count
+    def advance(  # type: ignore[no-untyped-def]
+        data, model, tables, ground, constants, reactions, h, steps, keeps_account, begin, end
     ):
+        leg_count = legs if legs else model[0].legs
         trunk = rows(doubles(form.trunk_size * lanes), lanes, form.trunk)
-        legs = rows(doubles(leg_count * form.leg_size * lanes), lanes, form.leg)
+        of_legs = rows(doubles(leg_count * form.leg_size * lanes), lanes, form.leg)
         account = rows(doubles(form.account_size * lanes), lanes, form.account)
         shapes = rows(doubles(leg_count * form.constants_size * lanes), lanes, form.constants)
         forces = rows(doubles(leg_count * form.reactions_size * lanes), lanes, form.reactions)
@@ -364,12 +365,12 @@ def advance_of(
             starts = before == RESET_REQUESTED
             if steps < 0 and not any_lane(starts):
                 continue
-            load(trunk, legs, leg_count, account, memory, at, n, row, far, lanes, form)
+            load(trunk, of_legs, leg_count, account, memory, at, n, row, far, lanes, form)
             if steps < 0:
-                start_motion(trunk, legs, leg_count, unpacked, starts)
+                start_motion(trunk, of_legs, leg_count, unpacked, starts)
             run_steps(
                 trunk,
-                legs,
+                of_legs,
                 leg_count,
                 unpacked,
                 account,
@@ -381,14 +382,14 @@ def advance_of(
                 reacts,
                 joints,
             )
-            result, good = judge(trunk, legs, leg_count, before, steps < 0, lanes_are_legs, form)
+            result, good = judge(trunk, of_legs, leg_count, before, steps < 0, lanes_are_legs, form)
             memory.result = result
             store_trunk(trunk, account, memory, good, keeps_account, form)
-            store_legs(trunk, legs, leg_count, good, at, n, row, far, lanes, form)
+            store_legs(trunk, of_legs, leg_count, good, at, n, row, far, lanes, form)
             if reacts:
                 store_reactions(forces, leg_count, reactions, n, row, lanes, lanes_are_legs, form)
 
-    return run
+    return advance
 
 
 KERNELS = {"leg": (1, 1, False), "four": (1, 4, True), "batch": (0, LANES, False)}
@@ -427,14 +428,7 @@ def _new_kernels(contact_law: Callable[..., Any] | None, features: Features, ide
         identity += f" {tuple(features)}"
 
     def new_kernel(name: str, legs: int, lanes: int, lanes_are_legs: bool, reacts: bool) -> Any:
-        run = advance_of(lanes, lanes_are_legs, reacts, law, form, joints)
-
-        def advance(  # type: ignore[no-untyped-def]
-            data, model, tables, ground, constants, reactions, h, steps, keeps_account, begin, end
-        ):
-            count = legs if legs else model[0].legs
-            run(data, model, tables, ground, constants, reactions, h, steps, keeps_account, begin, end, count)
-
+        advance = advance_of(legs, lanes, lanes_are_legs, reacts, law, form, joints)
         advance.__name__ = name
         return kernel(advance, f"{name} {identity}", threads=not lanes_are_legs and lanes > 1)
 

@@ -149,15 +149,10 @@ def _made(
     advance_one = getattr(advance, f"advance_{BY_LEGS.get(body.legs, 'batch')}")
     advance_batch = advance.advance_batch
     sizes = (room, scratch_size, count) = room_of(slots), *_sizes(body, action_map)
-    step = _step(task_record, sizes, layouts, body, parts)
+    step_one = _step("step_one", 1, advance_one, task_record, sizes, layouts, body, parts)
+    step_batch = _step("step_batch", LANES, advance_batch, task_record, sizes, layouts, body, parts)
     task_at = record_at(task_record)
     are_numbers = _are_numbers(count)
-
-    def step_one(addresses):  # type: ignore[no-untyped-def]
-        return step(addresses, 1, advance_one)
-
-    def step_batch(addresses):  # type: ignore[no-untyped-def]
-        return step(addresses, LANES, advance_batch)
 
     def apply_one(addresses):  # type: ignore[no-untyped-def]
         task = task_at(addresses[AT.task])[0]
@@ -180,7 +175,10 @@ def _made(
         return happened
 
     of_task = (step_one, step_batch, apply_one, finish_one)
-    kernels = {function.__name__: kernel(function, identity, function is step_batch) for function in of_task}
+    kernels = {
+        function.__name__: kernel(function, f"{function.__name__} {identity}", function is step_batch)
+        for function in of_task
+    }
     return StepKernels(observers=observers, **kernels)
 
 
@@ -297,14 +295,24 @@ def _keep_sums(layouts: Memories) -> Callable[..., Any]:
 
 
 def _step(
+    name: str,
+    lanes: int,
+    advance: Any,
     task_record: np.dtype[Any],
     sizes: tuple[int, int, int],
     layouts: Memories,
     body: BodyKernels,
     parts: tuple[Callable[..., Any], ...],
 ) -> Callable[..., Any]:
-    """Return a part of kernels that is a whole control step, made of `parts`: apply, finish and observe.
-    `sizes` are room for an observation, size of the scratch memory, and number of actions."""
+    """Return the function of a kernel that takes a whole control step.
+
+    Args:
+        name: of the function.
+        lanes, advance: number of environments side by side, and the kernel that advances them.
+        task_record, layouts, body: of the task.
+        sizes: room for an observation, size of the scratch memory, and number of actions.
+        parts: apply, finish and observe.
+    """
     (apply, finish, observe) = parts
     (room, scratch_size, actions_per_row) = sizes
     own_rows = layouts.own_rows
@@ -314,8 +322,7 @@ def _step(
     task_at = record_at(task_record)
     model_at = record_at(MODEL)
 
-    @inline_source
-    def step(addresses, lanes, advance):  # type: ignore[no-untyped-def]
+    def step(addresses):  # type: ignore[no-untyped-def]
         if not are_numbers(addresses):
             return NOT_A_NUMBER
         task = task_at(addresses[AT.task])[0]
@@ -354,4 +361,5 @@ def _step(
                     observe(addresses, lanes, task, n, memory, 0 if is_last else 1)
         return happened
 
+    step.__name__ = name
     return step
