@@ -32,6 +32,7 @@ if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
 
 LONGEST = (
     "envs/test_bits.py",
+    "test_packaging.py",
     "envs/test_own_task.py",
     "benchmarks/test_speed.py",
     "dynamics/test_mechanisms.py",
@@ -41,7 +42,6 @@ LONGEST = (
     "test_setup.py",
     "test_site.py",
     "envs/test_refused_tasks.py",
-    "test_packaging.py",
     "agents/test_soft_landing.py",
     "agents/test_demo.py",
     "view/test_tab.py",

@@ -5,6 +5,7 @@ import os
 import re
 import subprocess
 import sys
+import textwrap
 import tomllib
 import zipfile
 from pathlib import Path
@@ -112,24 +113,82 @@ def test_the_wheel_alone_lists_and_plays_what_ships(wheel, tmp_path):
     assert loaded == "[]"
 
 
-OWN_TASK = """\
-import gymnasium as gym, hoof_env
-term = hoof_env.Term("mine", 1.0, "-", "a test's", lambda step, weight: 3.0 * weight)
-hoof_env.register("own/Mine-v0", terms=[term])
-env = gym.make("own/Mine-v0")
-env.reset(seed=0)
-print(hoof_env.__file__)
-print(env.step([0.0] * 4)[4]["reward_mine"])
+USER = """
+    import math
+    import hoof_env
+    from hoof_env.simd.compile import inline_llvm
+
+    PAY = 1.0
+
+    @inline_llvm
+    def helper(x):
+        return 2.0 * x
+
+    def made(factor):
+        def mine(step, weight):
+            return factor * weight * PAY * helper(step.seconds)
+        return mine
+
+    for name, factor in (("A", 1.0), ("B", 10.0)):
+        term = hoof_env.Term("mine", 1.0, "-", "a test's", made(factor))
+        hoof_env.register(f"own/{name}-v0", terms=[term])
+"""
+
+CALL = """
+    import gc, sys
+    import hoof_env
+    from pathlib import Path
+    import gymnasium as gym, numpy as np
+    from hoof_env.simd.cache import COMPILED
+
+    def megabytes():
+        file = Path("/proc/self/smaps_rollup")
+        rows = dict(row.split(maxsplit=1) for row in file.read_text().splitlines()) if file.exists() else {}
+        return float(rows.get("Rss:", "0 kB").split()[0]) / 1e3
+
+    print(hoof_env.__file__)
+    for id in sys.argv[1:]:
+        before = megabytes()
+        env = gym.make(f"mine:own/{id}-v0")
+        env.reset(seed=0)
+        reward = env.step(np.zeros(4, np.float32))[4]["reward_mine"]
+        del env
+        gc.collect()
+        print(reward, "step_one" in COMPILED, megabytes() - before)
+        COMPILED.clear()
 """
 
 
-def test_a_task_of_ones_own_is_compiled_with_the_package_from_the_wheel(wheel, tmp_path):
-    """In another project's folder, with nothing that was compiled before."""
-    wheel.extractall(tmp_path / "site")
-    (tmp_path / "mine.py").write_text(OWN_TASK)
-    env = os.environ | {"PYTHONPATH": str(tmp_path / "site"), "NUMBA_CACHE_DIR": str(tmp_path / "cache")}
-    run = subprocess.run([sys.executable, "mine.py"], cwd=tmp_path, env=env, capture_output=True, text=True)
-    assert run.returncode == 0, run.stderr
-    package, paid = run.stdout.splitlines()
-    assert Path(package).is_relative_to(tmp_path / "site")
-    assert float(paid) == 3.0
+def test_an_edit_of_the_users_file_compiles_anew_and_nothing_else_does(wheel, tmp_path):
+    """In another project's folder, with the package from the wheel, and nothing compiled before. Two ids,
+    whose functions have one name, keep a kernel each, whichever has it after an edit. The second takes some
+    16 MB with what numba keeps of its kernel, and would take 42 MB were the observation compiled, too."""
+    site = tmp_path / "site"
+    wheel.extractall(site)
+
+    def rewards(*ids):
+        environment = {
+            **os.environ, "NUMBA_CACHE_DIR": str(tmp_path / "cache"), "PYTHONDONTWRITEBYTECODE": "1",
+            "PYTHONPATH": os.pathsep.join([str(tmp_path), str(site)]),
+        }  # fmt: skip
+        command = [sys.executable, "-c", textwrap.dedent(CALL), *ids]
+        done = subprocess.run(command, env=environment, cwd=tmp_path, capture_output=True, text=True)
+        assert done.returncode == 0, done.stderr
+        package, *lines = done.stdout.splitlines()
+        assert Path(package).is_relative_to(site)
+        rows = [line.split() for line in lines]
+        grown.append(float(rows[-1][2]))
+        return [(round(float(paid), 9), compiled == "True") for paid, compiled, _ in rows]
+
+    grown = []
+    (tmp_path / "mine.py").write_text(textwrap.dedent(USER))
+    assert rewards("A", "B") == [(0.04, True), (0.4, True)]
+    assert grown[0] < 25
+    assert rewards("A", "B") == [(0.04, False), (0.4, False)]
+    exchanged = USER.replace('("A", 1.0), ("B", 10.0)', '("A", 10.0), ("B", 1.0)')
+    assert exchanged != USER
+    (tmp_path / "mine.py").write_text(textwrap.dedent(exchanged))
+    assert rewards("A", "B") == [(0.4, False), (0.04, False)]
+    edited = USER.replace("PAY = 1.0", "PAY = 3.0").replace("2.0 * x", "5.0 * x")
+    (tmp_path / "mine.py").write_text(textwrap.dedent(edited))
+    assert rewards("A") == [(0.3, True)]

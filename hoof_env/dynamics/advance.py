@@ -339,8 +339,7 @@ def advance_of(
         legs: number of legs, 0 for any.
         lanes: number of environments side by side or, if `lanes_are_legs`, of legs of one environment.
         reacts: false for a kernel without code for joint reactions.
-        law, form: law of contact, see `hoof.law_of`, and layouts of the engine.
-        joints: kernels of the legs' structure.
+        law, form, joints: law of contact (`hoof.law_of`), engine's layouts, kernels of the legs' structure.
     """
 
     def advance(  # type: ignore[no-untyped-def]

@@ -197,18 +197,15 @@ def _made(
     observe = _observe(slots_of(entries)[1:], layouts, inputs_of, put_scaled)
     task_at = record_at(task_record)
 
-    @inline_source
-    def observe_all(addresses, lanes):  # type: ignore[no-untyped-def]
-        task = task_at(addresses[AT.task])[0]
-        memory = doubles(2 * room * lanes)
-        for n in range(addresses[BEGIN], addresses[END], lanes):
-            observe(addresses, lanes, task, n, memory, 0)
+    def observer(name: str, lanes: int) -> Callable[..., None]:
+        def observe_all(addresses):  # type: ignore[no-untyped-def]
+            task = task_at(addresses[AT.task])[0]
+            memory = doubles(2 * room * lanes)
+            for n in range(addresses[BEGIN], addresses[END], lanes):
+                observe(addresses, lanes, task, n, memory, 0)
 
-    def observe_one(addresses):  # type: ignore[no-untyped-def]
-        observe_all(addresses, 1)
-
-    def observe_batch(addresses):  # type: ignore[no-untyped-def]
-        observe_all(addresses, LANES)
+        observe_all.__name__ = name
+        return observe_all
 
     def measure_one(addresses, out):  # type: ignore[no-untyped-def]
         task = task_at(addresses[AT.task])[0]
@@ -220,8 +217,10 @@ def _made(
                 if column >= 0:
                     write(numbers[slot], address(out), column * out.shape[1] + n, 1)
 
-    functions = (observe_one, observe_batch, measure_one)
-    kernels = {function.__name__: kernel(function, identity) for function in functions}
+    functions = (observer("observe_one", 1), observer("observe_batch", LANES), measure_one)
+    kernels = {
+        function.__name__: kernel(function, f"{function.__name__} {identity}") for function in functions
+    }
     return Observers(observe=observe, **kernels)
 
 

@@ -294,6 +294,29 @@ def _keep_sums(layouts: Memories) -> Callable[..., Any]:
     return keep_sums
 
 
+def _advance_part(advance: Any, lanes: int) -> Callable[..., Any]:
+    """Return a part of kernels that calls the engine's kernel `advance` for one part of a step."""
+    model_at = record_at(MODEL)
+
+    @inline_source
+    def advance_part(addresses, task, part, n):  # type: ignore[no-untyped-def]
+        advance(
+            matrix_at(addresses, AT.data),
+            model_at(addresses[AT.model]),
+            matrix_at(addresses, AT.tables),
+            matrix_at(addresses, AT.ground),
+            matrix_at(addresses, AT.constants),
+            cube_at(addresses, AT.reactions),
+            task.h,
+            task.part_substeps[part],
+            False,
+            n,
+            n + lanes,
+        )
+
+    return advance_part
+
+
 def _step(
     name: str,
     lanes: int,
@@ -320,7 +343,7 @@ def _step(
     keep_sums = _keep_sums(layouts)
     are_numbers = _are_numbers(actions_per_row)
     task_at = record_at(task_record)
-    model_at = record_at(MODEL)
+    advance_part = _advance_part(advance, lanes)
 
     def step(addresses):  # type: ignore[no-untyped-def]
         if not are_numbers(addresses):
@@ -339,19 +362,7 @@ def _step(
             for part in range(task.parts):
                 if part == task.acting_part:
                     apply(addresses, lanes, task, n, scratch)
-                advance(
-                    matrix_at(addresses, AT.data),
-                    model_at(addresses[AT.model]),
-                    matrix_at(addresses, AT.tables),
-                    matrix_at(addresses, AT.ground),
-                    matrix_at(addresses, AT.constants),
-                    cube_at(addresses, AT.reactions),
-                    task.h,
-                    task.part_substeps[part],
-                    False,
-                    n,
-                    n + lanes,
-                )
+                advance_part(addresses, task, part, n)
                 if task.parts > 1:
                     keep_sums(addresses, lanes, n, kept, part == 0)
                 is_last = part == task.parts - 1

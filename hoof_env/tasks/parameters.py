@@ -4,7 +4,8 @@ parameters that are drawn for each episode."""
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any
+from functools import lru_cache
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -319,43 +320,73 @@ def make_terrain(description: Any) -> Terrain:
     return _hills({**HILLS, **rest})
 
 
+class _Hills(NamedTuple):
+    """What hills are drawn from; the keys of `HILLS`."""
+
+    seed: int
+    length: float
+    rise: float
+    slope: float
+    patch: float
+    roughness: float
+    begin: float
+    stiffness: tuple[float, float]
+    friction: tuple[float, float]
+
+
 def _hills(values: dict[str, Any]) -> Terrain:
     """Make hills from values for all keys of `HILLS`."""
+    bounds = {
+        "length": (10.0, 1e5),
+        "rise": (0.0, 10.0),
+        "slope": (1e-3, 1.0),
+        "patch": (0.2, 1e3),
+        "roughness": (0.0, 10.0),
+        "begin": (0.0, 100.0),
+    }
     seed = int(check_number("terrain['seed']", values["seed"], low=0, high=2**32))
-    length = check_number("terrain['length']", values["length"], low=10.0, high=1e5)
-    rise = check_number("terrain['rise']", values["rise"], low=0.0, high=10.0)
-    steepest = check_number("terrain['slope']", values["slope"], low=1e-3, high=1.0)
-    patch = check_number("terrain['patch']", values["patch"], low=0.2, high=1e3)
-    generator = np.random.default_rng(seed)
-    knots = round(length / SPACING) + 1
+    numbers: dict[str, Any] = {
+        name: check_number(f"terrain[{name!r}]", values[name], low=low, high=high)
+        for name, (low, high) in bounds.items()
+    }
+    ranges: dict[str, Any] = {
+        name: check_range(f"terrain[{name!r}]", values[name], 1e-3, 1e3, or_one=False)
+        for name in ("stiffness", "friction")
+    }
+    return _draw(_Hills(seed, **numbers, **ranges))
 
+
+@lru_cache(maxsize=16)
+def _draw(hills: _Hills) -> Terrain:
+    """Draw hills, once for all environments with the same."""
+    generator = np.random.default_rng(hills.seed)
+    knots = round(hills.length / SPACING) + 1
     height = 0.0
     row = np.zeros(knots)
     k = 1
     # The order of the draws is part of what a seed means.
     while k < knots:
-        target = generator.uniform(-rise, rise)
-        slope = generator.uniform(0.2, 1.0) * steepest
+        target = generator.uniform(-hills.rise, hills.rise)
+        slope = generator.uniform(0.2, 1.0) * hills.slope
         count = max(round(abs(target - height) / slope / SPACING), 1)
         row[k : k + count] = np.linspace(height, target, count + 1)[1:][: knots - k]
         height = target
         k = k + count
-    factors = {}
-    for name in ("stiffness", "friction"):
+    factors = []
+    for spread in (hills.stiffness, hills.friction):
         # Uniform in the logarithm: half as stiff is as likely as twice as stiff.
-        low, high = np.log(check_range(f"terrain[{name!r}]", values[name], 1e-3, 1e3, or_one=False))
+        low, high = np.log(spread)
         factor = np.empty(knots)
         k = 0
         while k < knots:
-            count = max(round(generator.exponential(patch) / SPACING), 5)
+            count = max(round(generator.exponential(hills.patch) / SPACING), 5)
             factor[k : k + count] = np.exp(generator.uniform(low, high))
             k += count
-        factors[name] = tuple(factor.tolist())
-    roughness = check_number("terrain['roughness']", values["roughness"], low=0.0, high=10.0)
-    begin = check_number("terrain['begin']", values["begin"], low=0.0, high=100.0)
-    if roughness:
+        factors.append(tuple(factor.tolist()))
+    if hills.roughness:
         each = round(BUMPS / SPACING)
-        bumps = roughness * generator.uniform(-1.0, 1.0, knots // each + 2)
+        bumps = hills.roughness * generator.uniform(-1.0, 1.0, knots // each + 2)
         row += np.interp(np.arange(knots), each * np.arange(len(bumps)), bumps)
-    row *= np.linspace(begin, 1.0, knots)
-    return Terrain(tuple(row.tolist()), factors["stiffness"], factors["friction"], 0.0, SPACING)
+    row *= np.linspace(hills.begin, 1.0, knots)
+    stiffness, friction = factors
+    return Terrain(tuple(row.tolist()), stiffness, friction, 0.0, SPACING)

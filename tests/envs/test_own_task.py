@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import re
 import subprocess
 import sys
@@ -28,7 +27,6 @@ from hoof_env.tasks import registry as tasks
 from hoof_env.tasks.episode import Episode
 from hoof_env.tasks.observation import ENTRIES, ObservationInputs
 from hoof_env.tasks.reward import TERMS, Outcome
-from tests.kernels import link_kernels
 
 PAGE = (Path(__file__).parents[2] / "docs" / "own_task.md").read_text(encoding="utf-8")
 PAGE = PAGE.split("## A leg of your own", 1)[0]  # tests/envs/test_own_leg.py has the rest
@@ -254,82 +252,6 @@ def test_what_a_function_encloses_is_in_the_fingerprint():
 
     values = (1.0, 2.0, 1, True, "a", np.zeros(2), np.ones(2), np.zeros(2, np.float32), made(1.0), (1.0, 2.0))
     assert len({fingerprint(made(value)) for value in values}) == len(values)
-
-
-USER = """
-    import math
-    import hoof_env
-    from hoof_env.simd.compile import inline_llvm
-
-    PAY = 1.0
-
-    @inline_llvm
-    def helper(x):
-        return 2.0 * x
-
-    def made(factor):
-        def mine(step, weight):
-            return factor * weight * PAY * helper(step.seconds)
-        return mine
-
-    for name, factor in (("A", 1.0), ("B", 10.0)):
-        term = hoof_env.Term("mine", 1.0, "-", "a test's", made(factor))
-        hoof_env.register(f"own/{name}-v0", terms=[term])
-"""
-
-CALL = """
-    import gc, sys
-    from pathlib import Path
-    import gymnasium as gym, numpy as np
-    from hoof_env.simd.cache import COMPILED
-
-    def megabytes():
-        file = Path("/proc/self/smaps_rollup")
-        rows = dict(row.split(maxsplit=1) for row in file.read_text().splitlines()) if file.exists() else {}
-        return float(rows.get("Rss:", "0 kB").split()[0]) / 1e3
-
-    for id in sys.argv[1:]:
-        before = megabytes()
-        env = gym.make(f"mine:own/{id}-v0")
-        env.reset(seed=0)
-        reward = env.step(np.zeros(4, np.float32))[4]["reward_mine"]
-        del env
-        gc.collect()
-        print(reward, "step_one" in COMPILED, megabytes() - before)
-        COMPILED.clear()
-"""
-
-
-def test_an_edit_of_the_users_file_compiles_anew_and_nothing_else_does(tmp_path):
-    """Two ids, whose functions have one name, keep a kernel each, whichever has it after an edit. The second
-    takes some 16 MB with what numba keeps of its kernel, and would take 42 MB were the observation compiled
-    anew, too."""
-
-    def rewards(*ids):
-        environment = {
-            **os.environ, "NUMBA_CACHE_DIR": str(tmp_path / "cache"), "PYTHONDONTWRITEBYTECODE": "1",
-            "PYTHONPATH": os.pathsep.join([str(tmp_path), str(Path(hoof_env.__file__).parents[1])]),
-        }  # fmt: skip
-        command = [sys.executable, "-c", textwrap.dedent(CALL), *ids]
-        done = subprocess.run(command, env=environment, cwd=tmp_path, capture_output=True, text=True)
-        assert done.returncode == 0, done.stderr
-        rows = [line.split() for line in done.stdout.splitlines()]
-        grown.append(float(rows[-1][2]))
-        return [(round(float(paid), 9), compiled == "True") for paid, compiled, _ in rows]
-
-    grown = []
-    link_kernels(tmp_path / "cache")
-    (tmp_path / "mine.py").write_text(textwrap.dedent(USER))
-    assert rewards("A", "B") == [(0.04, True), (0.4, True)]
-    assert grown[0] < 25
-    assert rewards("A", "B") == [(0.04, False), (0.4, False)]
-    exchanged = USER.replace('("A", 1.0), ("B", 10.0)', '("A", 10.0), ("B", 1.0)')
-    assert exchanged != USER
-    (tmp_path / "mine.py").write_text(textwrap.dedent(exchanged))
-    assert rewards("A", "B") == [(0.4, False), (0.04, False)]
-    edited = USER.replace("PAY = 1.0", "PAY = 3.0").replace("2.0 * x", "5.0 * x")
-    (tmp_path / "mine.py").write_text(textwrap.dedent(edited))
-    assert rewards("A") == [(0.3, True)]
 
 
 # The page
