@@ -321,7 +321,7 @@ def make_terrain(description: Any) -> Terrain:
 
 
 class _Hills(NamedTuple):
-    """What hills are drawn from; the keys of `HILLS`."""
+    """Numbers from which hills are drawn, the keys of `HILLS`."""
 
     seed: int
     length: float
