@@ -93,6 +93,33 @@ def test_an_edit_beside_a_kernel_recompiles_it_and_another_does_not(start, tmp_p
     assert ended(start(code, PYTHONPATH=f"{ROOT}{os.pathsep}{folder}"))[0] == "30.0 []"
 
 
+def test_a_stored_kernel_is_loaded_without_what_only_compiling_needs(start_anew, tmp_path):
+    """Its machine code refers to numba's runtime, for the array, and to the secret of Python's hashes."""
+    (tmp_path / "hashed.py").write_text(
+        textwrap.dedent("""
+            import numpy as np
+            from hoof_env.simd.compile import kernel
+
+            @kernel
+            def total(x, word):
+                numbers = np.empty(3)
+                numbers[0] = x
+                return numbers[0] + hash(word) % 1000
+        """)
+    )
+    code = """
+        import sys
+        import hashed
+        from hoof_env.simd.cache import COMPILED
+        # A text of its own, of which Python has no hash yet
+        found = hashed.total(2.0, "".join(["fore", "leg"]))
+        print(found == 2.0 + hash("foreleg") % 1000, "numba.np.linalg" in sys.modules, COMPILED)
+    """
+    path = f"{ROOT}{os.pathsep}{tmp_path}"
+    assert ended(start_anew(code, PYTHONPATH=path))[0] == "True True ['total']"
+    assert ended(start_anew(code, PYTHONPATH=path))[0] == "True False []"
+
+
 def test_who_waits_too_long_compiles_too(start, tmp_path):
     impatient = "from hoof_env.simd import cache; cache.LONGEST_WAIT = 0.2;" + CALL
     first, second = holder_and_waiter(start, tmp_path, impatient)
