@@ -15,11 +15,8 @@ import pytest
 from filelock import FileLock
 
 import hoof_env
+from hoof_env._collector import paused
 from hoof_env.simd.compile import QUIET
-
-# Until all tests are collected: what is imported for them stays, and the collector would go through it again
-# and again.
-gc.disable()
 
 os.environ.setdefault(QUIET, "1")
 os.environ["SDL_VIDEODRIVER"] = "dummy"
@@ -129,10 +126,14 @@ def pytest_collection_modifyitems(items):
     items.sort(key=lambda item: places.get(item.path, len(places)))
 
 
-def pytest_collection_finish():
-    """Let the garbage collector begin, and leave out what was collected and imported."""
+@pytest.hookimpl(wrapper=True)
+def pytest_collection():
+    """Keep what is collected and imported out of the garbage collector's way: it would go through it again
+    and again and find nothing."""
+    with paused():
+        found = yield
     gc.freeze()
-    gc.enable()
+    return found
 
 
 def pytest_terminal_summary(terminalreporter):

@@ -429,7 +429,7 @@ def _new_kernels(contact_law: Callable[..., Any] | None, features: Features, ide
     def new_kernel(name: str, legs: int, lanes: int, lanes_are_legs: bool, reacts: bool) -> Any:
         advance = advance_of(legs, lanes, lanes_are_legs, reacts, law, form, joints)
         advance.__name__ = name
-        return kernel(advance, f"{name} {identity}", threads=not lanes_are_legs and lanes > 1)
+        return kernel(advance, identity, threads=not lanes_are_legs and lanes > 1)
 
     kernels = {}
     for does in ("advance", "react"):

@@ -14,9 +14,9 @@ from hoof_env.dynamics.engine_memory import EngineMemory
 from hoof_env.dynamics.limits import CHECK_EVERY
 from hoof_env.dynamics.names import NamedColumns
 from hoof_env.dynamics.parts import broken
-from hoof_env.errors import NotStartedError, ParameterError, count
+from hoof_env.errors import NotStartedError, count
 from hoof_env.simd.threads import run_together
-from hoof_env.simd.user_functions import NotCompiledError, what_cannot_be_compiled
+from hoof_env.simd.user_functions import NotCompiledError, compilation_error
 
 MOST_STEPS = 10**12
 """Largest number of substeps of a call: they are counted in 64 bits."""
@@ -159,4 +159,4 @@ class EngineMotion(EngineMemory):
         except (NumbaError, NotCompiledError) as error:
             if self.contact_law is None:
                 raise
-            raise ParameterError(f"contact_law: {what_cannot_be_compiled(error)}") from error
+            raise compilation_error("contact_law", error) from error

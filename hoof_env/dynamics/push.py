@@ -79,4 +79,4 @@ def _new_kernel(features: Features) -> Any:
                 memory = leg_memory_of(at, i, n, row, 1, 1, form)
                 memory.state.crank_angle_rate = block_at(legs, i).state.crank_angle_rate
 
-    return kernel(push, f"push {tuple(features)}")
+    return kernel(push, f"{tuple(features)}")

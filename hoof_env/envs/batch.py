@@ -40,7 +40,7 @@ from hoof_env.envs.outcome import MOVED
 from hoof_env.envs.step import NOT_A_NUMBER, SOME_ENDED, SOME_PUSHED, SOME_SWITCHED
 from hoof_env.errors import ParameterError, check_number
 from hoof_env.simd.threads import run_together
-from hoof_env.simd.user_functions import NotCompiledError, what_cannot_be_compiled
+from hoof_env.simd.user_functions import NotCompiledError, compilation_error
 from hoof_env.tasks.delays import Delay
 from hoof_env.tasks.disturbances import Push
 from hoof_env.tasks.episode import episode_layout
@@ -155,7 +155,7 @@ class EpisodeBatch(BatchKernels, BatchChanges):
         try:
             self._compile()
         except (NumbaError, NotCompiledError) as error:
-            raise ParameterError(f"{task.id}: {what_cannot_be_compiled(error, MOVED)}") from error
+            raise compilation_error(task.id, error, MOVED) from error
 
     def _check_settings(self) -> None:
         """Check the settings, and set the attributes that follow from them."""

@@ -218,9 +218,7 @@ def _made(
                     write(numbers[slot], address(out), column * out.shape[1] + n, 1)
 
     functions = (observer("observe_one", 1), observer("observe_batch", LANES), measure_one)
-    kernels = {
-        function.__name__: kernel(function, f"{function.__name__} {identity}") for function in functions
-    }
+    kernels = {function.__name__: kernel(function, identity) for function in functions}
     return Observers(observe=observe, **kernels)
 
 

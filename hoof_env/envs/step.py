@@ -138,7 +138,7 @@ def _made(
     slots = slots_of(entries)[2]
     task_record = task_type(len(terms), slots, layouts.gait, (*body.task_fields, *own.fields))
     functions = _functions(terms, entries, contact_law, action_map)
-    # All that the compiled code depends on: the name under which it is in numba's cache on disk.
+    # All that the compiled code depends on: with the kernel's name that under which it is on disk.
     identity = fingerprint(*functions, _flags(terms, entries), layouts.episode.names, (FAILED, TRUNCATED))
     identity += f" {tuple(features)} {body.legs} legs, {task_record.descr}{_declared(own, action_map)}"
     observers = observers_of(entries, len(terms), features, body, own)
@@ -175,10 +175,7 @@ def _made(
         return happened
 
     of_task = (step_one, step_batch, apply_one, finish_one)
-    kernels = {
-        function.__name__: kernel(function, f"{function.__name__} {identity}", function is step_batch)
-        for function in of_task
-    }
+    kernels = {function.__name__: kernel(function, identity, function is step_batch) for function in of_task}
     return StepKernels(observers=observers, **kernels)
 
 
@@ -330,9 +327,9 @@ def _step(
     """Return the function of a kernel that takes a whole control step.
 
     Args:
-        name: of the function.
+        name: name of the function.
         lanes, advance: number of environments side by side, and the kernel that advances them.
-        task_record, layouts, body: of the task.
+        task_record, layouts, body: parts of the task.
         sizes: room for an observation, size of the scratch memory, and number of actions.
         parts: apply, finish and observe.
     """

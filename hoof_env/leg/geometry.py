@@ -1,7 +1,6 @@
 """Geometry of a leg: its lengths, pivot, assembly, masses and how it stands in the world.
 
-A `Geometry` is a frozen value; building one checks it. Presets are JSON files with a provenance line. The one
-in `hoof_env/data`, `identified`, is *identified* from the paper's results, for the paper prints no lengths.
+A `Geometry` is a frozen value; building one checks it. `leg.presets` reads its files.
 """
 
 from __future__ import annotations

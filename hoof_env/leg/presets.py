@@ -1,4 +1,8 @@
-"""Files of legs: presets of this package, by name, and others of the same form."""
+"""Files of legs: presets of this package, by name, and others of the same form.
+
+Presets are JSON files with a provenance line. The default one is *identified* from the paper's results, for
+the paper prints no lengths.
+"""
 
 from __future__ import annotations
 
@@ -22,16 +26,21 @@ PARTS = ("provenance", "units", "geometry", "ground", "gaits", "gait_provenance"
 
 
 def preset_names() -> list[str]:
-    """Names accepted by `load_geometry`."""
-    return sorted(_shipped())
+    """Return the names accepted by `load_geometry`."""
+    return list(_shipped())
 
 
 @cache
-def _shipped() -> dict[str, str]:
-    """Return the texts of the presets of this package by name."""
+def _shipped() -> tuple[str, ...]:
+    """List the presets of this package, once, in alphabetic order."""
     files = resources.files("hoof_env").joinpath("data").iterdir()
-    texts = (file for file in files if file.name.endswith(".json"))
-    return {file.name.removesuffix(".json"): file.read_text(encoding="utf-8") for file in texts}
+    return tuple(sorted(f.name.removesuffix(".json") for f in files if f.name.endswith(".json")))
+
+
+@cache
+def _shipped_text(name: str) -> str:
+    """Read a preset of this package, once."""
+    return resources.files("hoof_env").joinpath("data", f"{name}.json").read_text(encoding="utf-8")
 
 
 def presets_of_paper() -> list[str]:
@@ -50,7 +59,8 @@ def preset_error_type(preset: Preset) -> type[ParameterError] | type[DataFileErr
 
 
 def read_preset(source: Preset) -> dict[str, Any]:
-    """The content of a preset by name, or of a file by path (ends in .json); content comes back as it is."""
+    """Return the content of a preset by name, or of a file by path (ends in .json); content comes back as it
+    is."""
     data = source if isinstance(source, Mapping) else _read_file(source)
     if unknown := sorted(str(name) for name in data if name not in PARTS):
         said = f"unknown entries {', '.join(unknown)}; expected some of {', '.join(PARTS)}"
@@ -59,17 +69,15 @@ def read_preset(source: Preset) -> dict[str, Any]:
 
 
 def _read_file(source: str | Path) -> dict[str, Any]:
-    if not isinstance(source, Path) and not str(source).endswith(".json"):
-        shipped: dict[str, Any] = json.loads(_shipped()[check_choice("preset", source, preset_names())])
-        return shipped
-    path = Path(source)
+    is_path = isinstance(source, Path) or str(source).endswith(".json")
+    label = Path(source) if is_path else check_choice("preset", source, _shipped())
     try:
-        data = json.loads(path.read_text(encoding="utf-8"))
+        data = json.loads(Path(source).read_text(encoding="utf-8") if is_path else _shipped_text(str(label)))
     except OSError as error:
-        raise DataFileError(f"cannot read {path}: {error.strerror or error}") from None
+        raise DataFileError(f"cannot read {label}: {error.strerror or error}") from None
     except (ValueError, RecursionError) as error:
-        raise DataFileError(f"{path}: expected a JSON preset file, but it does not parse: {error}") from None
+        raise DataFileError(f"{label}: expected a JSON preset file, but it does not parse: {error}") from None
     if not isinstance(data, dict):
         got = type(data).__name__
-        raise DataFileError(f"{path}: expected a JSON object with 'geometry' and 'gaits', got {got}")
+        raise DataFileError(f"{label}: expected a JSON object with 'geometry' and 'gaits', got {got}")
     return data

@@ -19,7 +19,6 @@ import tempfile
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from functools import cache
-from importlib import import_module
 from pathlib import Path
 from typing import Any, ClassVar
 
@@ -160,7 +159,7 @@ def _sha(content: bytes) -> bytes:
 
 
 class KernelCache(_caching.FunctionCache):
-    """Files of one kernel; `identity` distinguishes kernels of one source that contain different functions.
+    """Files of one kernel; `identity` distinguishes kernels of one source.
 
     Raises:
         OutputError: no folder is writable, or others could have written the files.
@@ -281,13 +280,13 @@ def keep(dispatcher: Any, say: Callable[[str], None], identity: str = "") -> Non
 
 
 def _define_symbols(target_context: Any) -> None:
-    """Define all symbols that machine code may refer to.
+    """Define the symbols that machine code may refer to, but for those that modules define which a pickled
+    kernel names.
 
     Before numba loads it refreshes its target context, which in half a second imports all that it can
     compile; it does so before it compiles, too.
     """
     _runtime.rtsys.initialize(target_context)
-    import_module("numba.cpython.hashing")
     entrypoints.init_all()  # other packages' extensions of numba
 
 

@@ -33,7 +33,8 @@ def kernel(function: F, identity: str = "", threads: bool = False) -> F:
 
     Args:
         function: the kernel.
-        identity: identity of the functions from outside this package that it contains, see `user_functions`.
+        identity: identity of all that its code depends on besides the package's sources, see
+            `reach.fingerprint`; "" for nothing. Kernels of one source need one, and names that differ.
         threads: true if several threads may run it at once, without Python's lock; a call takes a little
             longer.
 
@@ -43,6 +44,7 @@ def kernel(function: F, identity: str = "", threads: bool = False) -> F:
     """
     # names in machine code are made of the qualified name: of two functions of one name the first is called
     if identity:
+        identity = f"{function.__name__} {identity}"
         function.__qualname__ += f".{hashlib.sha256(identity.encode()).hexdigest()[:12]}"
     compiled: Any = numba.njit(error_model="numpy", nogil=threads)(function)
     # with NUMBA_DISABLE_JIT, `njit` returns the function itself, which could not read fields of records

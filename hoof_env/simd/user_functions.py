@@ -1,5 +1,5 @@
-"""Plain functions from outside this package inside kernels: checks of their results, and error messages for
-those that cannot be compiled. `hoof_env.simd.reach` distinguishes them."""
+"""Plain functions from outside this package inside kernels: their compilation, checks of their results, and
+error messages for those that cannot be compiled. `hoof_env.simd.reach` distinguishes them."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from types import FunctionType, MappingProxyType
 from typing import Any
 
 from numba.core import types
-from numba.core.errors import ForceLiteralArg, NumbaError
+from numba.core.errors import NumbaError
 
 from hoof_env.errors import ParameterError
 from hoof_env.simd.compile import inline_llvm
@@ -30,6 +30,10 @@ class NotCompiledError(Exception):
     """
 
 
+class WrongResultError(NotCompiledError):
+    """Result of such a function that a kernel cannot take, in words for its author."""
+
+
 def inline_foreign(function: Callable[..., Any]) -> Any:
     """Return a function from outside this package as `inline_llvm` does, with `NotCompiledError` where numba
     cannot compile it."""
@@ -39,10 +43,8 @@ def inline_foreign(function: Callable[..., Any]) -> Any:
     def compile_once(signature: Any) -> Any:
         try:
             return compile_now(signature)
-        except ForceLiteralArg:  # a request to compile it again for a constant
-            raise
         except NumbaError as error:
-            raise NotCompiledError(str(error)) from error
+            raise NotCompiledError(str(error)) from None
 
     compiled.compile = compile_once
     return compiled
@@ -57,7 +59,7 @@ def number_of(what: str) -> Any:
         if not is_real(x):
             kinds = (name for kind, name in names.items() if isinstance(x, kind))
             given = "nothing in some cases" if isinstance(x, types.Optional) else next(kinds, str(x))
-            raise NotCompiledError(f"{what} returns {given}; expected a number")
+            raise WrongResultError(f"{what} returns {given}; expected a number")
         return x(x)
 
     return instruction(typed)(lambda code, x: x)
@@ -70,7 +72,7 @@ def numbers_of(what: str, count: int) -> Any:
     def typed(x: Any) -> Any:
         if not isinstance(x, types.BaseTuple) or len(x) != count:
             given = f"a tuple of {len(x)}" if isinstance(x, types.BaseTuple) else str(x)
-            raise NotCompiledError(f"{what} returns {given}; expected a tuple of {count} numbers")
+            raise WrongResultError(f"{what} returns {given}; expected a tuple of {count} numbers")
         return x(x)
 
     return instruction(typed)(lambda code, x: x)
@@ -87,6 +89,16 @@ def check_function(name: str, function: Any, arguments: int) -> None:
         raise ParameterError(f"{name}: expected a function of {arguments} arguments, got one of ({given})")
 
 
+def compilation_error(
+    name: str, error: Exception, moved: Mapping[str, str] = MappingProxyType({})
+) -> ParameterError:
+    """Return the error for the author of a function, about the task or setting of a name; arguments are those
+    of `what_cannot_be_compiled`. It takes the traceback from `error`: numba's hundred frames would hide the
+    message, and keep all that was compiled alive."""
+    error.__traceback__ = None
+    return ParameterError(f"{name}: {what_cannot_be_compiled(error, moved)}")
+
+
 def what_cannot_be_compiled(error: Exception, moved: Mapping[str, str] = MappingProxyType({})) -> str:
     """Return what numba does not compile in a function from outside: the operation, the function and the
     line.
@@ -96,7 +108,7 @@ def what_cannot_be_compiled(error: Exception, moved: Mapping[str, str] = Mapping
         moved: present names of attributes that had other ones, or were elsewhere.
     """
     text = str(error)
-    if isinstance(error, NotCompiledError) and error.__cause__ is None:  # of `number_of` or `numbers_of`
+    if isinstance(error, WrongResultError):
         return text
     where = next((place for place in map(_place, re.findall(r'File "(.*?)", line (\d+)', text)) if place), "")
     return (

@@ -356,7 +356,8 @@ def _hills(values: dict[str, Any]) -> Terrain:
     return _draw(_Hills(seed, **numbers, **ranges))
 
 
-@lru_cache(maxsize=16)
+# A few only: the longest hills take a hundred megabytes
+@lru_cache(maxsize=2)
 def _draw(hills: _Hills) -> Terrain:
     """Draw hills, once for all environments with the same."""
     generator = np.random.default_rng(hills.seed)

@@ -94,7 +94,8 @@ def test_an_edit_beside_a_kernel_recompiles_it_and_another_does_not(start, tmp_p
 
 
 def test_a_stored_kernel_is_loaded_without_what_only_compiling_needs(start_anew, tmp_path):
-    """Its machine code refers to numba's runtime, for the array, and to the secret of Python's hashes."""
+    """Its machine code refers to numba's runtime, for the array, and to the secret of Python's hashes, which
+    a module defines that its pickle names."""
     (tmp_path / "hashed.py").write_text(
         textwrap.dedent("""
             import numpy as np
