@@ -74,7 +74,9 @@ FASTEST = 6 * np.pi
 """Lowest and highest rate of a gait, and highest speed of a crank within a stride, of a horse of 475 kg
 [rad/s]."""
 LEADS = (-10.0, 10.0)  # range of leads [strides]
-COUPLING = 0.2  # largest change of a crank's speed that is out of step [-]
+COUPLING = 0.6
+"""Largest change of a crank's speed that is out of step [-]. Legs whose actions change the speed of a crank
+for long must not lose their phase; with 0.2 they do, see docs/evidence/actions.md."""
 
 
 @dataclass(frozen=True)

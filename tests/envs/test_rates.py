@@ -194,7 +194,7 @@ def test_actions_say_what_they_are():
     assert env.action_names == tuple(f"rate_of_{name}" for name in PARAMETERS)
     assert env.action_form == "rates"
     assert gym.make_vec(LEG, num_envs=2).unwrapped.action_form == "rates"
-    assert gym.make("hoof_env/Horse-v0").unwrapped.action_form == "offsets"
+    assert gym.make("hoof_env/Horse-v0").unwrapped.action_form == "offsets of 0.4 and 0.04 rad"
 
 
 TRUE_RATE = "true rate of the crank"
