@@ -76,6 +76,13 @@ CELLS = (1024, 1280, 1536, 2048, 3072, 4096, 6144)
 MOST_CELLS = 2**16
 """Largest number of cells that may be asked for."""
 
+SAMPLED = 16
+"""Number of cells of which one is fitted first: where its derivatives are not good enough, the others of that
+number of cells need no fit."""
+
+BETWEEN = np.array([-0.4999, -0.23, 0.06, 0.31, 0.4999])
+"""Angles between the nodes at which derivatives are compared, from the middle of a cell in cells."""
+
 ROW = float(FUNCTIONS * (DEGREE + 1))  # numbers in a row of the table
 
 DERIVATIVE_ERROR = 1e-9
@@ -149,7 +156,10 @@ class LegProfile:
         finest = CELLS if geometry.full_turn else CELLS[-1:]  # a rocking crank: as near to its ends as can be
         for tried in finest if cells is None else (count("cells", cells, most=MOST_CELLS),):
             self.cells = tried
-            self.table = _fit(geometry, tried)
+            is_last = cells is not None or tried == finest[-1]
+            if not is_last and self._is_too_coarse():
+                continue
+            self.table = _fit(geometry, np.arange(tried), tried)
             error = self._errors()
             while not geometry.full_turn and np.nanmax(error, initial=0.0) > DERIVATIVE_ERROR:
                 self.table[~(error <= DERIVATIVE_ERROR)] = np.nan
@@ -171,20 +181,24 @@ class LegProfile:
         theta = np.asarray(theta, dtype=np.float64)
         cell = np.rint(theta * (self.cells / (2 * np.pi)))
         x = (theta - cell * (2 * np.pi / self.cells))[:, None]
-        rows, first = self.table[cell.astype(np.int64) % self.cells], (DEGREE + 1) * SLOPED
-        sloped = rows[:, :first].reshape(-1, DEGREE + 1, SLOPED)
-        others = rows[:, first:].reshape(-1, DEGREE + 1, FUNCTIONS - SLOPED)
-        rows = np.concatenate([sloped, others], axis=2)
-        slope, value = np.zeros((2, len(theta), FUNCTIONS))
-        for p in range(DEGREE + 1):
-            slope = slope * x + value
-            value = value * x + rows[:, p]
-        return value, slope[:, :SLOPED]
+        return _evaluate(self.table[cell.astype(np.int64) % self.cells], x)
+
+    def _is_too_coarse(self) -> bool:
+        """Return whether a derivative of every `SAMPLED`-th cell is already worse than `DERIVATIVE_ERROR`."""
+        chosen = np.arange(0, self.cells, SAMPLED)
+        x = BETWEEN * (2 * np.pi / self.cells)
+        theta = (chosen[:, None] + BETWEEN).ravel() * (2 * np.pi / self.cells)
+        _, exact = functions(self.geometry, theta)
+        if not np.isfinite(exact).all():
+            return False  # the fit of all cells says where the links have no place
+        rows = _fit(self.geometry, chosen, self.cells).repeat(len(x), axis=0)
+        _, slope = _evaluate(rows, np.tile(x, len(chosen))[:, None])
+        return bool((np.abs(slope - exact) / np.abs(exact).max(0)).max() >= DERIVATIVE_ERROR)
 
     def _errors(self) -> NDArray[np.float64]:
-        """Largest error of a derivative in each cell over its largest value [-], NaN without a place."""
-        between = np.array([-0.4999, -0.23, 0.06, 0.31, 0.4999])
-        theta = (np.arange(self.cells)[:, None] + between).ravel() * (2 * np.pi / self.cells)
+        """Return the largest error of a derivative in each cell over its largest value [-], NaN without a
+        place."""
+        theta = (np.arange(self.cells)[:, None] + BETWEEN).ravel() * (2 * np.pi / self.cells)
         slope = self(theta)[1]
         known = np.isfinite(slope[:, 0])
         error = np.full(len(theta), np.nan)
@@ -200,11 +214,28 @@ def leg_profile(geometry: Geometry, cells: int | None = None) -> LegProfile:
     return LegProfile(geometry, cells)
 
 
-def _fit(geometry: Geometry, cells: int) -> NDArray[np.float64]:
-    """Fit values and derivatives at the Chebyshev points of every cell, by least squares."""
+def _evaluate(
+    rows: NDArray[np.float64], x: NDArray[np.float64]
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Return values and derivatives of the polynomials in rows of a table, at angles from the middles of the
+    cells [rad], shape (len(rows), 1)."""
+    first = (DEGREE + 1) * SLOPED
+    sloped = rows[:, :first].reshape(-1, DEGREE + 1, SLOPED)
+    others = rows[:, first:].reshape(-1, DEGREE + 1, FUNCTIONS - SLOPED)
+    rows = np.concatenate([sloped, others], axis=2)
+    slope, value = np.zeros((2, len(rows), FUNCTIONS))
+    for p in range(DEGREE + 1):
+        slope = slope * x + value
+        value = value * x + rows[:, p]
+    return value, slope[:, :SLOPED]
+
+
+def _fit(geometry: Geometry, chosen: NDArray[np.int64], cells: int) -> NDArray[np.float64]:
+    """Fit values and derivatives at the Chebyshev points of chosen cells, by least squares; return their rows
+    of a table of so many cells."""
     half, count = np.pi / cells, 2 * (DEGREE + 1)
     nodes = np.cos(np.pi * (2 * np.arange(count) + 1) / (2 * count))
-    theta = 2 * half * np.arange(cells)[:, None] + half * nodes
+    theta = 2 * half * chosen[:, None] + half * nodes
     value, slope = functions(geometry, theta.ravel())
     if geometry.full_turn and not np.isfinite(value).all():
         where = theta.ravel()[~np.isfinite(value).all(1)][0]
@@ -219,9 +250,9 @@ def _fit(geometry: Geometry, cells: int) -> NDArray[np.float64]:
     for fitted, sample in (
         (np.concatenate([powers, rates]), (value[:, :SLOPED], half * slope)), (powers, (value[:, SLOPED:],)),
     ):  # fmt: skip
-        known = np.concatenate([part.reshape(cells, count, -1) for part in sample], axis=1)
+        known = np.concatenate([part.reshape(len(chosen), count, -1) for part in sample], axis=1)
         found = np.einsum("pk,ckf->cpf", np.linalg.pinv(fitted), known) / scale[:, None]
-        parts.append(found.reshape(cells, -1))
+        parts.append(found.reshape(len(chosen), -1))
     table = np.concatenate(parts, axis=1)
     table[~np.isfinite(table).all(1)] = np.nan
     return table

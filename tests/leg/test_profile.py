@@ -11,7 +11,15 @@ from hoof_env.eq8.solver import ConstrainedLeg
 from hoof_env.ground.contact import Ground
 from hoof_env.leg.assembly import transmission_margin
 from hoof_env.leg.geometry import Geometry, load_geometry
-from hoof_env.leg.profile import DERIVATIVE_ERROR, FUNCTIONS, SLOPED, LegProfile, functions, leg_profile
+from hoof_env.leg.profile import (
+    CELLS,
+    DERIVATIVE_ERROR,
+    FUNCTIONS,
+    SLOPED,
+    LegProfile,
+    functions,
+    leg_profile,
+)
 from tests.legs import FIRST_FIT, PRESETS
 
 LEG = load_geometry(FIRST_FIT)
@@ -41,6 +49,18 @@ def test_a_leg_nearer_to_a_dead_point_has_more_cells(link, longer):
     assert profile.cells > leg_profile(IDENTIFIED).cells
     assert value < 1e-11
     assert slope < 2 * profile.derivative_error < 2 * DERIVATIVE_ERROR
+
+
+@pytest.mark.parametrize("longer", [1.0, 1.01, 1.02, 1.04])
+def test_the_number_of_cells_is_the_smallest_that_is_good_enough(longer):
+    """Every smaller number is fitted in full, where the profile fits a sample of its cells first."""
+    leg = IDENTIFIED.replace(lengths={"PB": longer * IDENTIFIED.lengths["PB"]})
+    chosen = LegProfile(leg)
+    smaller = [LegProfile(leg, cells) for cells in CELLS if cells <= chosen.cells]
+    assert [profile.derivative_error < DERIVATIVE_ERROR for profile in smaller[:-1]] == [False] * (
+        len(smaller) - 1
+    )
+    np.testing.assert_array_equal(chosen.table, smaller[-1].table)
 
 
 @pytest.mark.parametrize(("far", "bound"), [(1e6, 1e-9), (1e9, 1e-6)])
