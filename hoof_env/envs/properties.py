@@ -81,7 +81,7 @@ class LegProperties:
 
     @property
     def action_form(self) -> str:
-        """Meaning of actions: "rates" of the gait parameters of one leg, "offsets of" some
-        size from a horse's gait, or the form of a map of one's own.
+        """Meaning of actions: "rates" of the gait parameters of one leg, offsets from a horse's
+        gait and their spans, as in "offsets of 0.4 and 0.04 rad", or the form of a map of one's own.
         States and files of policies contain it, so that those of another form are refused."""
         return self.batch.action_form

@@ -184,7 +184,10 @@ class LegProfile:
         return _evaluate(self.table[cell.astype(np.int64) % self.cells], x)
 
     def _is_too_coarse(self) -> bool:
-        """Return whether a derivative of every `SAMPLED`-th cell is already worse than `DERIVATIVE_ERROR`."""
+        """Return whether derivatives in one of every `SAMPLED` cells are twice as bad as is allowed.
+
+        Twice, for the sample may miss the largest derivatives, to which errors are relative.
+        """
         chosen = np.arange(0, self.cells, SAMPLED)
         x = BETWEEN * (2 * np.pi / self.cells)
         theta = (chosen[:, None] + BETWEEN).ravel() * (2 * np.pi / self.cells)
@@ -193,7 +196,7 @@ class LegProfile:
             return False  # the fit of all cells says where the links have no place
         rows = _fit(self.geometry, chosen, self.cells).repeat(len(x), axis=0)
         _, slope = _evaluate(rows, np.tile(x, len(chosen))[:, None])
-        return bool((np.abs(slope - exact) / np.abs(exact).max(0)).max() >= DERIVATIVE_ERROR)
+        return bool((np.abs(slope - exact) / np.abs(exact).max(0)).max() >= 2 * DERIVATIVE_ERROR)
 
     def _errors(self) -> NDArray[np.float64]:
         """Return the largest error of a derivative in each cell over its largest value [-], NaN without a

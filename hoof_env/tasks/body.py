@@ -62,7 +62,7 @@ class Body(Protocol):
         command_step: largest change from one commanded speed to the next [m/s].
         start_names, gait_names: names of the numbers with which infos describe an episode's start.
         action_names: names of the actions, leg after leg.
-        action_form: tag of the meaning of actions, "rates" or "offsets of" the spans of a horse.
+        action_form: tag of the meaning of actions, "rates", or of a horse offsets and their spans.
         finite_fields: fields of the episode's memory that must be finite in a state; the weight always must.
     """
 

@@ -165,7 +165,7 @@ class Horse:
     picture: Picture = HorsePicture()
     finite_fields: tuple[str, ...] = ("gait",)
     action_names: tuple[str, ...] = tuple(f"{leg}_{name}" for leg, name in product(LEGS, PARAMETERS))
-    # Policies, states and datasets of other spans are refused by it.
+    # The spans are in the tag, so that policies, states and datasets of other spans are refused.
     action_form = f"offsets of {SPANS[0]:g} and {SPANS[1]:g} rad"
     step_error = STEP_ERROR
     start_names: tuple[str, ...] = ("phase", "speed", "pitch", "x")

@@ -82,6 +82,11 @@ class Kept:
         check_number(f"kept {self.name!r}", self.begin, low=-LARGEST, high=LARGEST)
 
 
+def _is_reserved(form: str) -> bool:
+    """Return whether a form of actions is one of the package, of now or before."""
+    return form in ("rates", "offsets") or form.startswith("offsets of ")
+
+
 @dataclass(frozen=True)
 class ActionMap:
     """Map from actions of one's own to those of the body.
@@ -104,7 +109,7 @@ class ActionMap:
     scalar: bool = False
 
     def __post_init__(self) -> None:
-        if not isinstance(self.form, str) or not self.form or self.form in ("rates", "offsets"):
+        if not isinstance(self.form, str) or not self.form or _is_reserved(self.form):
             raise ParameterError(f"action_map: form: expected a text of its own, got {self.form!r}")
         # Kernels are found by what they contain, and a mapping has no hash; a copy is given the pairs.
         pairs = tuple(self.actions.items()) if isinstance(self.actions, Mapping) else self.actions

@@ -1,6 +1,7 @@
 """`Horse-v0`: what it commands and what it may be told, how its reference gait goes, and how episodes end."""
 
 import copy
+from pathlib import Path
 
 import gymnasium as gym
 import numpy as np
@@ -11,9 +12,10 @@ from horses import SPEEDS, played, random_gaits
 from hoof_env import Sb3VecEnv
 from hoof_env.dynamics.layout import Features
 from hoof_env.envs import step
-from hoof_env.errors import ParameterError
+from hoof_env.errors import DataFileError, ParameterError
 from hoof_env.gait import PARAMETERS, WIDEST
 from hoof_env.leg.limb_masses import segment_masses, trunk_mass
+from hoof_env.policies.record import describe, refuse_misfit
 from hoof_env.tasks import horse_gaits as reference
 from hoof_env.tasks.horse import COMMAND_STEP, HORSE_KERNELS, MASS, SPANS
 from hoof_env.tasks.horse_gaits import (
@@ -171,6 +173,16 @@ def test_cranks_that_are_out_of_step_come_back():
     assert abs(before) > 0.2
     assert abs(ahead()) < 0.5 * abs(before)
     assert ahead() == pytest.approx(expected, abs=0.1 * abs(before) + 0.05)
+
+
+def test_what_has_the_former_spans_is_refused():
+    env = make(HORSE)
+    env.reset(seed=0)
+    with pytest.raises(ParameterError, match=r"are offsets of 0\.4 and 0\.04 rad, got 'offsets'"):
+        env.set_state({**env.get_state(), "actions": "offsets"})
+    here = describe(env)
+    with pytest.raises(DataFileError, match=r"actions offsets, expected offsets of 0\.4 and 0\.04 rad"):
+        refuse_misfit(Path("policy"), {**here, "actions": "offsets"}, here)
 
 
 def test_the_trunk_is_what_the_limbs_leave_of_the_horse():

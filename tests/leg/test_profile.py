@@ -9,6 +9,7 @@ import pytest
 
 from hoof_env.eq8.solver import ConstrainedLeg
 from hoof_env.ground.contact import Ground
+from hoof_env.leg import profile as profile_module
 from hoof_env.leg.assembly import transmission_margin
 from hoof_env.leg.geometry import Geometry, load_geometry
 from hoof_env.leg.profile import (
@@ -61,6 +62,17 @@ def test_the_number_of_cells_is_the_smallest_that_is_good_enough(longer):
         len(smaller) - 1
     )
     np.testing.assert_array_equal(chosen.table, smaller[-1].table)
+
+
+def test_a_sample_tells_that_cells_are_too_large(monkeypatch):
+    fitted, fit = [], profile_module._fit
+    monkeypatch.setattr(
+        profile_module,
+        "_fit",
+        lambda leg, chosen, cells: fitted.append((len(chosen), cells)) or fit(leg, chosen, cells),
+    )
+    assert LegProfile(IDENTIFIED).cells == 1280
+    assert fitted == [(64, 1024), (80, 1280), (1280, 1280)]
 
 
 @pytest.mark.parametrize(("far", "bound"), [(1e6, 1e-9), (1e9, 1e-6)])
