@@ -73,10 +73,11 @@ def test_touch_is_the_two_laws_at_the_place_of_the_point(x, y, vx, vy):
     force = touch(contact, complex(x, y), complex(vx, vy), record)
     normal = friction = 0.0
     if y < 0:
-        normal = normal_force(-y, -vy, max(-vy, 1e-4), 2e4, 1.5, 1.05, 0.0)
+        chi = 1.5 * (1 - 0.3)  # Hunt and Crossley's, which is not 1.05 in its last bit
+        # Rounded as `touch` does, which multiplies by 1 / approach where the law divides
+        damped = chi * -vy * (1 / max(-vy, 1e-4))
+        normal = normal_force(-y, damped, 1.0, 2e4, 1.5, 1.0, 0.0)
         friction = friction_force(vx, normal, 0, 0.4, 1e-3, 1e-2)
-    # `touch` multiplies by 1 / approach where the law divides: the last bits differ in one of some thousand
-    rounded = {"rel": 1e-15, "abs": 0.0}
-    assert force == pytest.approx(complex(friction, normal), **rounded)
+    assert force == complex(friction, normal)
     assert [contact[name] for name in ("x", "vx", "penetration", "rate")] == [x, vx, -y, -vy]
-    assert [contact["normal"], contact["friction"]] == pytest.approx([normal, friction], **rounded)
+    assert [contact["normal"], contact["friction"]] == [normal, friction]
