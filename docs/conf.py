@@ -3,6 +3,7 @@ other that is rendered and to any file."""
 
 from __future__ import annotations
 
+import gc
 import html
 import re
 import sys
@@ -17,6 +18,9 @@ from hoof_env import __version__
 
 sys.path.insert(0, str(Path(__file__).parent / "site"))
 import playbacks
+
+# Pages stay until all are written: the collector would take a sixth of the time to look at them
+gc.set_threshold(100_000)
 
 project = "hoof-env"
 author = "hoof-env contributors"

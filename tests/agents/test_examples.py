@@ -9,7 +9,7 @@ EXAMPLE = Path(__file__).parents[2] / "examples" / "first_curve.py"
 
 def test_first_curve(tmp_path):
     short = EXAMPLE.read_text()
-    for long, less in (("200_000", "4_096"), ("episodes=20", "episodes=2")):
+    for long, less in (("200_000", "2_048"), ("episodes=20", "episodes=2")):
         assert long in short
         short = short.replace(long, less)
     done = subprocess.run(
