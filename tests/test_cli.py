@@ -29,10 +29,16 @@ def test_help_lists_the_sub_commands_and_explains_their_options(arguments, words
     assert all(word in said for word in words)
 
 
-def test_reproduce_writes_its_results(tmp_path, capsys):
+def test_reproduce_writes_its_results(tmp_path, capsys, monkeypatch, reproduction):
+    def reproduce(progress, *, preset):
+        assert preset is None
+        progress("its progress")
+        return reproduction  # which takes seconds
+
+    monkeypatch.setattr("hoof_env.paper.reproduce.reproduce", reproduce)
     folder = tmp_path / "new" / "folder"
     assert cli.main(["reproduce", "--out", str(folder), "--no-figures"]) == 0
-    assert "exact, run, inelastic: peak" in capsys.readouterr().out
+    assert "its progress\n" in capsys.readouterr().out
     assert {file.name for file in folder.iterdir()} == {"reproduction.json", "reproduction.md"}
     assert len(json.loads((folder / "reproduction.json").read_text(encoding="utf-8"))) == 99
     page = (folder / "reproduction.md").read_text(encoding="utf-8")
@@ -43,7 +49,8 @@ def test_reproduce_writes_its_results(tmp_path, capsys):
 def test_an_interrupt_is_one_line_and_leaves_nothing_behind(tmp_path):
     command, pipe = [*HOOF_ENV, "reproduce", "--out", str(tmp_path)], subprocess.PIPE
     with subprocess.Popen(command, stdout=pipe, stderr=pipe, text=True) as process:
-        process.stdout.readline()  # the first condition is done, the others remain
+        # The first condition is done, the others remain
+        assert process.stdout.readline().startswith("paper, walk, elastic: peak 190.5 N")
         process.send_signal(signal.SIGINT)
         _, errors = process.communicate(timeout=300)
     assert process.returncode == 130

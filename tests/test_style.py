@@ -45,10 +45,15 @@ def sources() -> dict[Path, str]:
     return {path: path.read_text(encoding="utf-8") for path in files}
 
 
+@cache
+def every_node() -> list[tuple[Path, ast.AST]]:
+    """All nodes of all files."""
+    return [(path, node) for path, text in sources().items() for node in ast.walk(ast.parse(text))]
+
+
 def nodes(*kinds: type[ast.AST]) -> Iterator[tuple[Path, ast.AST]]:
     """Nodes of some kinds in all files."""
-    for path, text in sources().items():
-        yield from ((path, node) for node in ast.walk(ast.parse(text)) if isinstance(node, kinds))
+    yield from ((path, node) for path, node in every_node() if isinstance(node, kinds))
 
 
 def packed() -> Iterator[Place]:
