@@ -6,9 +6,6 @@ import gc
 from collections.abc import Iterator
 from contextlib import contextmanager
 
-MANY = 20_000
-"""Objects that only the import of a large library makes: a model or an environment makes fewer."""
-
 
 @contextmanager
 def paused() -> Iterator[None]:
@@ -20,8 +17,4 @@ def paused() -> Iterator[None]:
         yield
     finally:
         if collects:
-            if gc.get_count()[0] > MANY and not gc.get_freeze_count():
-                # Makes them old without a look at each, as three collections would
-                gc.freeze()
-                gc.unfreeze()
             gc.enable()

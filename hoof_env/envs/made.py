@@ -7,11 +7,9 @@ from typing import Any
 
 import gymnasium as gym
 
-from hoof_env._collector import paused
 from hoof_env.errors import ParameterError
 
 
-@paused()
 def make_env(env_id: str, **kwargs: Any) -> gym.Env[Any, Any]:
     """Call `gymnasium.make`; `ParameterError` for an unknown id, or an argument that the environment does not
     take."""

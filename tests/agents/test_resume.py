@@ -97,7 +97,7 @@ def test_a_file_system_without_locks_is_told(tmp_path, monkeypatch):
 
 def test_killed_again_and_again(tmp_path):
     """SIGKILL at random moments: the command with --resume ends as one that was never killed."""
-    steps = 128 * 16  # so many rollouts, of which the two that are killed take a few
+    steps = 128 * 32  # so many rollouts, of which the two that are killed take a few
     argv = [
         "--steps", str(steps), "--n-envs", "4", "--checkpoint-every", "0.02", "--resume",
         "--env-kwargs", *SHORT, "--params", *TINY,
