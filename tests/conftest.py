@@ -96,8 +96,9 @@ if not HAS_TORCH:
 
 
 @pytest.fixture(scope="session")
-def reproduction(request, tmp_path_factory):
-    """Return the paper's four conditions by every solver, which one process computes for all."""
+def reproduced(request, tmp_path_factory):
+    """Return the paper's four conditions by every solver, which one process computes for all, and what was
+    said meanwhile."""
     from hoof_env.paper.reproduce import reproduce
 
     folder = tmp_path_factory.getbasetemp()
@@ -107,9 +108,16 @@ def reproduction(request, tmp_path_factory):
     with FileLock(folder / "reproduction.lock"):
         if not path.exists():
             unfinished = folder / "reproduction.unfinished"
-            unfinished.write_bytes(pickle.dumps(reproduce()))
+            said = []
+            unfinished.write_bytes(pickle.dumps((reproduce(said.append), said)))
             unfinished.replace(path)
     return pickle.loads(path.read_bytes())
+
+
+@pytest.fixture(scope="session")
+def reproduction(reproduced):
+    """Return the paper's four conditions by every solver."""
+    return reproduced[0]
 
 
 def pytest_ignore_collect(collection_path):

@@ -29,16 +29,19 @@ def test_help_lists_the_sub_commands_and_explains_their_options(arguments, words
     assert all(word in said for word in words)
 
 
-def test_reproduce_writes_its_results(tmp_path, capsys, monkeypatch, reproduction):
+def test_reproduce_writes_its_results(tmp_path, capsys, monkeypatch, reproduced):
     def reproduce(progress, *, preset):
+        """Say and return what took other tests seconds."""
         assert preset is None
-        progress("its progress")
-        return reproduction  # which takes seconds
+        result, said = reproduced
+        for line in said:
+            progress(line)
+        return result
 
     monkeypatch.setattr("hoof_env.paper.reproduce.reproduce", reproduce)
     folder = tmp_path / "new" / "folder"
     assert cli.main(["reproduce", "--out", str(folder), "--no-figures"]) == 0
-    assert "its progress\n" in capsys.readouterr().out
+    assert "exact, run, inelastic: peak" in capsys.readouterr().out
     assert {file.name for file in folder.iterdir()} == {"reproduction.json", "reproduction.md"}
     assert len(json.loads((folder / "reproduction.json").read_text(encoding="utf-8"))) == 99
     page = (folder / "reproduction.md").read_text(encoding="utf-8")
