@@ -15,7 +15,6 @@ values. Of the losses those of policy and value are logged.
 from __future__ import annotations
 
 import copy
-import inspect
 from collections.abc import Iterator
 from typing import Any, ClassVar
 
@@ -32,6 +31,7 @@ from torch import nn
 from agents.perceptrons import ACTIONS, ADVANTAGE, CHUNK, Floats, Weights, compiled_gradient
 from hoof_env._collector import paused
 from hoof_env.errors import ParameterError
+from hoof_env.policies.unused_adam import UnusedAdam
 from hoof_env.simd.threads import check_threads, limit_threads, run_together
 
 # Decay rates of the moments, and the term that keeps Adam from dividing by 0
@@ -85,28 +85,6 @@ class Scale:
         self.mean = self.mean + gap * returns.size / count
         self.count = count
         return np.float32(np.sqrt(self.square + 1e-8))
-
-
-class UnusedAdam(torch.optim.Adam):
-    """Torch's Adam in name only: `FlatPPO.descend` takes its steps. Making a real one loads torch's compiler,
-    a third of the time from the start of Python to the first step."""
-
-    def __init__(self, params: Any, lr: float = 1e-3, **kwargs: Any) -> None:
-        usual = inspect.signature(torch.optim.Adam.__init__).parameters
-        defaults = {
-            name: parameter.default for name, parameter in usual.items() if name not in ("self", "params")
-        }
-        self.defaults = {**defaults, "lr": lr, **kwargs}
-        self.state: Any = {}
-        self.param_groups = [{"params": list(params), **self.defaults}]
-
-    def state_dict(self) -> dict[str, Any]:
-        """Return the state of an Adam that has not taken a step."""
-        (group,) = self.param_groups
-        return {"state": {}, "param_groups": [{**group, "params": list(range(len(group["params"])))}]}
-
-    def load_state_dict(self, state_dict: Any) -> None:
-        """Ignore the state: there is nothing to go on with."""
 
 
 class FlatPolicy(ActorCriticPolicy):

@@ -333,11 +333,12 @@ def draw_all(reproduction: Reproduction, folder: Path | str) -> list[Path]:
         for name, draw in DRAWINGS.items():
             figure = Figure()
             draw(figure, reproduction)
-            # Without the date, which would differ each time.
-            for file, metadata in ((f"{name}.png", {}), (f"{name}.svg", {"Date": None})):
-                figure.savefig(stage / file, metadata=metadata)
-                paths.append(folder / file)
+            # Hardly compressed, as it is written again.
+            figure.savefig(stage / f"{name}.png", pil_kwargs={"compress_level": 1})
             _reduce_colours(stage / f"{name}.png")
+            # Without the date, which would differ each time.
+            figure.savefig(stage / f"{name}.svg", metadata={"Date": None})
+            paths += [folder / f"{name}.png", folder / f"{name}.svg"]
     return paths
 
 

@@ -246,6 +246,8 @@ def read_plain(folder: Path) -> TrainedPolicy:
     raise exceptions of any type."""
     from safetensors.torch import load_file
 
+    from hoof_env.policies.unused_adam import UnusedAdam
+
     about = parse_json((folder / ABOUT).read_text(encoding="utf-8"))
     if about["format"] != FORMAT:
         raise ValueError(f"format {about['format']!r}, expected {FORMAT}")
@@ -254,9 +256,10 @@ def read_plain(folder: Path) -> TrainedPolicy:
     model.observation_space = built_box(**about["observation_space"])
     model.action_space = built_box(**about["action_space"])
     model.policy_kwargs = _built(about["policy_kwargs"])
-    model.policy = model.policy_class(
-        model.observation_space, model.action_space, lambda _: 0.0, **model.policy_kwargs
-    )
+    arguments = {**model.policy_kwargs, "optimizer_class": UnusedAdam}
+    model.policy = model.policy_class(model.observation_space, model.action_space, lambda _: 0.0, **arguments)
+    # For a copy of the policy that is trained on
+    model.policy.optimizer_class = UnusedAdam.__base__
     weights = load_file(folder / WEIGHTS)
     if not all(bool(tensor.isfinite().all()) for tensor in weights.values()):
         raise ValueError(f"{WEIGHTS} holds numbers that are not finite")

@@ -226,9 +226,15 @@ def alone(name: str, mode: AutoresetMode) -> tuple[Any, list[Found]]:
 
 @lru_cache(maxsize=3)
 def together(name: str, mode: AutoresetMode) -> tuple[Any, list[Found]]:
-    """Results of the most rows on one thread."""
-    run = Run(CASES[name], mode, Way(CASES[name].most))
-    return run.first, run.rest()
+    """Results of the most rows on one thread, of which the first are those of single environments."""
+    case = CASES[name]
+    run = Run(case, mode, Way(case.most))
+    found = run.first, run.rest()
+    first, expected = alone(name, mode)
+    same_rows(run.first, first, case.alone)
+    for one, other in zip(found[1], expected, strict=True):
+        one.check(other, case.alone)
+    return found
 
 
 def members(envs: Any) -> list[Any]:
@@ -342,14 +348,3 @@ def test_each_row_is_a_single_environment(name, mode, way):
     if again:
         run.envs, run.steps = again(), half
         run.check_rest(expected[half:])
-
-
-@pytest.mark.parametrize("mode", MODES[:2], ids=lambda mode: mode.name)
-@pytest.mark.parametrize("name", [name for name, case in CASES.items() if case.most > case.alone])
-def test_many_rows_begin_with_single_environments(name, mode):
-    """So that they may stand for them beyond those."""
-    first, found = together(name, mode)
-    start, expected = alone(name, mode)
-    same_rows(first, start, CASES[name].alone)
-    for one, other in zip(found, expected, strict=True):
-        one.check(other, CASES[name].alone)
