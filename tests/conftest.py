@@ -95,29 +95,45 @@ if not HAS_TORCH:
     hoof_env.Sb3VecEnv = _AbsentVecEnv
 
 
+def made_once(request, tmp_path_factory, name, make):
+    """Return the path of a file or folder that one process of this run makes for all, by `make(path)`."""
+    folder = tmp_path_factory.getbasetemp()
+    if hasattr(request.config, "workerinput"):
+        folder = folder.parent  # all processes of this run share it
+    path = folder / name
+    with FileLock(folder / f"{name}.lock"):
+        if not path.exists():
+            unfinished = folder / f"{name}.unfinished"
+            make(unfinished)
+            unfinished.replace(path)
+    return path
+
+
 @pytest.fixture(scope="session")
 def reproduced(request, tmp_path_factory):
     """Return the paper's four conditions by every solver, which one process computes for all, and what was
     said meanwhile."""
     from hoof_env.paper.reproduce import reproduce
 
-    folder = tmp_path_factory.getbasetemp()
-    if hasattr(request.config, "workerinput"):
-        folder = folder.parent  # all processes of this run share it
-    path = folder / "reproduction.pickle"
-    with FileLock(folder / "reproduction.lock"):
-        if not path.exists():
-            unfinished = folder / "reproduction.unfinished"
-            said = []
-            unfinished.write_bytes(pickle.dumps((reproduce(said.append), said)))
-            unfinished.replace(path)
-    return pickle.loads(path.read_bytes())
+    def make(path):
+        said = []
+        path.write_bytes(pickle.dumps((reproduce(said.append), said)))
+
+    return pickle.loads(made_once(request, tmp_path_factory, "reproduction", make).read_bytes())
 
 
 @pytest.fixture(scope="session")
 def reproduction(reproduced):
     """Return the paper's four conditions by every solver."""
     return reproduced[0]
+
+
+@pytest.fixture(scope="session")
+def drawn(request, tmp_path_factory, reproduction):
+    """Return the folder of the figures of `reproduction`, which one process draws for all."""
+    from hoof_env.paper.figures import draw_all
+
+    return made_once(request, tmp_path_factory, "figures", lambda path: draw_all(reproduction, path))
 
 
 def pytest_ignore_collect(collection_path):

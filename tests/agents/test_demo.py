@@ -3,6 +3,7 @@
 import base64
 import json
 import re
+import shutil
 import subprocess
 import sys
 from html.parser import HTMLParser
@@ -14,6 +15,7 @@ import pytest
 from agents import demo
 from hoof_env.demo import demo as shared
 from hoof_env.evaluation.scores import METRICS, evaluate
+from hoof_env.paper import figures
 from hoof_env.paper.reproduce import SOLVERS
 from hoof_env.paper.rows import load_published
 
@@ -57,10 +59,11 @@ class Page(HTMLParser):
 
 
 @pytest.fixture(scope="module")
-def folder(tmp_path_factory, reproduction) -> Path:
+def folder(tmp_path_factory, reproduction, drawn) -> Path:
     out = tmp_path_factory.mktemp("runs") / "demo"
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(shared, "reproduce", lambda say: reproduction)
+        patch.setattr(figures, "draw_all", lambda _, stage: shutil.copytree(drawn, stage, dirs_exist_ok=True))
         assert demo.demo(demo.Args(out=out, quick=True)) == out / "report.html"
     return out
 

@@ -28,6 +28,19 @@ def test_plain_data_act_as_the_zip(algo, env, tmp_path):
     assert env.action_space.contains(plain.predict(observation)[0])
 
 
+@pytest.mark.parametrize("algo", ["ppo", "sac", "td3", "tqc"])
+def test_plain_data_are_read_without_an_optimizer_and_saved_with_one(algo, env, tmp_path, monkeypatch):
+    """Torch's loads a compiler, which takes longer than all else."""
+    save_untrained(tmp_path, env, algo)
+    with monkeypatch.context() as patch:
+        patch.setattr(torch.optim.Optimizer, "__init__", lambda *_: pytest.fail("an optimizer was made"))
+        policy = SavedModel.find(tmp_path).load(env, ENV_ID).model.policy
+    policy.save(tmp_path / "copy.pt")
+    copy = type(policy).load(tmp_path / "copy.pt")
+    made = [type(each.optimizer) for each in copy.modules() if hasattr(each, "optimizer")]
+    assert {*made} == {torch.optim.Adam}
+
+
 def test_all_files_have_the_same_mode_and_nothing_is_unpickled(env, tmp_path):
     class Bomb:
         def __reduce__(self):
