@@ -285,8 +285,8 @@ TASKS: Mapping[str, Task] = MappingProxyType(
             + "\n\nThe ground has slopes of up to 10 % and bumps of up to 5 cm. Every 2 to 4 s the trunk is"
             " pushed forward or back, by up to 1.5 m/s times the horse's mass. Neither the ground ahead nor"
             " the pushes are observed. A fall costs 100 instead of 15, and `tracking` weighs 64 instead of"
-            " 16. The reference gait falls in a fifth of the episodes. The arguments `terrain`, `strength`"
-            " and `push_impulse` change these disturbances, and `size` does not.",
+            " 16: compare no returns with Horse-v0's. The reference gait falls in every fifth episode."
+            " `terrain`, `strength` and `push_impulse` change these disturbances; `size` does not.",
             # With the weights of Horse-v0, agents trade falls and the commanded speed for smoother gaits.
             {**_HORSE, **rough_ground(1.0, MASS), "reward_weights": {"fall": 100.0, "tracking": 64.0}},
             reference="reference",
