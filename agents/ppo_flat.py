@@ -31,7 +31,7 @@ from torch import nn
 from agents.perceptrons import ACTIONS, ADVANTAGE, CHUNK, Floats, Weights, compiled_gradient
 from hoof_env._collector import paused
 from hoof_env.errors import ParameterError
-from hoof_env.policies.unused_adam import UnusedAdam
+from hoof_env.policies.delayed_adam import DelayedAdam
 from hoof_env.simd.threads import check_threads, limit_threads, run_together
 
 # Decay rates of the moments, and the term that keeps Adam from dividing by 0
@@ -88,10 +88,10 @@ class Scale:
 
 
 class FlatPolicy(ActorCriticPolicy):
-    """Stable-Baselines3's policy without an optimiser of torch's."""
+    """Stable-Baselines3's policy, whose optimiser is never used."""
 
     def __init__(self, *args: Any, **kwargs: Any) -> None:
-        super().__init__(*args, **{**kwargs, "optimizer_class": UnusedAdam})
+        super().__init__(*args, **{**kwargs, "optimizer_class": DelayedAdam})
 
 
 class FlatPPO(OnPolicyAlgorithm):

@@ -6,6 +6,7 @@ Where PyTorch cannot be had, what needs it is left out, and a line at the end sa
 import gc
 import os
 import pickle
+import shutil
 import signal
 import sys
 from importlib.util import find_spec
@@ -104,6 +105,7 @@ def made_once(request, tmp_path_factory, name, make):
     with FileLock(folder / f"{name}.lock"):
         if not path.exists():
             unfinished = folder / f"{name}.unfinished"
+            shutil.rmtree(unfinished, ignore_errors=True)  # of a process that was killed
             make(unfinished)
             unfinished.replace(path)
     return path
@@ -153,7 +155,7 @@ def pytest_collection_modifyitems(items):
 @pytest.hookimpl(wrapper=True)
 def pytest_collection():
     """Keep what is collected and imported out of the garbage collector's way: it would go through it again
-    and again and find nothing. What tests make it looks at less often, which halves its time."""
+    and again and find nothing. Later it looks less often, which halves the time that it takes."""
     with paused():
         found = yield
     gc.freeze()

@@ -4,6 +4,8 @@ import os
 import re
 import subprocess
 import sys
+import time
+from contextlib import ExitStack
 from pathlib import Path
 
 import pytest
@@ -25,29 +27,29 @@ def options():
 
 @pytest.fixture(scope="module")
 def runs(tmp_path_factory):
-    """A run for each of `TESTS`, all at once, for some wait for their limit."""
+    """Return when the runs of all of `TESTS` began, and them: all at once, because some wait for a limit."""
     quick = ["-p", "no:cacheprovider", "-o", "faulthandler_timeout=3"]
     command = [sys.executable, "-m", "pytest", *options(), *quick]
-    begun = {}
-    for what, test in TESTS.items():
-        folder = tmp_path_factory.mktemp("lost")
-        (folder / "pyproject.toml").write_text((ROOT / "pyproject.toml").read_text())
-        (folder / "tests").mkdir()
-        (folder / "tests" / "test_bad.py").write_text(test + "\n")
-        (folder / "tests" / "test_good.py").write_text("def test_it(): pass\n")
-        pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.STDOUT, "text": True}
-        begun[what] = subprocess.Popen(command, cwd=folder, **pipes)
-    yield begun
-    for run in begun.values():
-        run.kill()
-        run.wait()
-        run.stdout.close()
+    pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.STDOUT, "text": True}
+    with ExitStack() as ends:
+        begun = {}
+        started = time.monotonic()
+        for what, test in TESTS.items():
+            folder = tmp_path_factory.mktemp("lost")
+            (folder / "pyproject.toml").write_text((ROOT / "pyproject.toml").read_text())
+            (folder / "tests").mkdir()
+            (folder / "tests" / "test_bad.py").write_text(test + "\n")
+            (folder / "tests" / "test_good.py").write_text("def test_it(): pass\n")
+            begun[what] = ends.enter_context(subprocess.Popen(command, cwd=folder, **pipes))
+            ends.callback(begun[what].kill)
+        yield started, begun
 
 
 @pytest.mark.parametrize("what", TESTS)
 def test_a_lost_worker_ends_the_run(what, runs):
-    said, _ = runs[what].communicate(timeout=100)
-    assert runs[what].returncode == 1, said
+    started, begun = runs
+    said, _ = begun[what].communicate(timeout=max(0.0, started + 100 - time.monotonic()))
+    assert begun[what].returncode == 1, said
     assert "crashed while running 'tests/test_bad.py::test_it'" in said
     assert "1 failed, 1 passed" in said
 

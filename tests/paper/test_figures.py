@@ -4,12 +4,11 @@ from itertools import combinations
 import numpy as np
 import pytest
 
-from hoof_env.paper import figures
 from hoof_env.paper.drawing import PRINT, shade
 from hoof_env.paper.figures import DRAWINGS, draw_angles, draw_forces, draw_paths, draw_vectors
 from hoof_env.paper.measure import measure_stance
 from hoof_env.paper.mechanism import draw_mechanism
-from hoof_env.paper.reproduce import run_cycle
+from hoof_env.paper.reproduce import run_cycle, write_reproduction
 from hoof_env.paper.rows import EXACT
 from tests.linkage import BODIES, POINTS
 
@@ -70,16 +69,18 @@ def test_every_figure_is_written_twice_and_again_without_a_difference(reproducti
 
     own = {"lines.linewidth": 7, "savefig.bbox": "tight", "axes.grid": True}  # a user's, without effect
     with matplotlib.rc_context(own):
-        paths = figures.draw_all(reproduction, tmp_path)
+        paths = write_reproduction(reproduction, tmp_path)
     assert sorted(paths) == sorted(tmp_path.iterdir())
     folders = drawn, tmp_path
-    assert {path.name for path in drawn.iterdir()} == {path.name for path in paths}
+    texts = {"reproduction.json", "reproduction.md"}
+    assert {path.name for path in drawn.iterdir()} | texts == {path.name for path in paths}
     names = {f"figure{n}.{s}" for n in (1, 3, 4, 5, 6) for s in ("png", "svg")}
-    assert {path.name for path in paths} == names
+    assert {path.name for path in drawn.iterdir()} == names
     for name in names:
         assert (folders[0] / name).read_bytes() == (folders[1] / name).read_bytes(), name
         if name.endswith("png"):
             with Image.open(folders[0] / name) as picture:
+                assert picture.mode == "P", name  # with a palette
                 assert picture.width >= 175 / 25.4 * 200, name  # two columns at 200 dots an inch
         else:
             text = (folders[0] / name).read_text(encoding="utf-8")
