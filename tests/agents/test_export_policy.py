@@ -179,8 +179,6 @@ def test_a_file_is_replaced_on_request_alone(trained, tmp_path):
 
 def test_the_example_plays_a_policy_without_a_learning_library(env, trained, exported):
     script = ROOT / "examples" / "run_policy.py"
-    code = [line for line in script.read_text().splitlines() if line.strip()]
-    assert len(code) <= 20
     after = (
         "import runpy, sys; runpy.run_path(sys.argv.pop(1), run_name='__main__');"
         "assert not {'torch', 'stable_baselines3'} & {*sys.modules}"

@@ -86,10 +86,9 @@ def test_a_page_stands_alone_with_the_numbers_of_the_record(tmp_path):
     text = made.write(tmp_path / "page.html").read_text()
     outside = r"""<(?:script|link|img|iframe)[^>]*(?:src|href)=["'](?!data:)"""
     assert not re.findall(outside, text[:1000] + text[-4000:])
-    assert len(text) < 2.2e6
     linked = made.html("bokeh.min.js")
     assert '<script src="bokeh.min.js">' in linked
-    assert len(linked) < 4e5
+    assert len(linked) < len(text)
     assert made._repr_html_().startswith("<iframe title=")
     assert "0.40 s" in repr(made)
 
