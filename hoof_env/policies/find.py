@@ -13,7 +13,8 @@ from typing import Any
 import gymnasium as gym
 import numpy as np
 
-from hoof_env.envs.policies import constant_gait, load_open_loop, make_policy, open_loop_record, policy_names
+from hoof_env.envs.open_loop import load_open_loop, open_loop_record
+from hoof_env.envs.policies import constant_gait, make_policy, policy_names
 from hoof_env.envs.shipped import SHIPPED
 from hoof_env.errors import DataFileError, MissingExtraError, ParameterError, count
 from hoof_env.gait import PARAMETERS, GaitParameters

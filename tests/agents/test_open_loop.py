@@ -12,7 +12,7 @@ from agents.open_loop import SIZES, Args, decode, encode, main, optimise, search
 from agents.runs import make_env
 from hoof_env import records
 from hoof_env.envs import policies
-from hoof_env.envs.policies import GAITS, load_open_loop, open_loop_record
+from hoof_env.envs.open_loop import GAITS, load_open_loop, open_loop_record
 from hoof_env.errors import DataFileError
 from hoof_env.evaluation.episodes import play, score_vector
 from hoof_env.policies.find import find_policy

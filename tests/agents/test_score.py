@@ -12,7 +12,8 @@ import pytest
 from agents.open_loop import decode
 from agents.runs import make_env
 from hoof_env import cli
-from hoof_env.envs.policies import Scripted, open_loop
+from hoof_env.envs.open_loop import open_loop
+from hoof_env.envs.policies import Scripted
 from hoof_env.errors import DataFileError
 from hoof_env.evaluation import episodes as played
 from hoof_env.evaluation import scores

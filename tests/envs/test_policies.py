@@ -7,13 +7,8 @@ import gymnasium as gym
 import numpy as np
 import pytest
 
-from hoof_env.envs.policies import (
-    load_open_loop,
-    make_policy,
-    open_loop,
-    policy_names,
-    start_of,
-)
+from hoof_env.envs.open_loop import load_open_loop, open_loop
+from hoof_env.envs.policies import make_policy, policy_names, start_of
 from hoof_env.gait import PARAMETERS, GaitParameters, load_gait
 from hoof_env.tasks import horse as horse_body
 from hoof_env.tasks.observation import HALF_RANGE, HIGH, LOW, MIDDLE

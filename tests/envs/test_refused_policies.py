@@ -10,7 +10,8 @@ import gymnasium as gym
 import numpy as np
 import pytest
 
-from hoof_env.envs.policies import load_open_loop, make_policy, open_loop
+from hoof_env.envs.open_loop import load_open_loop, open_loop
+from hoof_env.envs.policies import make_policy
 from hoof_env.errors import DataFileError, ParameterError
 
 LEG = "hoof_env/HorseLeg-v0"
