@@ -136,11 +136,12 @@ def towards(env: Any, gait_at: Any) -> Any:
 def make_policy(name: str, env: Any, seed: int = 0) -> Scripted:
     """Make a scripted policy for an environment.
 
-    The name of a gait starts in that gait and keeps it. "idle" stops the crank and holds the swing; "random"
-    draws a new action in every step; "bang-bang" switches all actions between their limits every quarter of a
-    second; "drag" turns the hoof to the ground, stops there and moves it back and forth with the swing;
-    "airborne" turns it to its highest position and stops there. For a horse, "reference" is the zero action:
-    the gait from which actions make offsets.
+    The name of a gait starts in that gait and keeps it. "zero" is the zero action: it keeps the gait in which
+    an episode starts, and on a horse is "reference" by another name. "idle" stops the crank and holds the
+    swing; "random" draws a new action in every step; "bang-bang" switches all actions between their limits
+    every quarter of a second; "drag" turns the hoof to the ground, stops there and moves it back and forth
+    with the swing; "airborne" turns it to its highest position and stops there. For a horse, "reference" is
+    the zero action: the gait from which actions make offsets.
 
     >>> import gymnasium as gym, hoof_env
     >>> env = gym.make("hoof_env/HorseLeg-v0")
@@ -162,10 +163,10 @@ def make_policy(name: str, env: Any, seed: int = 0) -> Scripted:
             f"env: expected an environment of this package, make_policy(name, env), got {env!r}"
         )
     check_choice("policy", name, policy_names(env))
-    if leg.task.action_map and name not in ("random", "bang-bang"):
+    if leg.task.action_map and name not in ("zero", "random", "bang-bang"):
         raise ParameterError(
-            f'policy {name!r}: expected actions of the leg, got actions that are {leg.action_form}; "random"'
-            ' and "bang-bang" take any'
+            f'policy {name!r}: expected actions of the leg, got actions that are {leg.action_form}; "zero",'
+            ' "random" and "bang-bang" take any'
         )
     policy = _scripted(name, env, leg, seed)
     policy.name = name
@@ -175,7 +176,7 @@ def make_policy(name: str, env: Any, seed: int = 0) -> Scripted:
 def _scripted(name: str, env: Any, leg: Any, seed: int) -> Scripted:
     """Make the policy of a known name, see `make_policy`; `leg` is the unwrapped environment."""
     count = len(leg.batch.action_names)
-    if name == "reference":
+    if name in ("zero", "reference"):
         return Scripted(lambda observation, time: np.zeros(count, np.float32), leg.dt)
     if name == "random":
         generator = np.random.default_rng(seed)
