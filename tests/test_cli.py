@@ -43,7 +43,7 @@ def test_reproduce_writes_its_results(tmp_path, capsys, monkeypatch, reproduced)
     assert cli.main(["reproduce", "--out", str(folder), "--no-figures"]) == 0
     assert "exact, run, inelastic: peak" in capsys.readouterr().out
     assert {file.name for file in folder.iterdir()} == {"reproduction.json", "reproduction.md"}
-    assert len(json.loads((folder / "reproduction.json").read_text(encoding="utf-8"))) == 99
+    assert len(json.loads((folder / "reproduction.json").read_text(encoding="utf-8"))) == 99 + 22 + 30
     page = (folder / "reproduction.md").read_text(encoding="utf-8")
     assert f"hoof-env reproduce --out {folder} --no-figures" in page
 

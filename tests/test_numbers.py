@@ -19,7 +19,8 @@ import pytest
 
 from hoof_env.envs.horse_leg import HorseLegEnv
 from hoof_env.evaluation.statistics import iqm
-from hoof_env.paper.rows import EXACT, OURS, PRINTED, PROBABLE, REPORTED
+from hoof_env.ground.laws import FACTORS, restitution_of_factor
+from hoof_env.paper.rows import EXACT, OURS, PRINTED, PROBABLE, UNDETERMINED
 from hoof_env.tasks.horse import MASS
 from hoof_env.tasks.horse_terms import HORSE_TERMS
 from hoof_env.tasks.reward import check_weights
@@ -150,19 +151,59 @@ def evidence(*words: str) -> float:
     raise AssertionError(f"{page} has no such cell: {row}, {column}")
 
 
-def reproduced(solver: str, count: str) -> float:
-    """How many rows of the committed reproduction have a bar, or are within it, with a solver."""
+def entries_of(kind: str) -> list[dict[str, Any]]:
+    """The entries of a kind in the committed reproduction."""
     entries = json.loads((ROOT / "docs/paper/reproduction.json").read_text(encoding="utf-8"))
+    return [entry for entry in entries if entry["kind"] == kind]
+
+
+def reproduced(solver: str, count: str) -> float:
+    """How many rows of the committed reproduction have a verdict with a solver, are within their bar, or are
+    not determinable."""
     names = {"exact": EXACT, "printed": PRINTED, "probable": PROBABLE}
-    rows = [entry for entry in entries if entry["kind"] == "row" and entry["solver"] == names[solver]]
-    barred = [row for row in rows if row["spared"] != REPORTED]
-    return {"rows": len(barred), "within": sum(bool(row["within_bar"]) for row in barred)}[count]
+    rows = [row for row in entries_of("row") if row["solver"] == names[solver]]
+    return {
+        "rows": sum(not row["spared"] for row in rows),
+        "within": sum(bool(row["within_bar"]) for row in rows),
+        "lost": sum(row["spared"] == UNDETERMINED for row in rows),
+    }[count]
+
+
+def row(name: str, solver: str, figure: str) -> float:
+    """A figure of a row of the committed reproduction: "simulated", "published", the size of its "error", or
+    another reading by its name."""
+    names = {"exact": EXACT, "printed": PRINTED, "probable": PROBABLE}
+    (found,) = (e for e in entries_of("row") if (e["id"], e["solver"]) == (name, names[solver]))
+    value = found[figure] if figure in found else found["beside"][figure]
+    return abs(value) if figure == "error" else value
+
+
+def level(name: str, figure: str) -> float:
+    """What a row of the committed reproduction is where the ground is so many micrometres higher; or by how
+    many bars it moves at most: "moved"; of all determinable rows together by the name "rest"."""
+    entries = {entry["id"]: entry for entry in entries_of("level")}
+    if name == "rest":
+        return max(entry[figure] for entry in entries.values() if entry["determinable"])
+    entry = entries[name]
+    if figure == "moved":
+        return entry["moved"]
+    return entry["simulated"][entry["shifts_um"].index(int(figure))]
+
+
+def detail(name: str) -> float:
+    """A figure of a gait in the committed reproduction that the paper does not print."""
+    (found,) = (entry for entry in entries_of("detail") if entry["id"] == name)
+    return found["value"]
+
+
+def returned(law: str, cr: str) -> float:
+    """The restitution of a free impact under a contact law."""
+    return restitution_of_factor(FACTORS[law](float(cr)))
 
 
 def claims(count: str) -> float:
     """How many claims of the paper there are, hold as printed, or hold with a turned sign, converged."""
-    entries = json.loads((ROOT / "docs/paper/reproduction.json").read_text(encoding="utf-8"))
-    shapes = [entry for entry in entries if entry["kind"] == "shape" and entry["solver"] == EXACT]
+    shapes = [entry for entry in entries_of("shape") if entry["solver"] == EXACT]
     of_paper = [shape for shape in shapes if not shape["claim"].startswith(OURS)]
     turned = sum(bool(shape["used"]) for shape in of_paper if shape["holds"])
     held = sum(shape["holds"] for shape in of_paper)
@@ -181,6 +222,10 @@ SOURCES: dict[str, Callable[..., float]] = {
     "gain": gain,
     "evidence": evidence,
     "reproduced": reproduced,
+    "row": row,
+    "level": level,
+    "detail": detail,
+    "returned": returned,
     "claims": claims,
 }
 

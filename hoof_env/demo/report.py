@@ -12,7 +12,7 @@ from hoof_env.errors import MissingExtraError
 from hoof_env.evaluation.scores import METRICS, Score, cell
 from hoof_env.paper.report import format_error, format_number
 from hoof_env.paper.reproduce import GAITS, SOLVERS
-from hoof_env.paper.rows import OURS, REPORTED, Reproduction
+from hoof_env.paper.rows import NOT_DETERMINABLE, OURS, Reproduction
 
 OPEN_LOOP = "open-loop"
 TEMPLATE = Path(__file__).with_name("report.html.j2")
@@ -97,7 +97,7 @@ class Report:
             episodes=episodes,
             seeds=(self.first_seed, self.first_seed + episodes - 1),
             by_policy={score.policy: score.estimates for score in self.scores},
-            reported=REPORTED,
+            lost=NOT_DETERMINABLE,
             ours=[shape["claim"] for shape in shapes if shape["claim"].startswith(OURS)],
             worse=worse(agent, next(score for score in gaits if score.policy == "run")),
             agent=agent.policy,

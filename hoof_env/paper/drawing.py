@@ -14,7 +14,7 @@ from hoof_env._plotting import BLUE, GREEN, GREY, ORANGE, PURPLE, SOIL, STYLE
 from hoof_env.leg.geometry import Geometry
 from hoof_env.leg.kinematics import FrameMotion, pose
 from hoof_env.paper.measure import POINTS, Stance, Trace, measure_stance
-from hoof_env.paper.rows import CONDITIONS, EXACT, PublishedRow, Reproduction
+from hoof_env.paper.rows import CONDITIONS, EXACT, NOT_DETERMINABLE, PublishedRow, Reproduction
 
 SMALL = 7.0
 """Smallest size of type [points]."""
@@ -153,8 +153,8 @@ def mark_published(ax: Any, x: Any, y: Any, *, xerr: Any = None, yerr: Any = Non
 
 def half_bar(row: PublishedRow) -> float:
     """Return the largest accepted difference from the published value, in the row's unit; 0 if the row is
-    only reported."""
-    limit = row.bar.limit or 0.0
+    only reported or not determinable."""
+    limit = 0.0 if row.id in NOT_DETERMINABLE else row.bar.limit or 0.0
     return abs(row.value) * limit / 100 if row.bar.measure == "%" else limit
 
 

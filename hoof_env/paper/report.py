@@ -14,13 +14,14 @@ from hoof_env import __version__
 from hoof_env._output import markdown_table
 from hoof_env.ground.contact import HERTZ
 from hoof_env.paper.figures import DRAWINGS
+from hoof_env.paper.level import SHIFTS
 from hoof_env.paper.measure import hoof_error, measure_stance
 from hoof_env.paper.rows import (
     EULER,
     EXACT,
-    ILL,
     PRINTED,
     PROBABLE,
+    UNDETERMINED,
     Reproduction,
     betas,
     counted,
@@ -69,7 +70,8 @@ def markdown(reproduction: Reproduction, *, command: str, figures: bool) -> str:
         ),
         summaries="\n\n".join(_summary(reproduction, solver) for solver in solvers),
         rows=_rows_table(reproduction, solvers),
-        ill_conditioned=_ill_conditioned(reproduction),
+        undetermined=_undetermined(reproduction),
+        details=_details_table(reproduction),
         resultants=_resultants(reproduction, solvers),
         beside=_beside_table(reproduction, solvers),
         claims="\n\n".join(_shape(reproduction, claim.id, figures) for claim in published.claims),
@@ -129,7 +131,7 @@ def _rows_table(reproduction: Reproduction, solvers: list[str]) -> str:
             # `within_bar` is None, and not False, for a row that is spared.
             if row["within_bar"] is False:
                 error += " ✗"
-            elif row["spared"] == ILL:
+            elif row["spared"] == UNDETERMINED:
                 error += " †"
             if (row["id"], solver) in worst:
                 error = f"**{error}**"
@@ -140,20 +142,66 @@ def _rows_table(reproduction: Reproduction, solvers: list[str]) -> str:
     return markdown_table(head, lines)
 
 
-def _ill_conditioned(reproduction: Reproduction) -> str:
-    """Return the section on ill-conditioned rows, "" if there are none."""
-    spared = dict.fromkeys(row["id"] for row in _of(reproduction.rows, spared=ILL))
+def _undetermined(reproduction: Reproduction) -> str:
+    """Return the section on rows that are not determinable, "" if there are none."""
+    spared = list(dict.fromkeys(row["id"] for row in _of(reproduction.rows, spared=UNDETERMINED)))
     if not spared:
         return ""
-    return (
-        "## Ill-conditioned rows\n\n"
-        f"These rows, marked †, count as outside with {listed((f'`{solver}`' for solver in EULER), 'or')}: "
-        f"{listed(f'`{name}`' for name in spared)}. Inelastic walking depends on the approach speed at a "
-        "touch-down that grazes the ground. The paper's loop takes that speed at its first step inside the "
-        "ground, so a small change of the time step, of β or of the identified ground level moves these rows "
-        "by many bars. How far each row moves is measured in the repository's "
-        "[docs/evidence/README.md](../evidence/README.md#the-paper).\n\n"
+    text = (
+        "## Rows that are not determinable\n\n"
+        f"These rows, marked †, have no verdict with any solver: {listed(f'`{name}`' for name in spared)}. "
+        "The walking toe grazes the ground, and Eq. 14 divides by the speed at which it touches down, so the "
+        "inelastic force of walking is a spike over the ground level. The level is fitted, and the search "
+        "put it on top of the spike. A row is not determinable if a shift of the ground level of at most "
+        f"{1e3 * max(SHIFTS):g} mm moves it by more than its bar."
     )
+    if not reproduction.levels:
+        return text + "\n\n"
+    first = reproduction.levels[0]
+    places = [k for k, shift in enumerate(first["shifts_um"]) if shift < 0]
+    middle = len(places)
+    head = ["row", *(f"{shift:+d} µm" for shift in first["shifts_um"])]
+    head.insert(1 + middle, "fitted level")
+    lines = []
+    for name in spared:
+        (entry,) = _of(reproduction.levels, id=name)
+        (row,) = _of(reproduction.rows, id=name, solver=EXACT)
+        values = list(zip(entry["simulated"], entry["within_bar"], strict=True))
+        values.insert(middle, (row["simulated"], abs(row["error"]) <= _limit(reproduction, name)))
+        cells = [format_number(value, row["unit"]) + ("" if within else " ✗") for value, within in values]
+        lines.append([f"`{name}` [{row['unit']}]", *cells])
+    moved = listed(f"{_of(reproduction.levels, id=name)[0]['moved']:.1f} (`{name}`)" for name in spared)
+    rest = [entry for entry in reproduction.levels if entry["id"] not in spared]
+    most = max(rest, key=lambda entry: entry["moved"])
+    leaving = [f"`{entry['id']}`" for entry in rest if not all(entry["within_bar"])]
+    left = (
+        f" {listed(leaving)} {'leave' if len(leaving) > 1 else 'leaves'} the bar all the same, because the "
+        "fit ends so near it."
+        if leaving
+        else ""
+    )
+    return (
+        f"{text} With solver `{EXACT}`, by the rise of the ground (✗ is outside the bar):\n\n"
+        f"{markdown_table(head, lines)}\n\n"
+        f"Within these shifts the rows move by {moved} bars, and each of the other {len(rest)} by "
+        f"{most['moved']:.2f} bars at most (`{most['id']}`).{left}\n\n"
+    )
+
+
+def _limit(reproduction: Reproduction, name: str) -> float:
+    """Return the largest accepted error of a row, 0 if it is only reported."""
+    return reproduction.published.row(name).bar.limit or 0.0
+
+
+def _details_table(reproduction: Reproduction) -> str:
+    """Return the table of figures beside the published ones, by gait."""
+    by_name: dict[str, list[str]] = {}
+    gaits = list(dict.fromkeys(entry["id"].partition(".")[0] for entry in reproduction.details))
+    for entry in reproduction.details:
+        name = entry["id"].partition(".")[2]
+        line = by_name.setdefault(name, [f"`{name}`", entry["quantity"], entry["unit"]])
+        line.append(f"{entry['value']:.2f}")
+    return markdown_table(["figure", "quantity", "unit", *gaits], by_name.values())
 
 
 def _resultants(reproduction: Reproduction, solvers: list[str]) -> str:

@@ -21,7 +21,9 @@ from hoof_env.errors import HoofEnvError, ParameterError
 from hoof_env.leg.geometry import Geometry
 from hoof_env.leg.mechanism_list import PAPER
 from hoof_env.paper import report
-from hoof_env.paper.measure import Trace, cycle_of, measure_stance
+from hoof_env.paper.details import details
+from hoof_env.paper.level import SHIFTS, compare_levels, level_line
+from hoof_env.paper.measure import Stance, Trace, cycle_of, measure_stance
 from hoof_env.paper.rows import CONDITIONS, EXACT, Published, compare, counted, load_published, settings_of
 from hoof_env.paper.rows import SOLVERS as SOLVERS
 from hoof_env.paper.rows import Reproduction as Reproduction
@@ -115,9 +117,30 @@ def reproduce(progress: Callable[[str], None] | None = None, *, preset: str | No
             tell(f"{solver}, {gait}, 0, 5, 10 cm deep: sole moves at {values} m/s")
         rows += compare(published, stances, solver)
     shapes = _judge_all(traces, medians, published)
+    levels = compare_levels(
+        published, rows, {shift: stances_at(geometry.hip_height - shift, **settings) for shift in SHIFTS}
+    )
+    tell(level_line(levels))
     for solver in SOLVERS:
         tell(f"{solver}: {counted(rows, shapes, solver)}")
-    return Reproduction(rows, shapes, traces, geometry, published, ground)
+    found = details({key[:2]: trace for key, trace in traces.items() if key[2] == EXACT})
+    return Reproduction(rows, shapes, traces, geometry, published, ground, levels, found)
+
+
+def stances_at(hip_height: float, **settings: Any) -> dict[tuple[str, str], Stance]:
+    """Measure the four conditions with the exact solver under a hip at another height [m].
+
+    Args:
+        hip_height: height of the hip above the ground [m]; ground that rises lowers it.
+        **settings: other arguments of the environment.
+    """
+    return {
+        (gait, condition): measure_stance(
+            run_cycle(gait, EXACT, restitution=restitution, hip_height=hip_height, **settings)
+        )
+        for gait in GAITS
+        for condition, restitution in CONDITIONS.items()
+    }
 
 
 def _check_paper(preset: str | None, geometry: Geometry, gaits: Collection[str]) -> None:
@@ -181,7 +204,12 @@ def write_reproduction(
     """
     out_dir = Path(out_dir)
     with staged(out_dir) as stage:
-        entries = [*reproduction.rows, *reproduction.shapes]
+        entries = [
+            *reproduction.rows,
+            *reproduction.shapes,
+            *reproduction.levels,
+            *reproduction.details,
+        ]
         text = json.dumps(entries, indent=1, ensure_ascii=False, allow_nan=False)
         (stage / "reproduction.json").write_text(text + "\n", encoding="utf-8")
         if figures:

@@ -1,7 +1,7 @@
 """Published numbers and claims of the paper, and their comparison with a simulation.
 
 A row is counted as within or outside its bar unless it is spared: its bar is 'reported', or it is one of
-`ILL_CONDITIONED` and the solver is one of the paper's. Solver "paper" is the paper's Eq. 8 in explicit Euler
+`NOT_DETERMINABLE`. Solver "paper" is the paper's Eq. 8 in explicit Euler
 at 1 ms with Baumgarte's beta as printed, sqrt(2 alpha), and "paper, probable beta" the same with the beta
 that is probably meant, sqrt(2) alpha. "exact" is the closed form with a time step so small that the results
 no longer change.
@@ -194,16 +194,16 @@ SOLVERS = (*EULER, EXACT)
 Stances = Mapping[tuple[str, str], Stance]
 """Measured cycles by (gait, condition)."""
 
-ILL_CONDITIONED = ("walk.peak_inelastic", "walk.mean_inelastic", "walk.reduction")
-"""Rows without a bar for the paper's solver, with either beta: the walk grazes, and they depend on how its
-loop samples touch-down (docs/evidence/README.md has how far they move)."""
+NOT_DETERMINABLE = ("walk.peak_inelastic", "walk.mean_inelastic", "walk.reduction")
+"""Rows without a verdict: the walk grazes, and tens of micrometres of the ground level, which is fitted, move
+them out of their bars with any solver (`level.compare_levels` measures it)."""
 
 OURS = "not in the paper"
 """Beginning of a claim that the paper does not make."""
 
 # Reasons why a row is spared.
 REPORTED = "reported"
-ILL = "ill-conditioned"
+UNDETERMINED = "not determinable"
 
 
 @dataclass(frozen=True)
@@ -218,6 +218,8 @@ class Reproduction:
         geometry: leg of the preset, which is identified and not published.
         published: the published numbers.
         ground: elastic ground of the preset.
+        levels: a dictionary for each row that has a bar, see `level.compare_levels`.
+        details: a dictionary for each gait and figure, see `details.details`.
     """
 
     rows: list[dict[str, Any]]
@@ -226,6 +228,8 @@ class Reproduction:
     geometry: Geometry
     published: Published
     ground: Ground = field(default_factory=Ground)
+    levels: list[dict[str, Any]] = field(default_factory=list)
+    details: list[dict[str, Any]] = field(default_factory=list)
 
 
 @dataclass(frozen=True)
@@ -295,8 +299,8 @@ def compare(published: Published, stances: Stances, solver: str) -> list[dict[st
 
     Returns:
         A dictionary for each published number: the published row, the definition of its measure, "simulated",
-        "error" (signed, in the bar's measure), "spared" (the reason why the row has no bar with this solver,
-        or ""), "within_bar" (None if the row is spared) and "beside" (values under other readings by name).
+        "error" (signed, in the bar's measure), "spared" (the reason why the row has no verdict, or ""),
+        "within_bar" (None if the row is spared) and "beside" (values under other readings by name).
     """
     return [_compare(row, stances, solver) for row in published.rows]
 
@@ -304,19 +308,20 @@ def compare(published: Published, stances: Stances, solver: str) -> list[dict[st
 def counted(rows: Iterable[Mapping[str, Any]], shapes: Iterable[Mapping[str, Any]], solver: str) -> str:
     """Return a sentence with the numbers of a solver's rows within their bars and of claims that hold.
 
-    An ill-conditioned row counts as outside. The paper's claims are counted apart from checks of our own, and
-    those that hold in another reading than the printed one are told.
+    Rows that are not determinable are counted apart, and so are checks of our own beside the paper's claims;
+    claims that hold in another reading than the printed one are told.
     """
-    own_rows = [row for row in rows if row["solver"] == solver and row["spared"] != REPORTED]
-    within = sum(bool(row["within_bar"]) for row in own_rows)
-    ill = sum(row["spared"] == ILL for row in own_rows)
+    own_rows = [row for row in rows if row["solver"] == solver]
+    verdicts = [row["within_bar"] for row in own_rows if not row["spared"]]
+    lost = sum(row["spared"] == UNDETERMINED for row in own_rows)
     claims = [shape for shape in shapes if shape["solver"] == solver]
     of_paper = [claim for claim in claims if not claim["claim"].startswith(OURS)]
     held = [claim for claim in of_paper if claim["holds"]]
     turned = sum(bool(claim["used"]) for claim in held)
     ours = [claim["holds"] for claim in claims if claim["claim"].startswith(OURS)]
     parts = (
-        f"{within} of {len(own_rows)} rows within their bar{f' ({ill} outside are {ILL})' if ill else ''}",
+        f"{sum(verdicts)} of {len(verdicts)} determinable rows within their bar",
+        f"{lost} {UNDETERMINED}",
         f"{len(held) - turned} of {len(of_paper)} of the paper's claims about shape hold as printed"
         f"{f' and {turned} with the sign turned' if turned else ''}",
         f"{sum(ours)} of {len(ours)} checks of our own",
@@ -333,8 +338,8 @@ def _compare(row: PublishedRow, stances: Stances, solver: str) -> dict[str, Any]
     spared = ""
     if row.bar.limit is None:
         spared = REPORTED
-    elif solver in EULER and row.id in ILL_CONDITIONED:
-        spared = ILL
+    elif row.id in NOT_DETERMINABLE:
+        spared = UNDETERMINED
     return {
         "kind": "row",
         "id": row.id,

@@ -97,7 +97,7 @@ def test_every_published_number_stands_beside_both_solvers(folder, report):
     entries = json.loads((folder / "reproduction.json").read_text())
     shown = {row[0].split()[-1]: row for row in report.tables["reproduction"] if len(row) == 2 + len(SOLVERS)}
     for row in published.rows:
-        simulated = [e for e in entries if e["id"] == row.id]
+        simulated = [e for e in entries if e["kind"] == "row" and e["id"] == row.id]
         assert [e["solver"] for e in simulated] == list(SOLVERS)
         _, printed, *cells = shown[row.id]
         assert float(printed.split()[0]) == pytest.approx(row.value, abs=0.051)
@@ -105,6 +105,7 @@ def test_every_published_number_stands_beside_both_solvers(folder, report):
         for cell, entry in zip(cells, simulated, strict=True):
             assert float(cell.split()[0]) == pytest.approx(entry["simulated"], abs=0.051)
             assert ("✓" in cell, "✗" in cell) == (entry["within_bar"] is True, entry["within_bar"] is False)
+            assert ("†" in cell) is (entry["spared"] == "not determinable")
     for claim in published.claims:
         assert claim.id in report.ids
 
