@@ -222,7 +222,7 @@ def draw_forces(figure: Any, reproduction: Reproduction) -> None:
     """Draw figure 5: force of the ground over time in the four conditions, with sub-phases, simulated peaks,
     published peaks at the times of the simulated ones, and published instants of contact on the time axis;
     means over the cycle stand at the side."""
-    note = "Bars: margin of each determinable row. Peaks have no time in print; marks: that of the simulated one."
+    note = "Bars: margin of each determinable row. Peaks have no time in print: marks at the simulated ones."
     head(figure, 4.2, reproduction, "Figure 5. Ground reaction force", "elastic and inelastic", note)
     axes = figure.subplots(1, 4, width_ratios=(9, 2, 9, 2)).reshape(2, 2)
     for (gait, (_, stance)), (ax, mean) in zip(elastic_cycles(reproduction).items(), axes, strict=True):

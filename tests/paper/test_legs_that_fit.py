@@ -4,7 +4,7 @@ import pytest
 
 from hoof_env.leg.geometry import load_geometry
 from hoof_env.paper.reproduce import reproduce
-from hoof_env.paper.rows import EXACT, PROBABLE, counted
+from hoof_env.paper.rows import EXACT, NOT_DETERMINABLE, PROBABLE, counted
 from tests.legs import load_ensemble
 
 ENSEMBLE = load_ensemble()
@@ -14,6 +14,8 @@ def check(reproduction):
     for solver in (EXACT, PROBABLE):
         words = counted(reproduction.rows, reproduction.shapes, solver)
         assert words.startswith("19 of 19 determinable rows within their bar, 3 not determinable")
+        lost = {entry["id"] for entry in reproduction.levels if not entry["determinable"]}
+        assert lost == set(NOT_DETERMINABLE)
         assert words.endswith(
             "6 of 7 of the paper's claims about shape hold as printed and 1 with the sign turned, "
             "2 of 2 checks of our own"
