@@ -24,14 +24,13 @@ from tyro.conf import Positional
 
 from agents import runs
 from agents.command import run
-from agents.gait_figures import SETTLED, froude_of
+from agents.gait_figures import SETTLED
 from agents.horse_gaits import speed_of
 from agents.statistics import described
 from hoof_env.constants import GRAVITY
 from hoof_env.errors import count
 from hoof_env.evaluation.episodes import FINAL_SEEDS, make_rows
 from hoof_env.policies.find import find_policy
-from hoof_env.tasks.horse import HIP_HEIGHT
 from hoof_env.tasks.horse_gaits import LEGS, PAIRS
 
 ENV_ID = "hoof_env/Horse-v0"
@@ -52,6 +51,9 @@ SUMMARY = (
     "failed",
 )
 """Figures of an episode that are kept besides the return."""
+
+NET = tuple(f"net_{pair}" for pair in PAIRS)
+"""Net horizontal forces of the pairs [N/kg]."""
 
 Episode = dict[str, float]
 
@@ -82,7 +84,7 @@ def play(envs: Any, policy: Any, seeds: Sequence[int], options: Mapping[str, Any
     kilograms = envs.weight / GRAVITY
     observation, infos = envs.reset(seed=list(seeds), options=dict(options))
     names = [name for name in infos if name.startswith("reward_")]
-    sums = {name: np.zeros(n) for name in ("return", *names, *(f"net_{pair}" for pair in PAIRS))}
+    sums = {name: np.zeros(n) for name in ("return", *names, *NET)}
     episodes: list[Episode] = [{} for _ in seeds]
     start = going = np.ones(n, bool)
     state = None
@@ -106,7 +108,7 @@ def play(envs: Any, policy: Any, seeds: Sequence[int], options: Mapping[str, Any
             summary["stance_peak_n"] = summary["stance_peak_sum_n"] / max(summary["stances"], 1.0)
             counted = max(step * envs.dt - SETTLED, envs.dt)
             one = {name: float(total[row]) for name, total in sums.items()}
-            one |= {f"net_{pair}": one[f"net_{pair}"] / counted / kilograms[row] for pair in PAIRS}
+            one |= {name: one[name] / counted / kilograms[row] for name in NET}
             episodes[row] = one | {name: summary[name] for name in SUMMARY}
         going = going & ~ended
         start = failed | truncated
@@ -172,7 +174,7 @@ def figures_of(envs: Any, policy: Any, zero: Any, seeds: Sequence[int]) -> dict[
             name: play(envs, one, seeds, options)
             for name, (one, options) in players(policy, zero, speed).items()
         }
-        shown = {name: means(episodes, ("return", *SUMMARY)) for name, episodes in played.items()}
+        shown = {name: means(episodes, ("return", *SUMMARY, *NET)) for name, episodes in played.items()}
         more = gain(played["agent"], played["zero action"])
         found["speeds"].append({"speed_m_s": speed, "policies": shown, "gain": more})
         for name, of_policy in shown.items():
@@ -181,10 +183,10 @@ def figures_of(envs: Any, policy: Any, zero: Any, seeds: Sequence[int]) -> dict[
         speed = speed_of(froude)
         both = players(policy, zero, speed)
         nets = {
-            name: means(play(envs, *both[name][:1], seeds, both[name][1]), [f"net_{pair}" for pair in PAIRS])
+            name: means(play(envs, both[name][0], seeds, both[name][1]), NET)
             for name in ("zero action", "agent")
         }
-        found["forces"].append({"froude": froude_of(speed, HIP_HEIGHT), "speed_m_s": speed, "policies": nets})
+        found["forces"].append({"froude": froude, "speed_m_s": speed, "policies": nets})
         for name, of_policy in nets.items():
             tell(f"Froude number {froude:g}, {name}", of_policy)
     return found

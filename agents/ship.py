@@ -281,7 +281,8 @@ def write_index(folder: Path, scores: Path) -> None:
     text = (
         "# Trained policies\n\n"
         "One for each id, made by `python -m agents.ship`; docs/agents.md says how to use them.\n"
-        "Mean returns in the same episodes, and the bootstrap's 95 % interval over the episodes of each policy.\n"
+        "Mean returns in the same episodes, and the bootstrap's 95 % interval over the episodes of each"
+        " policy.\n"
         "It says nothing about other trainings; each card says of how many its policy is the best.\n"
         "`HorseLegFixed-v0` has one deterministic episode.\n\n"
     )
