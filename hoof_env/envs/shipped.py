@@ -41,6 +41,15 @@ def shipped_returns(name: str) -> dict[str, float]:
         raise DataFileError(f"scores {path}: expected those that agents.ship writes: {error!r}") from None
 
 
+def is_one_episode(name: str) -> bool:
+    """True if all published episodes of an id are the same, so that a return is no mean."""
+    path = SHIPPED / name / "score.json"
+    try:
+        return len(set(parse_json(path.read_text(encoding="utf-8"))["returns"])) == 1
+    except (OSError, ValueError, KeyError, TypeError, AttributeError):
+        return False
+
+
 def good_returns(name: str) -> str:
     """Return the mean returns of the policies of an id as text, see `shipped_returns`."""
     returns = shipped_returns(name)
