@@ -19,8 +19,8 @@ from typing import Any
 import numpy as np
 
 from agents import runs
+from agents.cards import FILM, POLICIES
 from agents.command import run
-from agents.ship import FILM, POLICIES
 from agents.stock import OUT as CURVES
 from agents.stock_page import at
 from agents.stock_plan import TUNED, read_curves

@@ -35,7 +35,7 @@ def test_a_policy_ships_for_every_id():
 @pytest.mark.parametrize("env_id", shipped_ids())
 def test_numpy_plays_what_ships_as_onnx_does(env_id):
     pytest.importorskip("onnxruntime")
-    from agents.ship import POLICIES
+    from agents.cards import POLICIES
 
     policy = hoof_env.load_policy(env_id)
     exported = hoof_env.load_policy(POLICIES / env_id.removeprefix("hoof_env/") / "policy.onnx")
