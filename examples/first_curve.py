@@ -10,7 +10,8 @@ import torch
 from stable_baselines3 import PPO
 from stable_baselines3.common.monitor import Monitor
 
-from hoof_env.envs.policies import Scripted, load_open_loop, make_policy, start_of
+from hoof_env.envs.open_loop import load_open_loop
+from hoof_env.envs.policies import Scripted, make_policy, start_of
 
 ENV_ID = "hoof_env/HorseLeg-v0"
 torch.set_num_threads(1)  # more are slower with small networks, many times on a busy machine

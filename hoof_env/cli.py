@@ -84,6 +84,7 @@ def view(
     episode: Played = USUAL,
     port: int = 5006,
     address: str = "127.0.0.1",
+    host: tuple[str, ...] = (),
     open: bool = True,
     out: Path = Path(),
 ) -> None:
@@ -93,12 +94,14 @@ def view(
         episode: policy, environment and seed.
         port: port of the page; 0 takes any that is free.
         address: address on which the page is served; any other than this machine's own lets others use it.
+        host: names of this machine by which browsers may come, such as the one of a proxy. Without them the
+            page is served by loopback names, and with another address by local names and numbers.
         open: open the page in the browser, where there is a display.
         out: folder of recordings; made if it is missing.
     """
     from hoof_env.view.server import view
 
-    view(episode.id, episode.args, episode.policy, episode.seed, address, port, open, out)
+    view(episode.id, episode.args, episode.policy, episode.seed, address, port, open, out, host)
 
 
 def export(

@@ -13,7 +13,8 @@ import pytest
 from hoof_env import __version__, cli, records
 from hoof_env.constants import GRAVITY
 from hoof_env.dynamics.layout import TRUNK_STATE
-from hoof_env.envs.policies import GAITS, make_policy, open_loop_record, start_of
+from hoof_env.envs.open_loop import GAITS, open_loop_record
+from hoof_env.envs.policies import make_policy, start_of
 from hoof_env.envs.shipped import SHIPPED
 from hoof_env.errors import parse_pairs
 from hoof_env.gait import PARAMETERS, load_gait

@@ -5,19 +5,15 @@ All have the method `predict` of Stable-Baselines3, so that scripted and trained
 
 from __future__ import annotations
 
-import json
-import warnings
 from collections.abc import Mapping
 from functools import partial
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from hoof_env._version import __version__
 from hoof_env.envs.shown import line_of
-from hoof_env.errors import DataFileError, ParameterError, check_choice, parse_json
+from hoof_env.errors import ParameterError, check_choice
 from hoof_env.gait import LIMITS, GaitParameters, paper_gaits
 from hoof_env.leg.profile import leg_profile
 from hoof_env.tasks.leg_starts import extreme_posture
@@ -140,11 +136,12 @@ def towards(env: Any, gait_at: Any) -> Any:
 def make_policy(name: str, env: Any, seed: int = 0) -> Scripted:
     """Make a scripted policy for an environment.
 
-    The name of a gait starts in that gait and keeps it. "idle" stops the crank and holds the swing; "random"
-    draws a new action in every step; "bang-bang" switches all actions between their limits every quarter of a
-    second; "drag" turns the hoof to the ground, stops there and moves it back and forth with the swing;
-    "airborne" turns it to its highest position and stops there. For a horse, "reference" is the zero action:
-    the gait from which actions make offsets.
+    The name of a gait starts in that gait and keeps it. "zero" is the zero action: it keeps the gait in which
+    an episode starts, and on a horse is "reference" by another name. "idle" stops the crank and holds the
+    swing; "random" draws a new action in every step; "bang-bang" switches all actions between their limits
+    every quarter of a second; "drag" turns the hoof to the ground, stops there and moves it back and forth
+    with the swing; "airborne" turns it to its highest position and stops there. For a horse, "reference" is
+    the zero action: the gait from which actions make offsets.
 
     >>> import gymnasium as gym, hoof_env
     >>> env = gym.make("hoof_env/HorseLeg-v0")
@@ -166,10 +163,10 @@ def make_policy(name: str, env: Any, seed: int = 0) -> Scripted:
             f"env: expected an environment of this package, make_policy(name, env), got {env!r}"
         )
     check_choice("policy", name, policy_names(env))
-    if leg.task.action_map and name not in ("random", "bang-bang"):
+    if leg.task.action_map and name not in ("zero", "random", "bang-bang"):
         raise ParameterError(
-            f'policy {name!r}: expected actions of the leg, got actions that are {leg.action_form}; "random"'
-            ' and "bang-bang" take any'
+            f'policy {name!r}: expected actions of the leg, got actions that are {leg.action_form}; "zero",'
+            ' "random" and "bang-bang" take any'
         )
     policy = _scripted(name, env, leg, seed)
     policy.name = name
@@ -179,7 +176,7 @@ def make_policy(name: str, env: Any, seed: int = 0) -> Scripted:
 def _scripted(name: str, env: Any, leg: Any, seed: int) -> Scripted:
     """Make the policy of a known name, see `make_policy`; `leg` is the unwrapped environment."""
     count = len(leg.batch.action_names)
-    if name == "reference":
+    if name in ("zero", "reference"):
         return Scripted(lambda observation, time: np.zeros(count, np.float32), leg.dt)
     if name == "random":
         generator = np.random.default_rng(seed)
@@ -253,119 +250,6 @@ def _at_a_posture(name: str, env: Any, middle: float) -> Scripted:
     return Scripted(towards(env, hold), leg.dt)
 
 
-def open_loop(parameters: Mapping[str, Any], env: Any) -> Scripted:
-    """Make a policy that observes only its own gait and the time. It goes to a constant gait, or to one with
-    a first harmonic of a clock,
-
-        g(t) = constant + sin * sin(2 pi f t) + cos * cos(2 pi f t),   t: time since the start of the episode.
-
-    Args:
-        parameters: "constant", gait parameters, shape (4,), or (n, 4) for n environments; and with a clock
-            "sin" and "cos" of the same shape and "frequency_hz", a number or shape (n,). The sum is clipped
-            to the limits of the leg.
-        env: environment of one leg.
-
-    Raises:
-        ParameterError: a constant gait beyond the limits of the leg.
-    """
-    constant = np.asarray(parameters["constant"], float)
-    dt = env.unwrapped.dt
-    body = env.unwrapped.batch.body
-    if "frequency_hz" not in parameters:
-        body.check_reachable("constant", constant)
-        return Scripted(towards(env, lambda observation, time: constant), dt)
-    sine, cosine = (np.asarray(parameters[name], float) for name in ("sin", "cos"))
-    rate = 2 * np.pi * np.asarray(parameters["frequency_hz"], float)
-
-    def gait_at(observation: Any, time: Any) -> Any:
-        """Return g(t)."""
-        phase = np.asarray(rate * time)[..., None]
-        return np.clip(constant + sine * np.sin(phase) + cosine * np.cos(phase), body.low, body.high)
-
-    return Scripted(towards(env, gait_at), dt)
-
-
 STANDS_FOR = {"hoof_env/HorseLegMO-v0": "hoof_env/HorseLeg-v0"}
 """Ids that share the policies of another id, by their own: the leg is the same, and the sum of the first
 one's rewards is the reward of the second."""
-
-
-FORM = "gait"
-"""Form of the numbers in a gait's file: gait parameters in their units. Older files hold actions."""
-
-
-def open_loop_record(path: Path) -> dict[str, Any]:
-    """Read the file of an open-loop gait, which `agents.open_loop` writes: a mapping with "parameters" of one
-    environment as `open_loop` takes them, and their "form".
-
-    Raises:
-        DataFileError: not such a file, or its numbers are actions of an older form.
-    """
-    try:
-        record: dict[str, Any] = parse_json(path.read_text(encoding="utf-8"))
-        parameters = record["parameters"]
-        shapes = {"constant": (4,), "sin": (4,), "cos": (4,), "frequency_hz": ()}
-        clocked = "frequency_hz" in parameters
-        if set(parameters) != (set(shapes) if clocked else {"constant"}):
-            raise ValueError(f"parameters {sorted(parameters)}")
-        for name, value in parameters.items():
-            if np.shape(value) != shapes[name] or not np.isfinite(np.asarray(value, float)).all():
-                raise ValueError(f"{name} {value!r}")
-    except (OSError, ValueError, TypeError, KeyError, AttributeError) as error:
-        raise DataFileError(
-            f"open-loop gait {path}: expected the JSON object of agents.open_loop with form and parameters:"
-            f" {error!r}"
-        ) from None
-    if record.get("form") != FORM:
-        raise DataFileError(
-            f"open-loop gait {path}: expected form {FORM!r}, parameters of gaits, got {record.get('form')!r};"
-            " files of before hold actions that were positions, make them again by agents.open_loop"
-        )
-    return record
-
-
-GAITS = Path(__file__).parents[1] / "data" / "gaits"
-"""Folder of the open-loop gaits of the package, which `agents.open_loop` found."""
-
-
-def load_open_loop(path_or_env_id: str | Path, env: Any) -> Scripted:
-    """Make the policy of an open-loop gait. Warn if the gait was found for another id, with other settings,
-    or by another version.
-
-    Args:
-        path_or_env_id: file of a gait, or the id of an environment for its best gait in the package.
-        env: environment of one leg.
-
-    Raises:
-        DataFileError: there is no such gait, it cannot be read, or the environment is a horse.
-    """
-    path = Path(path_or_env_id)
-    if path.suffix != ".json":
-        name = STANDS_FOR.get(str(path_or_env_id), str(path_or_env_id)).rpartition("/")[2]
-        both = (GAITS / f"{name}-{family}.json" for family in ("constant", "clocked"))
-        files = [file for file in both if file.is_file()]
-        if not files:
-            known = ", ".join(sorted(file.name for file in GAITS.glob("*.json"))) or "none"
-            raise DataFileError(f"open-loop gait of {name}: expected one of those in {GAITS.name}/: {known}")
-        # Of a constant and a clocked gait the one with the higher mean return.
-        path = max(files, key=lambda file: open_loop_record(file)["score"]["mean"]["return"])
-    record = open_loop_record(path)
-    leg = env.unwrapped
-    if leg.action_form != "rates":
-        raise DataFileError(
-            f"open-loop gait {path}: expected an environment of one leg, got {type(leg).__name__} whose"
-            f" actions are {leg.action_form}"
-        )
-    here = leg.spec and leg.spec.id
-    unlike = []
-    if here and (there := record.get("env_id") or here) not in (here, STANDS_FOR.get(here)):
-        unlike.append(f"{there}, here {here}")
-    if (made_with := record.get("versions", {}).get("hoof-env", __version__)) != __version__:
-        unlike.append(f"hoof-env {made_with}, here {__version__}")
-    for key, there in record.get("env_kwargs", {}).items():
-        # Through JSON, as the record's value went: tuples are lists there.
-        if (present := json.loads(json.dumps(getattr(leg.settings, key, None), default=str))) != there:
-            unlike.append(f"{key}={there!r}, here {present!r}")
-    if unlike:
-        warnings.warn(f"open-loop gait {path}: found for {'; '.join(unlike)}", stacklevel=2)
-    return open_loop(record["parameters"], env)

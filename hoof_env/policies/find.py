@@ -13,7 +13,8 @@ from typing import Any
 import gymnasium as gym
 import numpy as np
 
-from hoof_env.envs.policies import constant_gait, load_open_loop, make_policy, open_loop_record, policy_names
+from hoof_env.envs.open_loop import load_open_loop, open_loop_record
+from hoof_env.envs.policies import constant_gait, make_policy, policy_names
 from hoof_env.envs.shipped import SHIPPED
 from hoof_env.errors import DataFileError, MissingExtraError, ParameterError, count
 from hoof_env.gait import PARAMETERS, GaitParameters
@@ -150,7 +151,7 @@ def find_function(name: str, actions: int) -> Function:
 def names_of(env: gym.Env[Any, Any]) -> list[str]:
     """Return the names of the policies of an environment of this package."""
     is_leg = env.unwrapped.action_form == "rates"  # type: ignore[attr-defined]
-    return [*policy_names(env), *(["open-loop"] if is_leg else []), "shipped"]
+    return [*policy_names(env), "open-loop", *(["constant"] if is_leg else []), "shipped"]
 
 
 def default_policy(env: gym.Env[Any, Any]) -> str:
@@ -192,8 +193,8 @@ def find_policy(name: str | None, env: gym.Env[Any, Any], env_id: str, seed: int
         )
     if text.endswith(".json"):
         return load_open_loop(text, env)
-    if text == "open-loop":
-        return load_open_loop(env_id, env)
+    if text in ("open-loop", "constant"):
+        return load_open_loop(env_id, env, None if text == "open-loop" else text)
     try:
         numbers = [float(number) for number in text.split(",")]
     except ValueError:
@@ -237,7 +238,8 @@ def load_policy(policy: Any, env: gym.Env[Any, Any] | None = None, seed: int = 0
               plays it;
             - the path of an .onnx file of `agents.export` or `stamp_onnx` (extra "onnx"), or of a .zip of
               Stable-Baselines3 or a run folder (extra "train"); a .zip can run code: load what you trust;
-            - a scripted policy by its name, see `make_policy`, or "open-loop", the best stored gait of an id;
+            - a scripted policy by its name, see `make_policy`, "open-loop", the best stored gait of an id
+              that sees nothing, or "constant", the best that is held;
             - the path of an open-loop gait, a .json;
             - a gait of one leg, in which episodes start: `GaitParameters`, or crank speed [rad/s], swing
               offset, sine and cosine coefficient [rad] as four numbers or as a text "6.28,0.7,-0.2,-0.3";

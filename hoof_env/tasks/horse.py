@@ -143,7 +143,7 @@ HORSE_KERNELS = BodyKernels(
     on_switch=refer_to_target,
 )
 
-POLICIES = ("reference", "random", "bang-bang")
+POLICIES = ("reference", "zero", "random", "bang-bang")
 """Names of the scripted policies."""
 
 

@@ -166,7 +166,7 @@ LEG_KERNELS = BodyKernels(
     on_switch=keep_gait,
 )
 
-POLICIES = ("idle", "random", "bang-bang", "drag", "airborne")
+POLICIES = ("zero", "idle", "random", "bang-bang", "drag", "airborne")
 """Names of the scripted policies that are not a gait of the preset."""
 
 

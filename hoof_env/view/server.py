@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import errno
+import ipaddress
 import logging
 import os
 import secrets
@@ -10,7 +11,7 @@ import socket
 import sys
 import webbrowser
 from collections import OrderedDict
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
@@ -30,6 +31,9 @@ KEPT_SETUPS = 64
 
 HERE = ("127.0.0.1", "localhost")
 """Addresses that only this machine reaches."""
+
+PRIVATE = (".local", ".lan", ".internal", ".home.arpa")
+"""Ends of names that the public name service does not give out, so that no other site can own one."""
 
 
 def check_bokeh() -> None:
@@ -89,8 +93,70 @@ class Pages:
             doc.template_variables.update(reason=words_of(error), wait=wait)
 
 
+def is_own_name(name: str, address: str, hosts: Collection[str] = ()) -> bool:
+    """True if a page that is served at an address may be asked for by this name.
+
+    A site on the internet can make its own name lead to this machine, and its scripts would then be those of
+    the page. Only loopback names are therefore answered at a loopback address. At an address that other
+    machines reach a browser may also come by an address in numbers, or by a name of the local network.
+
+    Args:
+        name: host of a request, without its port.
+        address: address at which the server listens.
+        hosts: further names, given by the user.
+    """
+    name = name.lower()
+    if name in {address.lower(), *HERE, *(host.lower() for host in hosts)}:
+        return True
+    try:
+        number = ipaddress.ip_address(name.strip("[]"))
+    except ValueError:
+        is_local = "." not in name or name.endswith(PRIVATE) or name == socket.gethostname().lower()
+        return is_local and not is_loopback(address)
+    return number.is_loopback or not is_loopback(address)
+
+
+def is_loopback(address: str) -> bool:
+    """True if only this machine reaches an address."""
+    try:
+        return ipaddress.ip_address(address).is_loopback
+    except ValueError:
+        return address.lower() == "localhost"
+
+
+def guarded(address: str, hosts: Collection[str]) -> type[Any]:
+    """Return Bokeh's application of Tornado, which answers requests by the server's own names alone, see
+    `is_own_name`, and opens sockets for pages of the same name and port alone."""
+    from bokeh.server.tornado import BokehTornado
+    from tornado.web import RequestHandler
+
+    class Refusal(RequestHandler):
+        def prepare(self) -> None:
+            self.set_status(403)
+            self.set_header("Content-Type", "text/plain; charset=utf-8")
+            self.finish(
+                "hoof-env view: this page is not served by that name. If the name is this machine's, start"
+                " the page with --host NAME.\n"
+            )
+
+    class Guarded(BokehTornado):
+        def find_handler(self, request: Any, **kwargs: Any) -> Any:
+            """Find the handler of a request, a refusal for a foreign host or origin."""
+            origin = request.headers.get("Origin") if "Upgrade" in request.headers else None
+            is_same = origin is None or origin.partition("://")[2].lower() == request.host.lower()
+            if is_same and is_own_name(request.host_name, address, hosts):
+                return super().find_handler(request, **kwargs)
+            return self.get_handler_delegate(request, Refusal)
+
+    return Guarded
+
+
 def start(
-    setup: dict[str, Any], address: str = HERE[0], port: int = 5006, out: Path = Path()
+    setup: dict[str, Any],
+    address: str = HERE[0],
+    port: int = 5006,
+    out: Path = Path(),
+    hosts: Collection[str] = (),
 ) -> tuple[Any, str]:
     """Start the server of a set-up.
 
@@ -99,6 +165,7 @@ def start(
         address: address of this machine on which the server listens.
         port: port, 0 for any that is free.
         out: folder of recordings.
+        hosts: names of this machine by which browsers may come, further to those of `is_own_name`.
 
     Returns:
         Bokeh's server, whose `io_loop` is not running yet, and the URL of the page.
@@ -110,38 +177,39 @@ def start(
     check_bokeh()
     from bokeh.application import Application
     from bokeh.application.handlers.function import FunctionHandler
-    from bokeh.server.server import Server
+    from bokeh.server.server import BaseServer
+    from tornado.httpserver import HTTPServer
+    from tornado.ioloop import IOLoop
+    from tornado.netutil import bind_sockets
 
     from hoof_env.view.answers import try_out
 
     count("port", port, low=0, most=65535)
-    if ":" in address:  # Bokeh's list of origins cannot name it
+    if ":" in address:
         raise ParameterError(f"address: expected an IPv4 address or a name, got {address!r}")
     check_folder(out)
     try_out(setup)
     pages = Pages(setup, out)
     try:
-        port = port or free_port(address)
-        server = Server(
-            {"/": Application(FunctionHandler(pages.open))},
-            address=address,
-            port=port,
-            allow_websocket_origin=[f"{name}:{port}" for name in {address, "localhost"}],
-            check_unused_sessions_milliseconds=500,
-            unused_session_lifetime_milliseconds=LINGER,
-        )
+        sockets = bind_sockets(port, address)
     except OSError as error:
         if error.errno == errno.EADDRINUSE:
             raise ParameterError(f"port: expected a free one, {port} is taken; 0 takes any") from None
         raise ParameterError(f"address: expected one of this machine, got {address!r} ({error})") from None
+    url = f"http://{address}:{sockets[0].getsockname()[1]}/"
+    application = guarded(address, hosts)(
+        {"/": Application(FunctionHandler(pages.open))},
+        absolute_url=url,
+        # `guarded` compares a socket's origin with the host by which its page came.
+        extra_websocket_origins=["*"],
+        check_unused_sessions_milliseconds=500,
+        unused_session_lifetime_milliseconds=LINGER,
+    )
+    http = HTTPServer(application)
+    http.add_sockets(sockets)
+    server = BaseServer(IOLoop.current(), application, http)
     server.start()
-    return server, f"http://{address}:{server.port}/"
-
-
-def free_port(address: str) -> int:
-    """Return a port that is free now: pages are refused unless their port is known beforehand."""
-    with socket.create_server((address, 0)) as taken:
-        return int(taken.getsockname()[1])
+    return server, url
 
 
 def view(
@@ -153,6 +221,7 @@ def view(
     port: int,
     open_browser: bool,
     out: Path,
+    hosts: Sequence[str] = (),
 ) -> None:
     """Serve the page until Ctrl-C, as `hoof-env view` does with the same options.
 
@@ -165,7 +234,7 @@ def view(
         "policy": policy,
         "seed": seed,
     }
-    server, url = start(setup, address, port, out)
+    server, url = start(setup, address, port, out, hosts)
     # A tab that is closed would be told in a line for each message that was under way to it.
     logging.getLogger("bokeh.server.views.ws").setLevel(logging.ERROR)
     if address not in HERE:

@@ -35,7 +35,7 @@ from agents.baselines_run import (
 )
 from agents.settings import FOLDER, load_settings
 from agents.statistics import LOWER, compare, dominates, dominates_with_confidence
-from hoof_env.envs.policies import open_loop
+from hoof_env.envs.open_loop import open_loop
 from hoof_env.errors import DataFileError
 from hoof_env.evaluation import statistics
 from hoof_env.evaluation.episodes import CURVE_SEEDS, FINAL_SEEDS, score_vector

@@ -10,7 +10,8 @@ import pytest
 
 from agents.runs import make_env
 from hoof_env import cli
-from hoof_env.envs.policies import GAITS, start_of
+from hoof_env.envs.open_loop import GAITS
+from hoof_env.envs.policies import start_of
 from hoof_env.errors import DataFileError
 from hoof_env.evaluation.episodes import play
 from hoof_env.evaluation.scores import METRICS, Score, evaluate, text_table, to_json

@@ -177,6 +177,24 @@ def test_a_file_is_replaced_on_request_alone(trained, tmp_path):
     OnnxPolicy(path)
 
 
+@pytest.mark.parametrize("entry", ["env_id", "env_kwargs"])
+def test_the_example_imports_nothing_that_a_file_names(exported, tmp_path, entry):
+    import onnx
+
+    model = onnx.load(exported)
+    asked = {"env_id": "payload:hoof_env/HorseLeg-v0", "env_kwargs": json.dumps({"task": "payload:x/Y-v0"})}
+    for prop in model.metadata_props:
+        prop.value = asked[entry] if prop.key == entry else prop.value
+    onnx.save(model, tmp_path / "policy.onnx")
+    (tmp_path / "payload.py").write_text("open('ran', 'w')\n")
+    command = [sys.executable, ROOT / "examples" / "run_policy.py", "policy.onnx"]
+    environment = {**os.environ, "PYTHONPATH": str(tmp_path)}
+    done = subprocess.run(command, cwd=tmp_path, env=environment, capture_output=True, text=True)
+    assert not (tmp_path / "ran").exists()
+    if entry == "env_kwargs":
+        assert "a file must not import a module" in done.stderr
+
+
 def test_the_example_plays_a_policy_without_a_learning_library(env, trained, exported):
     script = ROOT / "examples" / "run_policy.py"
     after = (

@@ -16,7 +16,7 @@ from safetensors.torch import load_file, save_file
 
 from agents import export
 from agents.runs import SavedModel, make_env
-from hoof_env.envs.policies import GAITS
+from hoof_env.envs.open_loop import GAITS
 from hoof_env.errors import DataFileError, HoofEnvError, OutputError, ParameterError
 from hoof_env.evaluation import scores
 from hoof_env.policies.find import find_policy

@@ -9,16 +9,17 @@ import sys
 import numpy as np
 import pytest
 
-from agents.open_loop import decode
 from agents.runs import make_env
 from hoof_env import cli
-from hoof_env.envs.policies import Scripted, open_loop
+from hoof_env.envs.open_loop import open_loop
+from hoof_env.envs.policies import Scripted
 from hoof_env.errors import DataFileError
 from hoof_env.evaluation import episodes as played
 from hoof_env.evaluation import scores
 from hoof_env.evaluation.episodes import play, score_vector
 from hoof_env.policies.find import find_policy
 from hoof_env.policies.record import environment_of
+from hoof_env.tasks.observation import HIGH, LOW
 from tests.agents.conftest import ENV_ID, KWARGS, SHORT
 
 SEEDS = [7, 3, 4, 11, 12]
@@ -53,7 +54,7 @@ def test_a_trained_policy(trained):
 
 
 def test_held_gaits_for_all_or_for_each(env):
-    gaits = decode("constant", np.random.default_rng(0).uniform(-1, 1, (len(SEEDS), 4)))["constant"]
+    gaits = np.random.default_rng(0).uniform(LOW, HIGH, (len(SEEDS), 4))
     rows = score_vector(open_loop({"constant": gaits}, env), ENV_ID, SEEDS, **KWARGS)
     for seed, gait, row in zip(SEEDS, gaits, rows, strict=True):
         assert one_by_one(open_loop({"constant": gait}, env), ENV_ID, [seed], **KWARGS) == [row]

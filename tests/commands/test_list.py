@@ -31,7 +31,9 @@ def test_one_id_has_the_names_of_its_policies(capsys):
         policies.strip().removeprefix("policies: ").split(", ")
     )
     assert cli.main(["list", "--id", "hoof_env/Horse-v0"]) == 0
-    assert "open-loop" not in capsys.readouterr().out
+    names = capsys.readouterr().out.splitlines()[2].strip().removeprefix("policies: ").split(", ")
+    assert {"reference", "zero", "open-loop", "shipped"} <= set(names)
+    assert "constant" not in names
 
 
 @pytest.mark.parametrize(

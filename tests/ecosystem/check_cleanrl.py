@@ -18,7 +18,7 @@ import numpy as np
 import pytest
 import torch
 
-from hoof_env.envs.policies import GAITS, open_loop_record
+from hoof_env.envs.open_loop import GAITS, open_loop_record
 
 RELEASE = "cleanrl==1.2.0"
 ENV_ID = "hoof_env/HorseLeg-v0"

@@ -7,24 +7,20 @@ import gymnasium as gym
 import numpy as np
 import pytest
 
-from hoof_env.envs.policies import (
-    load_open_loop,
-    make_policy,
-    open_loop,
-    policy_names,
-    start_of,
-)
+from hoof_env.envs.open_loop import check_blind, load_open_loop, open_loop
+from hoof_env.envs.policies import make_policy, policy_names, start_of
+from hoof_env.errors import ParameterError
 from hoof_env.gait import PARAMETERS, GaitParameters, load_gait
 from hoof_env.tasks import horse as horse_body
 from hoof_env.tasks.observation import HALF_RANGE, HIGH, LOW, MIDDLE
 from hoof_env.tasks.one_leg import POLICIES
 
 ENV_ID = "hoof_env/HorseLeg-v0"
-CLOCKED = {
-    "constant": [5.0, 0.4, 0.1, 0.0], "sin": [1.0, 0.0, 0.0, 0.1], "cos": [0.0, 0.2, 0.0, 0.0],
-    "frequency_hz": 0.25,
-}  # fmt: skip
-"""Gait parameters [rad/s, rad, rad, rad]."""
+COEFFICIENTS = [[[5.0, 0.4, 0.1, 0.0], [1.0, 0.0, 0.0, 0.1], [0.0, 0.2, 0.0, 0.0]]]
+"""Coefficients of 1, sine and cosine: gait parameters [rad/s, rad, rad, rad]."""
+
+CLOCKED = {"coefficients": COEFFICIENTS, "frequency_hz": 0.25}
+PHASE = {"coefficients": COEFFICIENTS}
 
 
 @pytest.fixture(scope="module")
@@ -114,7 +110,7 @@ def test_a_horse_has_no_gait_to_go_to():
 
 def test_the_clock_of_one_restarts_and_the_others_go_on(env):
     policy, twin = open_loop(CLOCKED, env), open_loop(CLOCKED, env)
-    seen = seen_in(env, [CLOCKED["constant"]] * 2)
+    seen = seen_in(env, [COEFFICIENTS[0][0]] * 2)
     first, _ = policy.predict(seen)
     for _ in range(9):
         policy.predict(seen)
@@ -129,7 +125,7 @@ def test_the_clock_of_one_restarts_and_the_others_go_on(env):
 def formula(time):
     """The gait of `CLOCKED` at a time."""
     phase = 2 * np.pi * CLOCKED["frequency_hz"] * time
-    c, a, b = (np.array(CLOCKED[name]) for name in ("constant", "sin", "cos"))
+    c, a, b = np.array(COEFFICIENTS[0])
     return np.clip(c + a * np.sin(phase) + b * np.cos(phase), LOW, HIGH)
 
 
@@ -154,8 +150,83 @@ def test_a_slow_clock_is_followed(env):
             assert (lag < [0.15, 0.03, 0.02, 0.02]).all()
 
 
+def test_a_gait_that_is_locked_to_the_crank_goes_towards_its_formula():
+    """At any crank angle, with the command in the weights, whatever else is seen."""
+    env = gym.make("hoof_env/HorseLegSpeed-v0")
+    names, reach = env.unwrapped.observation_names, reach_in(env)
+    rng = np.random.default_rng(0)
+    coefficients = rng.uniform(-0.3, 0.3, (2, 5, 4)) * HALF_RANGE
+    coefficients[0, 0] += MIDDLE
+    policy = open_loop({"coefficients": coefficients}, env)
+    for angle in rng.uniform(-np.pi, np.pi, 20):
+        seen, here, command = rng.uniform(-1, 1, len(names)), MIDDLE + 0.01, rng.uniform(0, 1)
+        seen[names.index("crank speed") :][:4] = (here - MIDDLE) / HALF_RANGE
+        seen[names.index("crank speed") + 4 :][:4] = 0.0
+        seen[names.index("sin(crank angle)")] = np.sin(angle)
+        seen[names.index("cos(crank angle)")] = np.cos(angle)
+        seen[names.index("commanded speed")] = command
+        basis = [1.0, np.sin(angle), np.cos(angle), np.sin(2 * angle), np.cos(2 * angle)]
+        gait = np.clip(basis @ (coefficients[0] + command * coefficients[1]), LOW, HIGH)
+        found, _ = policy.predict(seen)
+        np.testing.assert_allclose(found, np.clip((gait - here) / reach, -1, 1), atol=1e-6)
+
+
+def test_each_leg_of_a_horse_follows_its_own_crank_and_left_is_as_right():
+    env = gym.make("hoof_env/Horse-v0")
+    names = env.unwrapped.observation_names
+    rng = np.random.default_rng(0)
+    coefficients = rng.uniform(-0.5, 0.5, (1, 3, 8))
+    policy, seen = open_loop({"coefficients": coefficients}, env), rng.uniform(-1, 1, len(names))
+    angles = dict(
+        zip(("left fore", "right fore", "left hind", "right hind"), rng.uniform(-3, 3, 4), strict=True)
+    )
+    for leg, angle in angles.items():
+        for function in (np.sin, np.cos):
+            seen[names.index(f"{leg}: {function.__name__}(crank angle)")] = function(angle)
+    found, _ = policy.predict(seen)
+    for k, (leg, angle) in enumerate(angles.items()):
+        own = coefficients[0][:, :4] if "fore" in leg else coefficients[0][:, 4:]
+        expected = np.clip(np.array([1.0, np.sin(angle), np.cos(angle)]) @ own, -1, 1)
+        np.testing.assert_allclose(found[4 * k : 4 * k + 4], expected, atol=1e-6)
+        action = env.unwrapped.batch.action_names[4 * k]
+        assert action.startswith(leg.replace(" ", "_"))
+
+
+def test_a_motor_takes_a_clock_and_not_its_crank(env):
+    motor = gym.make(ENV_ID, drive="motor")
+    with pytest.raises(ParameterError, match=r'expected "frequency_hz", a clock, as the drive is a motor'):
+        open_loop(PHASE, motor)
+    open_loop(CLOCKED, motor)
+    open_loop(PHASE, motor, blind=False)
+    with pytest.raises(ParameterError, match="expected 'target' among the observed groups"):
+        open_loop({"coefficients": COEFFICIENTS * 2}, env)
+    with pytest.raises(ParameterError, match="expected 8 numbers of a horse, got 4"):
+        open_loop(PHASE, gym.make("hoof_env/Horse-v0"))
+    with pytest.raises(ParameterError, match="expected 'crank' among the observed groups"):
+        open_loop(PHASE, gym.make(ENV_ID, observation=["gait"]))
+
+
+@pytest.mark.parametrize(
+    ("groups", "drive", "seeing"),
+    [
+        (["crank", "gait"], "prescribed", ""),
+        (["gait", "crank", "trunk"], "prescribed", "got trunk"),
+        (["crank", "gait"], "motor", "got crank; the ground changes the crank of a motor"),
+        (["gait"], "motor", ""),
+    ],
+)
+def test_observations_of_the_ground_are_told(groups, drive, seeing):
+    settings = gym.make(ENV_ID, observation=groups, drive=drive).unwrapped.settings
+    if seeing:
+        with pytest.raises(ParameterError, match=seeing):
+            check_blind(settings)
+    else:
+        check_blind(settings)
+
+
 def test_a_gait_beyond_the_limits_is_gone_to_as_far_as_they_reach(env):
-    policy = open_loop({**CLOCKED, "constant": [12.0, 1.39, 0.0, 0.0], "frequency_hz": 0.0}, env)
+    held = [[[12.0, 1.39, 0.0, 0.0], *COEFFICIENTS[0][1:]]]
+    policy = open_loop({"coefficients": held, "frequency_hz": 0.0}, env)
     np.testing.assert_allclose(formula(0.0), [5.0, 0.6, 0.1, 0.0])
     seen, _ = env.reset(seed=0)
     for _ in range(200):
@@ -165,7 +236,7 @@ def test_a_gait_beyond_the_limits_is_gone_to_as_far_as_they_reach(env):
 
 def test_a_gait_for_each_of_many(env):
     generator = np.random.default_rng(0)
-    gaits = {name: generator.uniform(-1, 1, (3, 4)) for name in ("constant", "sin", "cos")}
+    gaits = {"coefficients": generator.uniform(-1, 1, (3, 1, 3, 4))}
     gaits["frequency_hz"] = np.array([0.5, 1.0, 2.0])
     many, seen = open_loop(gaits, env), seen_in(env, generator.uniform(LOW, HIGH, (3, 4)))
     alone = [open_loop({name: value[row] for name, value in gaits.items()}, env) for row in range(3)]

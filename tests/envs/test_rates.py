@@ -9,7 +9,7 @@ from family import LEGS, actions, same, substeps
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from hoof_env.envs.policies import open_loop
+from hoof_env.envs.open_loop import open_loop
 from hoof_env.errors import ParameterError
 from hoof_env.gait import PARAMETERS, FilterSettings, GaitParameters, load_gait
 from hoof_env.tasks.observation import HIGH, LOW, MIDDLE

@@ -10,14 +10,13 @@ import gymnasium as gym
 import numpy as np
 import pytest
 
-from hoof_env.envs.policies import load_open_loop, make_policy, open_loop
+from hoof_env.envs.open_loop import load_open_loop, open_loop
+from hoof_env.envs.policies import make_policy
 from hoof_env.errors import DataFileError, ParameterError
 
 LEG = "hoof_env/HorseLeg-v0"
-CLOCKED = {
-    "constant": [5.0, 0.4, 0.1, 0.0], "sin": [1.0, 0.0, 0.0, 0.1], "cos": [0.0, 0.2, 0.0, 0.0],
-    "frequency_hz": 0.25,
-}  # fmt: skip
+COEFFICIENTS = [[[5.0, 0.4, 0.1, 0.0], [1.0, 0.0, 0.0, 0.1], [0.0, 0.2, 0.0, 0.0]]]
+CLOCKED = {"coefficients": COEFFICIENTS, "frequency_hz": 0.25}
 
 
 @cache
@@ -48,7 +47,7 @@ CALLS = [
     ),
     (
         lambda: make_policy("idle", horse()),
-        "policy: expected one of bang-bang, random, reference, got 'idle'",
+        "policy: expected one of bang-bang, random, reference, zero, got 'idle'",
     ),
     (lambda: make_policy(made(), "run"), NO_ENV),
     (lambda: make_policy("run", "walk"), NO_ENV),
@@ -80,6 +79,8 @@ FILES = [
             ({"constant": [0.0, 0.0, 0.0]}, r"constant \[0.0, 0.0, 0.0\]"),
             ({**CLOCKED, "frequency_hz": None}, "frequency_hz None"),
             ({"constant": [0.0] * 4, "sin": [0.0] * 4}, r"parameters \['constant', 'sin'\]"),
+            ({"coefficients": COEFFICIENTS[0]}, r"coefficients \[\[5\.0"),
+            ({"coefficients": [COEFFICIENTS[0][:2]]}, r"coefficients \[\[\[5\.0"),
             (None, "NoneType"),
             ({"constant": [0.0, 0.0, 0.0, float("nan")]}, "constant .*nan"),
         )
@@ -105,7 +106,7 @@ def test_files(content, words, tmp_path):
 def test_a_file_for_an_environment_whose_actions_mean_something_else(tmp_path):
     path = tmp_path / "gait.json"
     path.write_text(json.dumps({**GAIT, "env_id": "hoof_env/Horse-v0"}))
-    with pytest.raises(DataFileError, match="expected an environment of one leg, got HorseLegEnv whose act"):
+    with pytest.raises(DataFileError, match=r"expected the form 'offsets of .*' of HorseLegEnv, whose act"):
         load_open_loop(path, horse())
 
 

@@ -15,7 +15,7 @@ pytest.importorskip("bokeh")
 from tornado.httpclient import AsyncHTTPClient
 
 from hoof_env.view import server
-from hoof_env.view.server import Pages, start
+from hoof_env.view.server import Pages, is_own_name, start
 from tests.view.pages import SETUP, opened
 
 
@@ -52,6 +52,48 @@ def test_a_page_that_is_refused_takes_no_place_and_an_old_one_is_told(tmp_path):
     doc = opened(pages, setup=[kept.encode()])
     assert doc.template_variables["simulation"].seed == 7
     assert len(pages._tabs) == 1
+
+
+def answer(port, host, *headers):
+    """Status line of this machine's answer to a browser that came by the name `host`."""
+    with socket.create_connection(("127.0.0.1", port), timeout=60) as wire:
+        lines = ("GET / HTTP/1.1", f"Host: {host}", "Connection: close", *headers)
+        wire.sendall(("\r\n".join(lines) + "\r\n\r\n").encode())
+        return int(wire.recv(64).split()[1])
+
+
+def test_the_page_is_served_by_its_own_names_alone(tmp_path):
+    """A site that makes its own name lead here gets neither page nor socket, whatever Tornado checks."""
+    running, url = start(SETUP, port=0, out=tmp_path, hosts=["proxy.example.org"])
+    port = int(url.rstrip("/").rpartition(":")[2])
+    loop = running.io_loop
+
+    def asked(*request):
+        return loop.run_sync(lambda: loop.run_in_executor(None, answer, port, *request))
+
+    upgrade = (
+        "Upgrade: websocket", "Connection: Upgrade", "Sec-WebSocket-Version: 13",
+        "Sec-WebSocket-Key: aG9vZi1lbnYtdmlldy0xMg==",
+    )  # fmt: skip
+    try:
+        own = (f"127.0.0.1:{port}", f"localhost:{port}", "127.8.0.1", "LOCALHOST:80", "proxy.example.org")
+        assert [asked(host) for host in own] == [200] * 5
+        foreign = ("rebound.example.org", "127.0.0.1.example.org", "192.0.2.7:80", "lab-computer", "[::2]:1")
+        assert [asked(host) for host in foreign] == [403] * 5
+        here = f"localhost:{port}"
+        for origin in ("http://rebound.example.org", "http://localhost:1", "null"):
+            assert asked(here, *upgrade, f"Origin: {origin}") == 403
+        assert asked("rebound.example.org", *upgrade, "Origin: http://rebound.example.org") == 403
+    finally:
+        running.stop()
+
+
+def test_names_of_a_page_that_other_machines_reach():
+    numbers_and_local = ("198.51.100.7", "lab-computer", "lab.local", "[2001:db8::1]", "localhost", "0.0.0.0")
+    assert all(is_own_name(name, "0.0.0.0") for name in numbers_and_local)
+    assert not is_own_name("rebound.example.org", "0.0.0.0")
+    assert is_own_name("rebound.example.org", "0.0.0.0", ["Rebound.example.org"])
+    assert is_own_name("lab.example.org", "lab.example.org")
 
 
 def test_no_more_tabs_than_the_limit_however_fast_they_are_opened(tmp_path, monkeypatch):

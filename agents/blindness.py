@@ -1,0 +1,121 @@
+"""Proof that a policy sees nothing of the ground: its actions, computed in a world with other ground and
+replayed in the real one, return the same.
+
+A policy without feedback acts on its start, on its crank and gait, and on the command, and none of them
+depends on a force. So it acts alike on any ground, and the returns must be the same to the last bit.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from hoof_env.errors import DataFileError, ParameterError
+from hoof_env.evaluation.episodes import make_rows
+
+OTHER_GROUNDS = ((0.05, 10.0), (0.2, 3.0), (0.3, 1.5))
+"""Friction of other grounds, and factors of their stiffness, the most unlike first. On the first of them some
+animals fall, and an episode that is over has no more actions to replay."""
+
+
+@dataclass(frozen=True)
+class Proof:
+    """What a replay has shown.
+
+    Attributes:
+        friction, stiffness: of the other ground [-, N/m^n].
+        episodes: episodes that went on in the other world until they ended in the real one.
+        of: episodes that were played.
+        difference: largest difference of a return from the policy's own; 0 proves blindness.
+        elsewhere: largest difference of returns between the worlds, which shows that the ground matters.
+    """
+
+    friction: float
+    stiffness: float
+    episodes: int
+    of: int
+    difference: float
+    elsewhere: float
+
+
+def prove(
+    policy: Any, env_id: str, seeds: Sequence[int], env_kwargs: Mapping[str, Any] | None = None
+) -> Proof:
+    """Replay the actions of another world in the real one.
+
+    Args:
+        policy: policy with `predict` for many observations.
+        env_id: id of the environment, of this package.
+        seeds: seeds of the episodes.
+        env_kwargs: arguments of the environment.
+
+    Raises:
+        ParameterError: the id has no native vector environment.
+        DataFileError: a return differs, so the policy sees the ground.
+    """
+    kwargs = dict(env_kwargs or {})
+    real = make_rows(env_id, len(seeds), **kwargs)
+    if real is None:
+        raise ParameterError(f"env_id: expected an id of this package with many at once, got {env_id!r}")
+    settings: Any = real.settings
+    stiffness = float(real.batch.engine.ground.stiffness)
+    proof = None
+    for friction, factor in OTHER_GROUNDS:
+        ground = {"friction": friction, "stiffness": factor * stiffness}
+        other = make_rows(env_id, len(seeds), **kwargs | ground)
+        assert other is not None
+        own, here, there, whole = replay(policy, real, other, seeds)
+        proof = Proof(
+            **ground,
+            episodes=int(whole.sum()),
+            of=len(seeds),
+            difference=float(np.abs(own - here)[whole].max(initial=0.0)),
+            elsewhere=float(np.abs(here - there)[whole].max(initial=0.0)),
+        )
+        if 2 * proof.episodes >= proof.of:
+            break
+    assert proof is not None
+    if proof.difference or not proof.episodes:
+        raise DataFileError(
+            f"policy on {env_id}: expected actions that do not depend on the ground; replayed from a ground"
+            f" with friction {proof.friction:g}, {proof.episodes} of {proof.of} episodes differ by up to"
+            f" {proof.difference:.3g} in their returns (observed: {', '.join(settings.observation)})"
+        )
+    return proof
+
+
+def replay(policy: Any, real: Any, other: Any, seeds: Sequence[int]) -> tuple[Any, Any, Any, Any]:
+    """Play a policy in two worlds, and the actions of the other one in the real one.
+
+    Returns:
+        Returns of the policy in the real world, of the replayed actions there, and of the policy in the other
+        world, each of shape (n,); and the episodes that lasted in the other world as long as in the real one.
+    """
+    own, _ = _episodes(policy, [real], seeds)
+    (here, there), whole = _episodes(policy, [real, other], seeds)
+    return own[0], here, there, whole
+
+
+def _episodes(policy: Any, worlds: Sequence[Any], seeds: Sequence[int]) -> tuple[Any, Any]:
+    """Play an episode for each seed in each world, with the actions of the last; return the returns, shape
+    (worlds, n), and the rows whose last world was not over before another one."""
+    start = dict(getattr(policy, "start", None) or {})
+    seen = [world.reset(seed=list(seeds), options=start)[0] for world in worlds]
+    count = len(seeds)
+    totals = np.zeros((len(worlds), count))
+    going = np.ones((len(worlds), count), bool)
+    whole = np.ones(count, bool)
+    fresh = np.ones(count, bool)
+    while going.any():
+        actions, _ = policy.predict(seen[-1], episode_start=fresh, deterministic=True)
+        fresh = np.zeros(count, bool)
+        for k, world in enumerate(worlds):
+            seen[k], rewards, terminated, truncated, _ = world.step(actions)
+            totals[k] += np.where(going[k], rewards, 0.0)
+            going[k] &= ~(terminated | truncated)
+        # What an ended episode of the last world would have done is not known
+        whole &= going[-1] | ~going[:-1].any(0)
+    return totals, whole

@@ -1,0 +1,126 @@
+"""Rows of the tables: files that a replay confirms, and pages that are made of them."""
+
+import json
+import math
+from dataclasses import replace
+
+import pytest
+
+from agents import results
+from agents.results import Row, check_replay, filled, make_row, read_row
+from hoof_env.errors import DataFileError, ParameterError
+
+LEG = "hoof_env/HorseLeg-v0"
+FILES = sorted(results.RESULTS.glob("*.json"))
+
+
+@pytest.fixture(scope="module")
+def row():
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(results, "FINAL_SEEDS", range(1_000_000, 1_000_006))
+        patch.setattr(results, "_FINAL", (1_000_000, 1_000_006))
+        return make_row(LEG, "constant")
+
+
+def test_a_row_is_what_its_file_says(row, tmp_path):
+    path = row.write(tmp_path)
+    assert path.name == "HorseLeg-v0-constant.json"
+    again = read_row(path)
+    assert again.mean == row.mean
+    assert again.seeds == (1_000_000, 1_000_006)
+    assert {"python", "numpy", "hoof-env"} <= set(again.versions)
+    assert "recorded" in check_replay(again)
+
+
+DAMAGES = [
+    ("not JSON", lambda data: "{", "expected one as agents.results writes it"),
+    ("a list", lambda data: [], "not an object"),
+    ("no mean", lambda data: {k: v for k, v in data.items() if k != "mean"}, "mean"),
+    ("another kind", lambda data: data | {"kind": "best"}, "kind: expected one of"),
+    ("seeds backwards", lambda data: data | {"seeds": [5, 3]}, r"seeds \(5, 3\)"),
+    ("a return that is none", lambda data: data | {"mean": {"return": math.nan}}, "returns nan|NaN"),
+    ("an unknown entry", lambda data: data | {"secret": 1}, "secret"),
+    ("a policy that is no text", lambda data: data | {"policy": 3}, "must be texts"),
+]
+
+
+@pytest.mark.parametrize(("change", "words"), [pair[1:] for pair in DAMAGES], ids=[one[0] for one in DAMAGES])
+def test_a_damaged_row_is_refused(row, tmp_path, change, words):
+    path = row.write(tmp_path)
+    content = change(json.loads(path.read_text()))
+    path.write_text(content if isinstance(content, str) else json.dumps(content))
+    with pytest.raises(DataFileError, match=words):
+        read_row(path)
+    with pytest.raises(DataFileError, match=r"HorseLeg-v0-constant\.json"):
+        results.main(["add", str(path)])
+
+
+def test_a_row_that_does_not_replay_is_refused(row):
+    with pytest.raises(DataFileError, match=r"expected return .* replayed 1[34]\d"):
+        check_replay(replace(row, mean=row.mean | {"return": 500.0}))
+    with pytest.raises(DataFileError, match="has other numbers than when it was scored"):
+        check_replay(replace(row, digest="0" * 64))
+    with pytest.raises(DataFileError, match="best of its runs is not the policy"):
+        check_replay(replace(row, runs={"0": 500.0, "1": 3.0}))
+
+
+def test_a_row_that_claims_to_see_nothing_must_see_nothing(row):
+    with pytest.raises(DataFileError, match="do not depend on the ground"):
+        make_row(LEG, "open-loop", "shipped")
+    with pytest.raises(ParameterError, match="kind: expected one of"):
+        make_row(LEG, "best")
+
+
+def made(kind, value, **more):
+    return Row(LEG, kind, kind, "", (0, 2), {"return": value}, {"return": None}, **more)
+
+
+def test_a_table_has_the_best_blind_policy_in_bold_and_the_spread_over_runs(tmp_path):
+    for each in (
+        made("zero", 70.0),
+        made("constant", 139.7),
+        made("open-loop", 179.4, effort={"episodes": 90_000}),
+        made("blind", 173.0, runs={"0": 173.0, "1": 162.0, "2": 159.0}, effort={"steps": 3_000_000}),
+        made("shipped", 183.2, runs={"0": 183.2}),
+    ):
+        each.write(tmp_path)
+    page = "text\n<!-- results: HorseLeg-v0 return -->\nold\n<!-- end of results -->\nmore"
+    text = filled(page, tmp_path)
+    assert text.startswith("text\n")
+    assert text.endswith("\nmore")
+    assert "old" not in text
+    lines = text.splitlines()
+    (bold,) = [line for line in lines if "best without feedback" in line]
+    assert "| 90,000 episodes | 179.4 |" in bold
+    assert any(
+        "blind agents, best run" in line and "median 162.0 of 3 (159.0 to 173.0)" in line for line in lines
+    )
+    assert any("shipped agent |" in line and "one run" in line for line in lines)
+    assert filled(text, tmp_path) == text
+    with pytest.raises(DataFileError, match=r"expected columns of return.*got retrun"):
+        filled(page.replace("return", "retrun"), tmp_path)
+    overview = filled("<!-- results: all -->\n<!-- end of results -->", tmp_path)
+    assert "**179.4** (best gait locked to the crank)" in overview
+
+
+@pytest.mark.parametrize("page", results.pages(), ids=lambda path: path.name)
+def test_tables_on_pages_are_made_of_the_rows(page):
+    text = page.read_text(encoding="utf-8")
+    assert filled(text) == text, "run `python -m agents.results pages`"
+
+
+@pytest.mark.parametrize("path", FILES, ids=lambda path: path.stem)
+def test_rows_have_their_policies(path):
+    row = read_row(path)
+    assert path.stem == row.name
+    if row.kind == "stock":
+        check_replay(row)
+    else:
+        assert row.digest == results.digest_of(row.policy, row.env_id)
+    assert row.kind in ("zero", "run") or row.digest
+    if row.runs and row.kind != "stock":
+        assert max(row.runs.values()) >= row.mean["return"] - 1e-6
+
+
+def test_a_row_of_the_repository_replays():
+    check_replay(read_row(results.RESULTS / "HorseLeg-v0-open-loop.json"))
