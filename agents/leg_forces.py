@@ -1,6 +1,6 @@
 """Force of the suspension on the trunk of one leg, and depth of its hoof in the ground.
 
-    python -m agents.leg_forces                 the run, the best constant gait and the shipped agent
+    python -m agents.leg_forces                 the run, the best gaits without feedback and the shipped agent
     python -m agents.leg_forces runs/a/s0 --out forces.json
 
 The suspension is the spring, the damper and the constant force that stand for the animal's other legs. Its
@@ -74,7 +74,7 @@ greater of toe and heel."""
 class Args:
     """Arguments of the command."""
 
-    policies: Positional[tuple[str, ...]] = ("run", "open-loop", "shipped")
+    policies: Positional[tuple[str, ...]] = ("run", "constant", "open-loop", "shipped")
     """names of gaits, and names or paths of trained policies"""
     episodes: int = 100
     """of each policy, the first of those of the published scores"""

@@ -348,7 +348,13 @@ def test_the_suspension_on_the_page_is_that_of_the_figures():
         "work of the drives [kJ]": ("drive_work_j", 1e-3),
         "greatest depth of the hoof [m]": ("depth_m", 1),
     }
-    policies = {"scripted run": "run", "best constant gait": "open-loop", "shipped agent": "shipped"}
+    policies = {
+        "scripted run": "run",
+        "best constant gait": "constant",
+        "best gait locked to the crank": "open-loop",
+        "shipped agent": "shipped",
+    }
+    assert list(shown) == list(policies)
     for name, policy in policies.items():
         for title, (figure, factor) in figures.items():
             value = suspension(policy, figure, str(factor))
