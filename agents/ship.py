@@ -55,7 +55,8 @@ them."""
 CHECKED = 20
 """Number of episodes, from the first of the score on, that are played again to check a shipped policy."""
 
-GAITS = ("run", "walk", "carrying_walk", "reference", "open-loop")  # scored as well, if an id has them
+GAITS = ("zero", "run", "walk", "carrying_walk", "reference", "constant", "open-loop")
+"""Policies that are scored as well, if an id has them."""
 
 LIMIT = 1_000_000
 FILM_LIMIT = 650_000
@@ -310,13 +311,18 @@ def write_card(
 def write_index(folder: Path, scores: Path) -> None:
     """Write README.md into `folder`, the table of its policies, whose scores are beneath `scores`."""
     rows = []
-    references = ("open-loop", "run", "reference")
+    references = {
+        "blind": "best without feedback",
+        "constant": "best constant gait",
+        "run": "run",
+        "zero": "zero action",
+    }
     for path in sorted(scores.glob(f"*/{SCORE}")):
         score = parse_json(path.read_text(encoding="utf-8"))
         algo = parse_json(path.with_name(runs.RECORD).read_text(encoding="utf-8"))["algo"]
         row = [f"`{score['env_id']}`", algo.upper()]
         for name in ("policy", *references):
-            of_policy = score["policies"].get(name)
+            of_policy = score["policies"].get(name) or (name == "zero" and score["policies"].get("reference"))
             if of_policy:
                 interval = Interval(of_policy["mean"]["return"], *of_policy["interval95"]["return"])
                 row.append(interval.text(2))
@@ -328,7 +334,7 @@ def write_index(folder: Path, scores: Path) -> None:
         "One for each id, made by `python -m agents.ship`; docs/agents.md says how to use them.\n"
         "Mean returns in the same episodes, and the bootstrap's 95 % interval.\n\n"
     )
-    titles = ["id", "policy", "return", *references, "card"]
+    titles = ["id", "policy", "return", *references.values(), "card"]
     runs.write_text(folder / "README.md", text + markdown_table(titles, rows) + "\n")
 
 
