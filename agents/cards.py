@@ -36,6 +36,15 @@ SCORE = "score.json"
 SHOWN = ("return", "distance_m", "stance_peak_n", "weight_share", "cost_of_transport", "failed")
 """Columns of the card's table, keys of `METRICS`."""
 
+TITLES = {
+    "policy": "**this policy**",
+    "zero": "zero action",
+    "constant": "best constant gait",
+    "open-loop": "best gait locked to the crank",
+    "blind": "best without feedback",
+}
+"""Names of policies in the card's table."""
+
 
 @dataclass(frozen=True)
 class Args:
@@ -92,7 +101,11 @@ def card(
         is_one_episode=len(score["returns"]) > 1 and np.ptp(score["returns"]) == 0.0,
         titles=[METRICS[key].title.replace("\n", " ") for key in keys],
         rows=[
-            (name, [" ".join(cell(key, of_policy[key])).strip() for key in keys])
+            # A score from elsewhere may lack figures
+            (
+                TITLES.get(name, name),
+                [" ".join(cell(key, of_policy.get(key, Interval(math.nan)))).strip() for key in keys],
+            )
             for name, of_policy in estimates.items()
         ],
         estimates=estimates,

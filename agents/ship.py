@@ -51,7 +51,8 @@ them."""
 CHECKED = 20
 """Number of episodes, from the first of the score on, that are played again to check a shipped policy."""
 
-GAITS = ("run", "walk", "carrying_walk", "reference", "open-loop")  # scored as well, if an id has them
+GAITS = ("zero", "run", "walk", "carrying_walk", "reference", "constant", "open-loop")
+"""Policies that are scored as well, if an id has them."""
 
 LIMIT = 1_000_000
 FILM_LIMIT = 650_000
@@ -265,13 +266,18 @@ def shown_command(command: str) -> str:
 def write_index(folder: Path, scores: Path) -> None:
     """Write README.md into `folder`, the table of its policies, whose scores are beneath `scores`."""
     rows = []
-    references = ("open-loop", "run", "reference")
+    references = {
+        "blind": "best without feedback",
+        "constant": "best constant gait",
+        "run": "run",
+        "zero": "zero action",
+    }
     for path in sorted(scores.glob(f"*/{SCORE}")):
         score = parse_json(path.read_text(encoding="utf-8"))
         algo = parse_json(path.with_name(runs.RECORD).read_text(encoding="utf-8"))["algo"]
         row = [f"`{score['env_id']}`", algo.upper()]
         for name in ("policy", *references):
-            of_policy = score["policies"].get(name)
+            of_policy = score["policies"].get(name) or (name == "zero" and score["policies"].get("reference"))
             if of_policy:
                 interval = Interval(of_policy["mean"]["return"], *of_policy["interval95"]["return"])
                 row.append(interval.text(2))
@@ -286,7 +292,7 @@ def write_index(folder: Path, scores: Path) -> None:
         "It says nothing about other trainings; each card says of how many its policy is the best.\n"
         "`HorseLegFixed-v0` has one deterministic episode.\n\n"
     )
-    titles = ["id", "policy", "return", *references, "card"]
+    titles = ["id", "policy", "return", *references.values(), "card"]
     runs.write_text(folder / "README.md", text + markdown_table(titles, rows) + "\n")
 
 

@@ -59,9 +59,11 @@ HORSES = (_NAMES["horse"], _NAMES["rough"])
 
 SCORED = {
     "random": "random actions",
+    "zero": "zero action",
     "run": "scripted run",
-    "reference": "reference gait",
-    "open-loop": "best gait without feedback",
+    "reference": "reference gait (zero action)",
+    "constant": "best constant gait",
+    "blind": "best policy without feedback",
     "stock": "stock PPO",
     "policy": "shipped agent",
 }

@@ -11,8 +11,16 @@ SHIPPED = Path(__file__).parents[1] / "data" / "policies"
 """Folder with a folder of each id's trained policy, as `agents.ship` writes it: weights, how they were
 trained, and returns of the policy and of gaits in the same episodes."""
 
-SHOWN = {"policy": "shipped", "open-loop": "open-loop", "run": "run", "reference": "reference"}
-"""Policies whose returns are shown, with the names by which commands take them."""
+SHOWN = {
+    "policy": "shipped",
+    "blind": "best without feedback",
+    "constant": "constant",
+    "run": "run",
+    "zero": "zero",
+    "reference": "reference",
+}
+"""Policies whose returns are shown, with the names by which commands take them. "blind" is the best policy
+that sees nothing, a gait ("open-loop") or an agent."""
 
 
 def summaries() -> dict[str, str]:

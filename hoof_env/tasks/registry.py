@@ -209,7 +209,7 @@ TASKS: Mapping[str, Task] = MappingProxyType(
             {
                 "trunk": "rail",
                 **RACING,
-                # All five times as large: with a metre worth 1, stock PPO ended below the best open-loop gait
+                # All five times as large: with a metre worth 1, stock PPO ended below the best constant gait
                 # in a third of its trainings.
                 "reward_weights": {
                     **RACING["reward_weights"],
