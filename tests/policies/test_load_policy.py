@@ -102,7 +102,7 @@ def test_settings_that_differ_are_told_and_the_default_ones_are_not():
     ("policy", "words"),
     [
         ("hoof_env/HorseLegRail-v0", "HorseLegRail-v0, expected hoof_env/HorseLeg-v0"),
-        ("gallop", r"expected a name \(.*run.*open-loop, shipped\).*got 'gallop'"),
+        ("gallop", r"expected a name \(.*run.*open-loop, constant, shipped\).*got 'gallop'"),
         ((1.0, 2.0), r"expected four gait parameters, got \(1\.0, 2\.0\)"),
         ((1e3, 0.0, 0.0, 0.0), "crank_speed"),
         (["6.28", "0", "0", "x"], "crank_speed: expected a finite number .* got '6.28'"),
