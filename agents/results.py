@@ -449,13 +449,14 @@ def pages() -> list[Path]:
 
 def scores_of(env_id: str, data: dict[str, Any], folder: Path = RESULTS) -> dict[str, Any]:
     """Return the content of an id's score.json with the policies that rows have: zero action, best constant
-    gait, best gait locked to the crank, and "blind", the best policy without feedback."""
+    gait, best gait locked to the crank, "blind", the best policy without feedback, and stock PPO."""
     rows = rows_of(STANDS_FOR.get(env_id, env_id), folder)
     found: dict[str, Row] = {kind: rows[kind] for kind in ("zero", "constant", "open-loop") if kind in rows}
     if "reference" in data["policies"]:
         found.pop("zero", None)  # the same
     if best := best_blind(rows):
         found["blind"] = best
+    found |= {"stock": rows["stock"]} if "stock" in rows else {}
     policies = {name: value for name, value in data["policies"].items() if name not in KINDS}
     policies |= {name: data["policies"][name] for name in ("run",) if name in data["policies"]}
     for name, row in found.items():

@@ -317,6 +317,8 @@ def main(argv: list[str] | None = None) -> None:
         means = {name: of_policy["mean"]["return"] for name, of_policy in score["policies"].items()}
         write_index(args.out, SHIPPED if args.out == POLICIES else args.out)
         print(f"{env_id}: " + ", ".join(f"{name} {value:.2f}" for name, value in means.items()), flush=True)
+    if args.out == POLICIES:
+        print("next: python -m agents.results score NAME shipped --runs RUNS, for each; then ... pages")
 
 
 if __name__ == "__main__":
