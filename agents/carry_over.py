@@ -23,8 +23,8 @@ import numpy as np
 from tyro.conf import Positional
 
 from agents import runs
+from agents.cards import POLICIES
 from agents.command import run
-from agents.ship import POLICIES
 from hoof_env._output import check_folder, markdown_table
 from hoof_env.envs.policies import STANDS_FOR
 from hoof_env.errors import DataFileError, ParameterError, check_number, count

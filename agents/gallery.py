@@ -4,7 +4,7 @@
 
 Stills are cut out of the films of the policies. Returns are those of random actions, and of stock PPO where
 docs/evidence/stock has its curves, in the episodes of the published scores. Ids with curves also have
-the steps and seconds that the best stock learner takes to pass the best gait that needs no learning.
+the steps and seconds that the best stock learner takes to pass the best policy without feedback.
 """
 
 from __future__ import annotations
@@ -19,8 +19,8 @@ from typing import Any
 import numpy as np
 
 from agents import runs
+from agents.cards import FILM, POLICIES
 from agents.command import run
-from agents.ship import FILM, POLICIES
 from agents.stock import OUT as CURVES
 from agents.stock_page import at
 from agents.stock_plan import TUNED, read_curves
@@ -35,9 +35,6 @@ CUT = (20, 60, 310, 270)
 
 PLACE = 2 / 3
 """Place of the frame in the film, over its length: agents have found their gait there."""
-
-UNLEARNT = ("open-loop", "reference")
-"""Best gaits that need no learning, of a leg and of a horse, as score.json names them."""
 
 
 @dataclass(frozen=True)
@@ -84,7 +81,7 @@ def learning_of(rows: Sequence[dict[str, Any]], bar: float) -> dict[str, Any]:
 
     Args:
         rows: rows of curves.csv of one id.
-        bar: return of the best gait that needs no learning.
+        bar: return of the best policy without feedback.
 
     Returns:
         "algo", "seeds", and "steps" and "seconds" from which on it stays above the bar, of the algorithm with
@@ -120,8 +117,7 @@ def returns_of(env_id: str, random: float) -> dict[str, Any]:
     played = STANDS_FOR.get(env_id, env_id)
     found = {"random": round(random, 4), **{k: round(v, 4) for k, v in stock_return(played).items()}}
     scored = shipped_returns(env_id.rpartition("/")[2])
-    bar = max(scored[name] for name in UNLEARNT if name in scored)
-    learnt = learning_of([row for row in read_curves(CURVES) if row["env_id"] == env_id], bar)
+    learnt = learning_of([row for row in read_curves(CURVES) if row["env_id"] == env_id], scored["blind"])
     return found | ({"learnt": learnt} if learnt else {})
 
 

@@ -51,7 +51,7 @@ def draw_learning_curve(folder: Path, scores: Sequence[Score], path: Path, **opt
             axes.plot(*zip(*points, strict=True), color=GREEN, lw=1, label="without noise on the way")
         policy, *others = [(score.policy, score.estimates["return"].mean) for score in scores]
         label = f"this policy, without noise: {policy[1]:.1f}"
-        axes.plot(1e-6 * training_length(folder)[0], policy[1], "o", color=GREEN, label=label)
+        axes.plot(1e-6 * training_length(folder)["steps"], policy[1], "o", color=GREEN, label=label)
         for _, level in others:
             axes.axhline(level, color=ORANGE, lw=1, ls="--")
         height = 0.065 * np.ptp(axes.get_ylim())  # height of a line of text
@@ -80,9 +80,10 @@ def render_template(file: str, /, **values: Any) -> str:
     return report.render_template(TEMPLATES / file, **values)
 
 
-def training_length(folder: Path) -> tuple[int, float]:
-    """Return the steps and the seconds of a training, up to its last episode if it is not finished."""
+def training_length(folder: Path) -> dict[str, float]:
+    """Return the "steps" and the "seconds" of a training, up to its last episode if it is not finished."""
     if finished := runs.read_record(folder).get("finished"):
-        return int(finished["steps"]), float(finished["seconds"])
+        return {"steps": int(finished["steps"]), "seconds": float(finished["seconds"])}
     episodes = runs.read_episodes(folder)
-    return (int(episodes[-1, 0]), float(episodes[:, 2].max())) if len(episodes) else (0, 0.0)
+    steps, seconds = (int(episodes[-1, 0]), float(episodes[:, 2].max())) if len(episodes) else (0, 0.0)
+    return {"steps": steps, "seconds": seconds}

@@ -2,7 +2,7 @@
 
     python -m agents.results replay                      plays all rows again; or results/NAME.json ...
     python -m agents.results add results/mine.json       replays a row and takes it into results/
-    python -m agents.results pages                       writes the tables of all pages from the rows
+    python -m agents.results pages                       writes the tables of pages and package from the rows
     python -m agents.results score HorseLeg-v0 zero      plays a policy and writes its row
 
 A row says which policy was played on which id, in which episodes, what came out, and which command, commit
@@ -32,12 +32,16 @@ from tyro.conf import Positional, subcommand
 
 from agents import runs
 from agents.blindness import prove
+from agents.cards import POLICIES
 from agents.command import run
+from agents.ship import shown_command, write_index
 from hoof_env._output import markdown_table
 from hoof_env.envs.open_loop import gait_file, open_loop_record
+from hoof_env.envs.policies import STANDS_FOR
 from hoof_env.envs.shipped import SHIPPED
 from hoof_env.errors import DataFileError, HoofEnvError, ParameterError, check_choice, parse_json
 from hoof_env.evaluation.episodes import FINAL_SEEDS, score_vector
+from hoof_env.evaluation.scores import METRICS
 from hoof_env.evaluation.statistics import estimate, iqm
 from hoof_env.policies.find import find_policy, is_model
 from hoof_env.policies.record import environment_of
@@ -48,7 +52,7 @@ CURVES = ROOT / "docs" / "evidence" / "stock" / "curves.csv"
 
 KINDS = {
     "zero": "zero action",
-    "run": "scripted run",
+    "run": "scripted gait",
     "constant": "best constant gait",
     "open-loop": "best gait locked to the crank",
     "blind": "blind agents",
@@ -65,7 +69,7 @@ COLUMNS: dict[str, tuple[str, int, float]] = {
     "speed_m_s": ("speed m/s", 2, 1.0),
     "stance_peak_n": ("stance peak kN", 2, 1e-3),
     "loading_rate_n_s": ("loading rate kN/s", 0, 1e-3),
-    "slip_m": ("slip m", 2, 1.0),
+    "slip_m": ("slip of a stance m", 2, 1.0),
     "cost_of_transport": ("cost of transport, mechanical", 2, 1.0),
     "weight_share": ("weight share", 2, 1.0),
     "failed": ("falls", 2, 1.0),
@@ -90,7 +94,8 @@ class Row:
         interval95: bounds of the bootstrap's 95 % interval over the episodes, None for equal episodes.
         runs: mean returns of all training runs of this kind by seed, of which `policy` is the best; empty for
             a policy that was not trained.
-        effort: what it took: "steps" of a training run, or "episodes" of a search.
+        effort: what it took: "steps" of a training run, "episodes" of a search, and "runs", the number of
+            training runs of which it is the best, where `runs` lacks their returns.
         command: command that made the policy.
         commit: commit at which it was scored.
         versions: versions of the packages.
@@ -219,11 +224,15 @@ def played(policy: str, env_id: str, seeds: range) -> list[dict[str, float]]:
 # -- making and replaying ----------------------------------------------------------------------
 
 
+STORED = tuple(dict.fromkeys((*COLUMNS, *METRICS)))
+"""Figures that a row has the means of."""
+
+
 def figures(episodes: Sequence[dict[str, float]]) -> tuple[dict[str, float], dict[str, Any]]:
     """Return means and intervals of the finite figures of episodes."""
     mean: dict[str, float] = {}
     interval: dict[str, Any] = {}
-    for key in COLUMNS:
+    for key in STORED:
         values = [episode[key] for episode in episodes if key in episode]
         if len(values) == len(episodes) and all(map(math.isfinite, values)):
             mean[key] = float(np.mean(values))
@@ -262,6 +271,25 @@ def make_row(
     )  # fmt: skip
     check_blindness(row)
     return row
+
+
+def returns_of_runs(place: Path, env_id: str) -> dict[str, float]:
+    """Return the mean returns of training runs in the published episodes by seed.
+
+    Args:
+        place: folder of run folders, which play them, or table in which they are.
+        env_id: id of the environment.
+    """
+    if place.is_file():
+        with place.open(newline="", encoding="utf-8") as file:
+            rows = [row for row in csv.DictReader(file) if ", seed " in row["policy"]]
+        return {row["policy"].rpartition(" ")[2]: float(row["return"]) for row in rows}
+    found = {}
+    for folder in sorted(record.parent for record in place.rglob(runs.RECORD)):
+        record = runs.read_record(folder)
+        episodes = score_vector(str(folder), env_id, FINAL_SEEDS, **record.get("env_kwargs", {}))
+        found[str(record["seed"])] = float(np.mean([episode["return"] for episode in episodes]))
+    return found
 
 
 def stock_row(env_id: str) -> Row:
@@ -344,14 +372,16 @@ def cell(row: Row, key: str) -> str:
 def runs_cell(row: Row) -> str:
     """Return the cell of the training runs: median and range of their returns."""
     if row.spread is None:
-        return "one run" if row.kind in ("blind", "shipped", "stock") else ""
+        among = row.effort.get("runs", 1)
+        several = f"best of {among}; the rest was not kept" if among > 1 else "one run"
+        return several if row.kind in ("blind", "shipped", "stock") else ""
     median, low, high = row.spread
     return f"median {median:.1f} of {len(row.runs)} ({low:.1f} to {high:.1f})"
 
 
 def effort_cell(row: Row) -> str:
     """Return the cell of steps or episodes."""
-    return ", ".join(f"{count:,} {unit}" for unit, count in row.effort.items())
+    return ", ".join(f"{count:,} {unit}" for unit, count in row.effort.items() if unit != "runs")
 
 
 def table(env_id: str, columns: Sequence[str], folder: Path = RESULTS) -> str:
@@ -361,6 +391,7 @@ def table(env_id: str, columns: Sequence[str], folder: Path = RESULTS) -> str:
     lines = []
     for kind, row in rows.items():
         title = KINDS[kind] + (", best run" if row.spread and kind in ("blind", "shipped") else "")
+        title += f" (`{row.policy}`)" if kind == "run" else ""
         title = f"**{title}: best without feedback**" if row is best else title
         lines.append([title, effort_cell(row), *(cell(row, key) for key in columns), runs_cell(row)])
     titles = [COLUMNS[key][0] for key in columns]
@@ -413,6 +444,33 @@ def pages() -> list[Path]:
     return [path for path in places if "<!-- results: " in path.read_text(encoding="utf-8")]
 
 
+# -- scores of the package ---------------------------------------------------------------------
+
+
+def scores_of(env_id: str, data: dict[str, Any], folder: Path = RESULTS) -> dict[str, Any]:
+    """Return the content of an id's score.json with the policies that rows have: zero action, best constant
+    gait, best gait locked to the crank, "blind", the best policy without feedback, and stock PPO."""
+    rows = rows_of(STANDS_FOR.get(env_id, env_id), folder)
+    found: dict[str, Row] = {kind: rows[kind] for kind in ("zero", "constant", "open-loop") if kind in rows}
+    if "reference" in data["policies"]:
+        found.pop("zero", None)  # the same
+    if best := best_blind(rows):
+        found["blind"] = best
+    found |= {"stock": rows["stock"]} if "stock" in rows else {}
+    policies = {name: value for name, value in data["policies"].items() if name not in KINDS}
+    policies |= {name: data["policies"][name] for name in ("run",) if name in data["policies"]}
+    for name, row in found.items():
+        mean = {key: row.mean[key] for key in METRICS if key in row.mean}
+        bounds = {key: row.interval95.get(key) or (mean[key], mean[key]) for key in mean}
+        policies[name] = {"mean": mean, "interval95": bounds}
+    return data | {"policies": policies}
+
+
+def score_files() -> dict[str, Path]:
+    """Return the files of scores in the package by id."""
+    return {f"hoof_env/{path.parent.name}": path for path in sorted(SHIPPED.glob("*/score.json"))}
+
+
 # -- command -----------------------------------------------------------------------------------
 
 
@@ -447,6 +505,15 @@ class ScoreOne:
     """kind of the row"""
     policy: str | None = None
     """name, file or folder of the policy, relative to the repository; otherwise the kind"""
+    runs: Path | None = None
+    """all training runs of which the policy is the best: a folder with their folders, or a table of evidence
+    with columns policy ("ppo_flat, seed 3") and return"""
+    steps: int | None = None
+    """environment steps of each training run"""
+    among: int | None = None
+    """number of training runs of which the policy is the best, where their returns were not kept"""
+    note: str = ""
+    """what a reader must know"""
 
 
 Command = (
@@ -473,11 +540,22 @@ def main(argv: list[str] | None = None) -> None:
     if isinstance(args, ScoreOne):
         if "/" in args.name:
             raise ParameterError(f"name: expected an id of hoof_env without its namespace, got {args.name!r}")
-        print(make_row(f"hoof_env/{args.name}", args.kind, args.policy, command=runs.command()).write())
+        env_id = f"hoof_env/{args.name}"
+        effort = {"steps": args.steps} if args.steps else {}
+        effort |= {"runs": args.among} if args.among else {}
+        training = returns_of_runs(args.runs, env_id) if args.runs else {}
+        command = shown_command(runs.command())
+        row = make_row(env_id, args.kind, args.policy, training, effort, command, args.note)
+        print(row.write().relative_to(ROOT))
     elif isinstance(args, Pages):
         for path in pages():
             runs.write_text(path, filled(path.read_text(encoding="utf-8")))
             print(path.relative_to(ROOT))
+        for env_id, path in score_files().items():
+            data = scores_of(env_id, parse_json(path.read_text(encoding="utf-8")))
+            runs.write_text(path, json.dumps(data, indent=1, allow_nan=False) + "\n")
+            print(path.relative_to(ROOT))
+        write_index(POLICIES, SHIPPED)
     else:
         files = args.rows or sorted(RESULTS.glob("*.json"))
         rows = list(confirmed(files))

@@ -7,6 +7,7 @@ The best of an id is that with the highest mean return in episodes on which noth
 in the package, hoof_env/data/policies/NAME: its weights as plain data, how it was trained, its returns with
 those of gaits and how far other machines may be off. agents/policies/NAME has the exported policy, a model
 card, a curve and a film, and agents/policies/README.md lists all. Each folder is written whole or not at all.
+After a change of the card's template `python -m agents.cards` writes the cards of all policies anew.
 """
 
 from __future__ import annotations
@@ -26,27 +27,22 @@ import numpy as np
 from tyro.conf import Positional
 
 from agents import runs
+from agents.cards import CARD, FILM, POLICIES, SCORE, card
 from agents.command import run
 from agents.export import write_policy
-from agents.pages import draw_learning_curve, render_template, training_length
+from agents.pages import draw_learning_curve, training_length
 from hoof_env._output import check_folder, markdown_table, staged
 from hoof_env.envs.policies import STANDS_FOR
 from hoof_env.envs.shipped import SHIPPED
 from hoof_env.errors import DataFileError, OutputError, ParameterError, check_choice, parse_json
 from hoof_env.evaluation.episodes import FINAL_SEEDS as SCORE_SEEDS
 from hoof_env.evaluation.episodes import score_vector
-from hoof_env.evaluation.scores import METRICS, Score, cell, to_json
+from hoof_env.evaluation.scores import Score, to_json
 from hoof_env.evaluation.statistics import Interval
 from hoof_env.film import render_episode
 from hoof_env.policies.onnx_file import FILE, OnnxPolicy
 from hoof_env.policies.record import about, environment_of, own_id
 from hoof_env.policies.saved import ABOUT, WEIGHTS
-from hoof_env.records import surroundings
-from hoof_env.tasks.registry import TASKS
-
-POLICIES = Path(__file__).with_name("policies")
-SHOWN = ("return", "distance_m", "stance_peak_n", "weight_share", "cost_of_transport", "failed")
-"""Columns of the card's table, keys of `METRICS`."""
 
 CHOOSING_SEEDS = range(500_000, 500_100)
 """Seeds of the episodes by which the best of several runs is chosen; no training and no reported score plays
@@ -55,16 +51,14 @@ them."""
 CHECKED = 20
 """Number of episodes, from the first of the score on, that are played again to check a shipped policy."""
 
-GAITS = ("run", "walk", "carrying_walk", "reference", "open-loop")  # scored as well, if an id has them
+GAITS = ("zero", "run", "walk", "carrying_walk", "reference", "constant", "open-loop")
+"""Policies that are scored as well, if an id has them."""
 
 LIMIT = 1_000_000
 FILM_LIMIT = 650_000
 """Largest size of a folder and of the film in it [bytes]; a film that is larger is made shorter."""
 
 FILM_SECONDS = 4.0
-
-FILM = "film.gif"
-SCORE = "score.json"
 
 COPIED = (WEIGHTS, ABOUT, runs.CONFIG)
 PACKAGED = (WEIGHTS, ABOUT, runs.RECORD, SCORE)
@@ -147,6 +141,7 @@ def ship(choice: Choice, env_id: str, out: Path) -> dict[str, Any]:
     if not len(runs.read_episodes(saved.path.parent)):
         raise DataFileError(f"run {saved.path.parent}: expected a training in which episodes end, got none")
     record = saved.record | {"command": shown_command(saved.record.get("command", "")), "env_id": env_id}
+    record.setdefault("finished", training_length(saved.path.parent))
     record.pop("args", None)  # paths of the machine that trained; the command says the rest
     with runs.make_env(trained_on) as env:
         trained = saved.load(env, trained_on)
@@ -157,7 +152,7 @@ def ship(choice: Choice, env_id: str, out: Path) -> dict[str, Any]:
         write_policy(trained, stage / FILE, metadata)
         policy = OnnxPolicy(stage / FILE)  # the shipped file is scored, not the model
         scores = [Score("policy", score_vector(policy, played_on, SCORE_SEEDS)), *gaits(played_on)]
-        score = score_record(policy, scores, env_id, played_on)
+        score = score_record(policy, scores, env_id, played_on) | {"runs": choice.among}
         if env_id != trained_on:
             record["trained_on"] = trained_on
         for name in COPIED:
@@ -171,7 +166,10 @@ def ship(choice: Choice, env_id: str, out: Path) -> dict[str, Any]:
         shown = shared_film(stage, out / trained_on.rpartition("/")[2]) if env_id != played_on else ""
         if not shown:
             film(stage, env_id)
-        write_card(stage, env_id, record, score, scores, choice, shown or FILM)
+        config = (stage / runs.CONFIG).read_text(encoding="utf-8")
+        has_weights = (stage / WEIGHTS).is_file()
+        text = card(env_id, record, score, config, shown or FILM, has_weights)
+        (stage / CARD).write_text(text, encoding="utf-8")
         size = sum(file.stat().st_size for file in stage.iterdir())
         if size > LIMIT:
             raise OutputError(f"{folder}: expected at most {LIMIT:,} bytes, got {size:,}")
@@ -265,58 +263,21 @@ def shown_command(command: str) -> str:
     return shlex.join([Path(word).name if Path(word).is_absolute() else word for word in shown])
 
 
-def write_card(
-    folder: Path,
-    env_id: str,
-    record: dict[str, Any],
-    score: dict[str, Any],
-    scores: Sequence[Score],
-    choice: Choice,
-    shown: str,
-) -> None:
-    """Write card.md, the model card of a policy."""
-    keys = [key for key in SHOWN if key in scores[0].estimates]
-    with runs.make_env(env_id) as env:
-        is_suspended = surroundings(env).trunk == "suspended"
-        summaries = {task.id: task.summary for task in TASKS.values()}
-        summary = summaries.get(env_id) or (type(env.unwrapped).__doc__ or "").partition("\n")[0]
-    steps, seconds = training_length(choice.saved.path.parent)
-    text = render_template(
-        "model_card.md.j2",
-        env_id=env_id,
-        name=env_id.rpartition("/")[2],
-        summary=summary,
-        trained_on=record.get("trained_on", env_id),
-        record=record,
-        steps=steps,
-        seconds=seconds,
-        settings=(folder / runs.CONFIG).read_text(encoding="utf-8").strip(),
-        score=score,
-        spread=float(np.std(score["returns"])),
-        titles=[METRICS[key].title.replace("\n", " ") for key in keys],
-        rows=[
-            (one_score.policy, [" ".join(cell(key, one_score.estimates[key])) for key in keys])
-            for one_score in scores
-        ],
-        estimates={one_score.policy: one_score.estimates for one_score in scores},
-        choice=choice,
-        film=shown,
-        suspended=is_suspended,
-        files={file.name for file in folder.iterdir()},
-    )
-    (folder / "card.md").write_text(text, encoding="utf-8")
-
-
 def write_index(folder: Path, scores: Path) -> None:
     """Write README.md into `folder`, the table of its policies, whose scores are beneath `scores`."""
     rows = []
-    references = ("open-loop", "run", "reference")
+    references = {
+        "blind": "best without feedback",
+        "constant": "best constant gait",
+        "run": "run",
+        "zero": "zero action",
+    }
     for path in sorted(scores.glob(f"*/{SCORE}")):
         score = parse_json(path.read_text(encoding="utf-8"))
         algo = parse_json(path.with_name(runs.RECORD).read_text(encoding="utf-8"))["algo"]
         row = [f"`{score['env_id']}`", algo.upper()]
         for name in ("policy", *references):
-            of_policy = score["policies"].get(name)
+            of_policy = score["policies"].get(name) or (name == "zero" and score["policies"].get("reference"))
             if of_policy:
                 interval = Interval(of_policy["mean"]["return"], *of_policy["interval95"]["return"])
                 row.append(interval.text(2))
@@ -326,9 +287,12 @@ def write_index(folder: Path, scores: Path) -> None:
     text = (
         "# Trained policies\n\n"
         "One for each id, made by `python -m agents.ship`; docs/agents.md says how to use them.\n"
-        "Mean returns in the same episodes, and the bootstrap's 95 % interval.\n\n"
+        "Mean returns in the same episodes, and the bootstrap's 95 % interval over the episodes of each"
+        " policy.\n"
+        "It says nothing about other trainings; each card says of how many its policy is the best.\n"
+        "`HorseLegFixed-v0` has one deterministic episode.\n\n"
     )
-    titles = ["id", "policy", "return", *references, "card"]
+    titles = ["id", "policy", "return", *references.values(), "card"]
     runs.write_text(folder / "README.md", text + markdown_table(titles, rows) + "\n")
 
 
@@ -353,6 +317,8 @@ def main(argv: list[str] | None = None) -> None:
         means = {name: of_policy["mean"]["return"] for name, of_policy in score["policies"].items()}
         write_index(args.out, SHIPPED if args.out == POLICIES else args.out)
         print(f"{env_id}: " + ", ".join(f"{name} {value:.2f}" for name, value in means.items()), flush=True)
+    if args.out == POLICIES:
+        print("next: python -m agents.results score NAME shipped --runs RUNS, for each; then ... pages")
 
 
 if __name__ == "__main__":

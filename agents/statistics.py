@@ -1,4 +1,4 @@
-"""Comparison of agents with the scripted run.
+"""Means with intervals as plain data, and the comparison of agents with the scripted run.
 
 An agent dominates the scripted run if it is faster, its forces, its cost of transport and its loading rate
 are lower by at least what `LOWER` says, and it bears between the run's share of the weight and all of it:
@@ -7,13 +7,22 @@ bearing less is a way to be soft, and with more the suspension pulls the animal 
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 
 from hoof_env._output import markdown_table
-from hoof_env.evaluation.statistics import TABLE, Scored, cells
+from hoof_env.evaluation.statistics import TABLE, Scored, cells, estimate
 
 LOWER = {"stance_peak_n": 0.75, "highest_grf_n": 0.85, "cost_of_transport": 0.7, "loading_rate_n_s": 1.0}
 """Largest ratios to the run's figures for an agent that dominates; chosen values of this project."""
+
+
+def described(values: Sequence[float]) -> dict[str, float]:
+    """Return mean and bounds of the 95 % interval of values over episodes as plain data; equal values, which
+    have no interval, and a single one have a mean alone."""
+    found = estimate(values)
+    has_interval = math.isfinite(found.low) and found.low < found.high
+    return {"mean": found.mean, **({"low": found.low, "high": found.high} if has_interval else {})}
 
 
 def dominates(figures: Mapping[str, float], run: Mapping[str, float]) -> bool:

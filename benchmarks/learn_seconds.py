@@ -1,4 +1,4 @@
-"""Seconds of learning until `ppo_flat`, and stock learners, are better than the best open-loop gait.
+"""Seconds of learning until `ppo_flat`, and stock learners, are better than the best constant gait.
 
     python -m benchmarks.learn_seconds                writes learn_seconds.json and .md
     python -m benchmarks.learn_seconds --seeds 3      fewer trainings
@@ -51,7 +51,7 @@ INTRO = """\
 # Seconds to learn
 
 Written by `python -m benchmarks.learn_seconds`: from the first reset of `{env_id}` to the end of the update
-whose policy returns more than the best open-loop gait, {gait:.1f}, and to within 5 % of the final return, in
+whose policy returns more than the best constant gait, {gait:.1f}, and to within 5 % of the final return, in
 the mean of 64 starts; scores are not counted. Imports took {imports:.1f} s, loading the stored kernels
 {loading:.1f} s. Stock learners stop after {limit:g} s."""
 
@@ -153,7 +153,7 @@ def main() -> None:
     assert envs is not None
     with runs.make_env(ENV_ID) as env:
         runs.warm_up(env)
-        gait = find_policy("open-loop", env, ENV_ID)
+        gait = find_policy("constant", env, ENV_ID)
         level = float(np.mean([episode["return"] for episode in play_rows(envs, gait, STARTS)]))
     # Outside of the clock of all trainings
     learn_flat(0, envs, args.threads, 4096)  # loads the trainer's kernels
@@ -182,7 +182,7 @@ def main() -> None:
     intro = INTRO.format(
         env_id=ENV_ID, gait=level, imports=IMPORTED - BEGAN, loading=loading, limit=STOCK_SECONDS
     )
-    head = ("learner", "seeds", "seconds to the best open loop", "seconds to within 5 %", "final return")
+    head = ("learner", "seeds", "seconds to the best constant gait", "seconds to within 5 %", "final return")
     text = "\n\n".join([intro, markdown_table(head, rows), markdown_table(("what", ""), [*about.items()])])
     bits = vector_bits()
     result = {"machine": about, "bits": bits, "open_loop": level, "curves": results}

@@ -39,7 +39,7 @@ env = gym.make(ENV_ID)
 beside = {
     "zero action, which keeps the gait": Scripted(lambda observation, time: np.zeros(4), env.unwrapped.dt),
     "scripted run": make_policy("run", env),
-    "best open-loop gait": load_open_loop(ENV_ID, env),
+    "best gait without feedback": load_open_loop(ENV_ID, env),
 }
 returns, steps = np.loadtxt("first_curve.monitor.csv", delimiter=",", skiprows=2, usecols=(0, 1)).T
 plt.plot(np.cumsum(steps), returns, label="PPO, as it explores")

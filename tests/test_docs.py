@@ -14,7 +14,7 @@ from hoof_env.tasks.reward import BEARING, STEPPING, check_weights
 from tests.test_rooms import FLOORS
 
 ROOT = Path(__file__).resolve().parent.parent
-FOLDERS = ("agents", "benchmarks", "docs", "examples", "hoof_env", "scripts", "tests")
+FOLDERS = ("agents", "benchmarks", "docs", "examples", "hoof_env", "results", "scripts", "tests")
 PAGES = sorted([*ROOT.glob("*.md"), *(page for folder in FOLDERS for page in (ROOT / folder).rglob("*.md"))])
 LIVE = [page for page in PAGES if "evidence" not in page.parts]
 """Frozen pages name the commands of their commits."""

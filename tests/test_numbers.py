@@ -17,6 +17,7 @@ from typing import Any
 
 import pytest
 
+from agents.results import read_row
 from hoof_env.envs.horse_leg import HorseLegEnv
 from hoof_env.evaluation.statistics import iqm
 from hoof_env.ground.laws import FACTORS, restitution_of_factor
@@ -65,6 +66,13 @@ def score(policy_id: str, policy: str, figure: str) -> float:
     if figure == "loading_kn_s":
         return found["loading_rate_n_s"] / 1000.0
     return found[figure]
+
+
+def row(name: str, kind: str, figure: str) -> float:
+    """A mean figure of a row of results, or the median, lowest or highest return of its training runs."""
+    found = read_row(ROOT / f"results/{name}-{kind}.json")
+    spread = dict(zip(("median", "lowest", "highest"), found.spread or (), strict=False))
+    return spread[figure] if figure in spread else found.mean[figure]
 
 
 def stock(name: str, algo: str, steps: str) -> float:
@@ -120,6 +128,18 @@ def constant(module: str, name: str, *keys: str) -> float:
     for key in keys:
         value = 100 * value if key == "percent" else value[key]
     return abs(value)
+
+
+@cache
+def measured(file: str) -> dict[str, Any]:
+    """A file of figures in docs/evidence."""
+    return json.loads((ROOT / "docs/evidence" / file).read_text(encoding="utf-8"))
+
+
+def suspension(policy: str, figure: str, factor: str = "1", of: str = "mean") -> float:
+    """A figure of the suspension or the hoof of one leg, times a factor: its mean over episodes, or the least
+    or the most of all."""
+    return float(factor) * measured("leg_forces.json")["policies"][policy][figure][of]
 
 
 def fastest_gait() -> float:
@@ -212,12 +232,14 @@ def claims(count: str) -> float:
 
 SOURCES: dict[str, Callable[..., float]] = {
     "score": score,
+    "row": row,
     "stock": stock,
     "speed": speed,
     "engine_speed": engine_speed,
     "leg": leg,
     "horse": horse,
     "constant": constant,
+    "suspension": suspension,
     "fastest_gait": fastest_gait,
     "gain": gain,
     "evidence": evidence,
@@ -287,39 +309,10 @@ def differs(shown: str, values: Iterable[float]) -> bool:
     return any(abs(number - value) > 0.5001 * step for number, step, value in pairs)
 
 
-COLUMNS = (
-    "return",
-    "speed m/s",
-    "stance peak kN",
-    "loading rate kN/s",
-    "slip of a stance m",
-    "cost of transport",
-    "weight share",
-)
-"""Columns of the table of agents whose titles the evidence shares."""
-
-
-def test_agents_reach_on_the_page_what_they_reach_in_the_evidence():
-    shown = table("docs/agents.md", "the suspension's share")
-    with (ROOT / "docs" / "evidence" / "actions" / "agents.csv").open(encoding="utf-8", newline="") as file:
-        found = {row["policy"]: row for row in csv.DictReader(file)}
-    seeds = [row for name, row in found.items() if name.startswith("ppo_flat, seed")]
-    assert len(seeds) == 10
-    for title, own in (("the suspension's share", "suspension's share"), *((one, one) for one in COLUMNS)):
-        for name, row in (
-            ("scripted run", "run"),
-            ("zero action", "zero action"),
-            ("best open-loop gait", "open-loop"),
-        ):
-            assert not differs(shown[name][title], numbers(found[row][own])[:1]), (name, title)
-        values = [numbers(seed[own])[0] for seed in seeds]
-        assert not differs(shown["ppo_flat`, ten seeds"][title], (min(values), max(values))), title
-
-
 def test_seconds_to_learn_are_those_of_the_benchmark():
     page = "benchmarks/results/512-bits/learn_seconds.md"
-    row = table(page, "seconds to the best open loop")["ppo_flat"]
-    best = numbers(row["seconds to the best open loop"])
+    row = table(page, "seconds to the best constant gait")["ppo_flat"]
+    best = numbers(row["seconds to the best constant gait"])
     near = numbers(row["seconds to within 5 %"])
     text = (ROOT / "docs/agents.md").read_text(encoding="utf-8")
     said = f"after {best[0]:g} seconds of learning (median of ten seeds, {best[2]:g} in the worst)"
@@ -365,6 +358,101 @@ def test_a_living_horse_is_compared_with_what_the_evidence_has():
     for k, leg in enumerate(("fore", "hind")):
         assert not differs(shown[f"stance peak, {leg} [N/kg]"]["trot-like"], peaks[k : k + 1])
         assert not differs(shown[f"duty factor, {leg}"]["trot-like"], duties[k : k + 1])
+
+
+def test_the_suspension_on_the_page_is_that_of_the_figures():
+    shown = table("docs/task.md", "pulls down")
+    figures = {
+        "mean": ("force_mean", 1),
+        "rms": ("force_rms", 1),
+        "lowest": ("force_lowest", 1),
+        "highest": ("force_highest", 1),
+        "pulls down": ("pulling_time", 100),
+        "mean while it does": ("pulling_force", 1),
+        "heat of the damper [kJ]": ("damper_heat_j", 1e-3),
+        "work of the drives [kJ]": ("drive_work_j", 1e-3),
+        "greatest depth of the hoof [m]": ("depth_m", 1),
+    }
+    policies = {
+        "scripted run": "run",
+        "best constant gait": "constant",
+        "best gait locked to the crank": "open-loop",
+        "shipped agent": "shipped",
+    }
+    assert list(shown) == list(policies)
+    for name, policy in policies.items():
+        for title, (figure, factor) in figures.items():
+            value = suspension(policy, figure, str(factor))
+            assert not differs(shown[name][title], [value]), (name, title)
+
+
+POLICIES = {"zero action": "zero action", "shipped agent": "agent", "trot-like": "trot-like"}
+"""Names of policies of the horse in its figures, by those on the page."""
+
+
+def test_the_gain_of_the_horse_by_term_is_that_of_the_figures():
+    shown = table("docs/horse.md", "term", "gain")
+    found = measured("horse/figures.json")["gain"]
+    named = set()
+    for name, row in shown.items():
+        for term in ["return"] if name == "all" else [f"reward_{x}" for x in re.findall(r"\w+", name)]:
+            named.add(term)
+            assert not differs(row["gain"], [found[term]["mean"]]), term
+            if "low" in found[term]:
+                assert not differs(row["95 % interval"], [found[term]["low"], found[term]["high"]]), term
+    assert named == set(found)
+
+
+def test_the_horse_by_speed_is_that_of_the_figures():
+    text = (ROOT / "docs/horse.md").read_text(encoding="utf-8")
+    titles = {
+        "return": ("return", 1),
+        "speed reached [m/s]": ("speed_m_s", 1),
+        "loading rate [kN/s]": ("loading_rate_n_s", 1e-3),
+        "stance peak [kN]": ("stance_peak_n", 1e-3),
+        "slip a stance [m]": ("slip_m", 1),
+        "cost of transport": ("cost_of_transport", 1),
+    }
+    head, _, *lines = re.search(r"^\| commanded.*\n(?:\|.*\n)+", text, re.MULTILINE)[0].splitlines()
+    cells = [[cell.strip() for cell in line.strip("|").split("|")] for line in (head, *lines)]
+    rows = iter(dict(zip(cells[0], row, strict=True)) for row in cells[1:])
+    for of_speed in measured("horse/figures.json")["speeds"]:
+        for name, figures in of_speed["policies"].items():
+            row = next(rows)
+            assert float(row["commanded [m/s]"]) == of_speed["speed_m_s"]
+            assert POLICIES[row["policy"].strip("`")] == name
+            assert figures["failed"]["mean"] == 0.0  # as the page says of all
+            for title, (figure, factor) in titles.items():
+                assert not differs(row[title], [factor * figures[figure]["mean"]]), (row, title)
+            nets = [figures[f"net_{pair}"]["mean"] for pair in ("fore", "hind")]
+            assert not differs(row["net force, fore and hind [N/kg]"], nets), row
+    assert not list(rows)
+
+
+def test_which_legs_brake_is_what_the_figures_have():
+    """Signs, too: the page says where roles are reversed, and where the agent loads faster."""
+    title = "net horizontal force of the pair, fore and hind [N/kg]"
+    shown = table("docs/horse.md", title)
+    found = measured("horse/figures.json")
+    for of_froude in found["forces"]:
+        for row in shown.values():
+            name = POLICIES.get(row[title].partition(":")[0])
+            if name:
+                nets = [of_froude["policies"][name][f"net_{pair}"]["mean"] for pair in ("fore", "hind")]
+                assert not differs(row[f"Fr {of_froude['froude']:g}"], nets), (row, of_froude["froude"])
+    speeds = found["speeds"]
+    zero, agent = ([row["policies"][name] for row in speeds] for name in ("zero action", "agent"))
+    assert [row["net_fore"]["mean"] > 0 for row in zero] == [True, True, True, False, True]
+    assert all(row["policies"]["zero action"]["net_fore"]["mean"] > 0.4 for row in found["forces"])
+    for figure, more in (("loading_rate_n_s", 4), ("stance_peak_n", 2)):
+        pairs = zip(agent, zero, strict=True)
+        assert sum(ours[figure]["mean"] > theirs[figure]["mean"] for ours, theirs in pairs) == more
+    compared = table("docs/horse.md", "slow gait", "trot-like")
+    slow, trot = found["forces"][1]["policies"]["zero action"], found["speeds"][-1]["policies"]["trot-like"]
+    for pair in ("fore", "hind"):
+        row = compared[f"net horizontal force, {pair} [N/kg]"]
+        for column, figures in (("slow gait", slow), ("trot-like", trot)):
+            assert not differs(row[column], [figures[f"net_{pair}"]["mean"]]), (pair, column)
 
 
 def test_a_cell_that_differs_is_found():

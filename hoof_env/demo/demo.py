@@ -25,7 +25,7 @@ from hoof_env.paper.rows import Reproduction, counted
 ENV_ID = DEFAULT_ENV
 FIXED_ID = "hoof_env/HorseLegFixed-v0"
 AGENT = "shipped agent"
-SCRIPTED = ("walk", "run", OPEN_LOOP, "idle", "random", "bang-bang")
+SCRIPTED = ("zero", "walk", "run", "constant", OPEN_LOOP, "idle", "random", "bang-bang")
 FIRST_SEED = 1000  # first of the scored episodes; no training starts its own from it
 PAGE = "report.html"
 SLOW = 4  # factor of the slow motion in which the films of the fixed trunk play

@@ -36,7 +36,10 @@ SUMMARY = {
     "positive_work_j": ("J", "positive work of both drives"),
     "cost_of_transport": ("-", "work per weight and distance; infinite without forward progress"),
     "weight_share": ("-", "mean normal force over weight: what the leg bore"),
-    "support_share": ("-", "the rest, which rail or suspension bore"),
+    "support_share": (
+        "-",
+        "the rest, which rail or suspension bore: a mean, for a suspension also pulls",
+    ),
     "failed": ("-", "0 or 1"),
     "success": ("-", f"1 if it lasted, at {SUCCESS_SPEED} of the commanded speed or more, if there is one"),
 }

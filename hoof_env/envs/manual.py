@@ -25,7 +25,7 @@ from hoof_env.envs.manual_bodies import page_of_body
 from hoof_env.envs.manual_common import own_sections, sections_left, shared_sections, without_common
 from hoof_env.envs.manual_words import HERE, TABLES, WORDS, rows_of
 from hoof_env.envs.policies import STANDS_FOR
-from hoof_env.envs.shipped import shipped_returns
+from hoof_env.envs.shipped import is_one_episode, shipped_returns
 from hoof_env.envs.shown import Markdown
 from hoof_env.errors import DataFileError, OutputError, check_choice
 from hoof_env.render.renderer import USUAL_SIZE
@@ -59,9 +59,11 @@ HORSES = (_NAMES["horse"], _NAMES["rough"])
 
 SCORED = {
     "random": "random actions",
+    "zero": "zero action",
     "run": "scripted run",
-    "reference": "reference gait",
-    "open-loop": "best gait without feedback",
+    "reference": "reference gait (zero action)",
+    "constant": "best constant gait",
+    "blind": "best policy without feedback",
     "stock": "stock PPO",
     "policy": "shipped agent",
 }
@@ -329,7 +331,8 @@ def _returns(policy: Path, films: Path, name: str) -> dict[str, Any]:
         DataFileError: the policy has no scores, or the file of returns cannot be read.
     """
     scored = shipped_returns(policy.name)
-    found = {key: scored[key] for key in SCORED if key in scored}
+    found: dict[str, Any] = {key: scored[key] for key in SCORED if key in scored}
+    found["one_episode"] = is_one_episode(policy.name)
     path = films / RETURNS
     try:
         others = json.loads(path.read_text(encoding="utf-8")) if path.is_file() else {}
@@ -346,7 +349,8 @@ def _score(returns: Mapping[str, Any]) -> str:
     shown = [key for key in SCORED if key in returns]
     table = markdown_table([titles[key] for key in shown], [[f"{returns[key]:.3g}" for key in shown]])
     stock = "" if "stock" in returns else WORDS["no_stock"]
-    return Template(WORDS["score"].strip()).substitute(returns=table, stock=stock)
+    words = WORDS["one_score" if returns.get("one_episode") else "score"]
+    return Template(words.strip()).substitute(returns=table, stock=stock)
 
 
 def _film(name: str, kind: str, film: str) -> str:

@@ -11,8 +11,16 @@ SHIPPED = Path(__file__).parents[1] / "data" / "policies"
 """Folder with a folder of each id's trained policy, as `agents.ship` writes it: weights, how they were
 trained, and returns of the policy and of gaits in the same episodes."""
 
-SHOWN = {"policy": "shipped", "open-loop": "open-loop", "run": "run", "reference": "reference"}
-"""Policies whose returns are shown, with the names by which commands take them."""
+SHOWN = {
+    "policy": "shipped",
+    "blind": "best without feedback",
+    "constant": "constant",
+    "run": "run",
+    "zero": "zero",
+    "reference": "reference",
+}
+"""Policies whose returns are shown, with the names by which commands take them. "blind" is the best policy
+that sees nothing, a gait ("open-loop") or an agent."""
 
 
 def summaries() -> dict[str, str]:
@@ -39,6 +47,15 @@ def shipped_returns(name: str) -> dict[str, float]:
         return {policy: scores["mean"]["return"] for policy, scores in policies.items()}
     except (OSError, ValueError, KeyError, TypeError, AttributeError) as error:
         raise DataFileError(f"scores {path}: expected those that agents.ship writes: {error!r}") from None
+
+
+def is_one_episode(name: str) -> bool:
+    """True if all published episodes of an id are the same, so that a return is no mean."""
+    path = SHIPPED / name / "score.json"
+    try:
+        return len(set(parse_json(path.read_text(encoding="utf-8"))["returns"])) == 1
+    except (OSError, ValueError, KeyError, TypeError, AttributeError):
+        return False
 
 
 def good_returns(name: str) -> str:

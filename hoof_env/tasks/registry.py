@@ -170,6 +170,8 @@ RACING: Mapping[str, Any] = MappingProxyType(
 _SUSPENDED = (
     "The trunk moves along x and y. The leg must bear `trunk_share` of the weight of trunk and leg. A"
     " constant force carries the rest, and a vertical spring and damper stand for the animal's other legs."
+    " They push and pull by more than the weight within a stride: give [their figures](../task.md#the-trunk)"
+    " beside any force of the ground."
 )
 
 _FOUR_LEGS = (
@@ -207,7 +209,7 @@ TASKS: Mapping[str, Task] = MappingProxyType(
             {
                 "trunk": "rail",
                 **RACING,
-                # All five times as large: with a metre worth 1, stock PPO ended below the best open-loop gait
+                # All five times as large: with a metre worth 1, stock PPO ended below the best constant gait
                 # in a third of its trainings.
                 "reward_weights": {
                     **RACING["reward_weights"],
@@ -252,7 +254,9 @@ TASKS: Mapping[str, Task] = MappingProxyType(
             ' `solver="exact"` follows the closed form at 0.1 ms; `solver="paper"` integrates'
             " Eq. 8 (42 coordinates, 42 multipliers, Baumgarte) with explicit Euler at 1 ms and samples the"
             " approach speed at the first step inside the ground. Restitution 1 is the paper's elastic"
-            " condition, 0 its inelastic one.",
+            " condition, 0 its inelastic one.\n\nBy default nothing is drawn, so all episodes are the same."
+            " This is a reproduction and not a benchmark: a return is that of one deterministic episode, has"
+            " no interval, and says nothing about what feedback is worth.",
             {
                 "gait": "walk",
                 "trunk": "fixed",

@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import json
 import math
+from contextlib import suppress
 from typing import Any, NamedTuple
 
 import gymnasium as gym
 
+from hoof_env.envs.open_loop import gait_file
 from hoof_env.envs.policies import policy_names
-from hoof_env.errors import HoofEnvError
+from hoof_env.errors import DataFileError, HoofEnvError
 from hoof_env.gait import PARAMETERS
 from hoof_env.paper.rows import load_published
 from hoof_env.policies.find import shipped_ids
@@ -140,9 +142,11 @@ def known_ids() -> list[str]:
 
 
 def known_policies(simulation: Simulation) -> list[str]:
-    """Return the policies that the page offers: scripted ones, the open loop, and the one that ships."""
+    """Return the policies that the page offers: scripted ones, the best gait that sees nothing, and the one
+    that ships."""
     names = policy_names(simulation.env)
-    if simulation.is_driven:
+    with suppress(DataFileError):  # an id without a gait
+        gait_file(own_id(simulation.env_id))
         names = [*names, "open-loop"]
     return [*names, "shipped"] if own_id(simulation.env_id) in shipped_ids() else names
 

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from agents import carry_over
+from agents.cards import POLICIES
 from agents.runs import make_env
-from agents.ship import POLICIES
 from hoof_env.evaluation.episodes import score_vector
 
 LEG, FIXED = "hoof_env/HorseLeg-v0", "hoof_env/HorseLegFixed-v0"

@@ -28,8 +28,8 @@ from agents import (
     train,
     tune,
 )
+from agents.cards import POLICIES
 from agents.settings import ALGORITHMS, algorithm_class, load_settings, model_arguments
-from agents.ship import POLICIES
 from hoof_env.errors import DataFileError, HoofEnvError, MissingExtraError, OutputError, ParameterError
 from hoof_env.evaluation import scores
 from hoof_env.evaluation.episodes import score_vector

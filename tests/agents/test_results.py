@@ -119,7 +119,7 @@ def test_rows_have_their_policies(path):
         assert row.digest == results.digest_of(row.policy, row.env_id)
     assert row.kind in ("zero", "run") or row.digest
     if row.runs and row.kind != "stock":
-        assert max(row.runs.values()) >= row.mean["return"] - 1e-6
+        assert max(row.runs.values()) >= row.mean["return"] - 0.05  # a table has one decimal
 
 
 def test_a_row_of_the_repository_replays():

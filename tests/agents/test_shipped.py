@@ -15,7 +15,7 @@ import pytest
 if not os.environ.get("CI"):  # which installs it, so that nothing may be left out there
     pytest.importorskip("onnxruntime", reason='needs pip install "hoof-env[onnx]"')
 
-from agents import ship
+from agents import cards, ship
 from agents.runs import SavedModel, make_env
 from hoof_env.envs.shipped import SHIPPED as DATA
 from hoof_env.errors import DataFileError, ParameterError
@@ -59,6 +59,19 @@ def test_the_index_is_what_the_command_writes(tmp_path):
     assert (tmp_path / "README.md").read_text() == (ship.POLICIES / "README.md").read_text()
 
 
+def test_the_cards_are_what_the_command_writes(tmp_path):
+    cards.main(["--out", str(tmp_path)])
+    written = {path.parent.name: path.read_text() for path in tmp_path.glob("*/card.md")}
+    assert written == {path.name: (path / "card.md").read_text() for path in FOLDERS}
+
+
+def test_a_figure_that_is_infinite_or_without_interval_is_read_back():
+    policy = {"mean": {"a": None, "b": 1.0}, "interval95": {"a": [None, None], "b": [0.5, 2.0]}}
+    found = cards.estimates_of(policy)
+    assert found["a"].text() == "∞"
+    assert found["b"].text() == "1.0 [0.5, 2.0]"
+
+
 @SHIPPED
 def test_score(folder):
     score = read(data_of(folder) / "score.json")
@@ -98,7 +111,12 @@ def test_folder(folder):
     score, card = read(data_of(folder) / "score.json"), (folder / "card.md").read_text()
     assert score["env_id"].endswith(f"/{folder.name}")
     assert np.mean(score["returns"]) == pytest.approx(score["policies"]["policy"]["mean"]["return"], abs=1e-3)
-    assert f"value: {np.mean(score['returns']):.2f} +/-" in card
+    is_one = np.ptp(score["returns"]) == 0.0
+    spread = "" if is_one else f" +/- {np.std(score['returns']):.2f}"
+    assert f"value: {np.mean(score['returns']):.2f}{spread}, name" in card
+    assert ("one deterministic episode" in card) == (folder.name == "HorseLegFixed-v0") == is_one
+    assert ("There was one training" in card) == (score["runs"] == 1)
+    assert ("the best of" in card) == (score["runs"] > 1)
     film = "../HorseLeg-v0/film.gif" if folder.name == "HorseLegMO-v0" else "film.gif"
     assert f"![{folder.name}]({film})" in card
     assert (folder / film).is_file()

@@ -113,7 +113,7 @@ def test_an_interrupted_plan_goes_on_with_what_is_missing(tmp_path, monkeypatch)
     assert trained == [(LEG, "ppo", 2)]
     page = (args.out / "README.md").read_text(encoding="utf-8")
     assert "| HorseLeg | PPO | 3 |" in page
-    assert "2 of 3 |" in page  # above the best open loop
+    assert "2 of 3 |" in page  # above the best without feedback
     assert "`abc`" in page
     assert (args.out / "stock.png").stat().st_size > 1000
     trained.clear()

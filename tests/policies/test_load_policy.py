@@ -35,7 +35,7 @@ def test_a_policy_ships_for_every_id():
 @pytest.mark.parametrize("env_id", shipped_ids())
 def test_numpy_plays_what_ships_as_onnx_does(env_id):
     pytest.importorskip("onnxruntime")
-    from agents.ship import POLICIES
+    from agents.cards import POLICIES
 
     policy = hoof_env.load_policy(env_id)
     exported = hoof_env.load_policy(POLICIES / env_id.removeprefix("hoof_env/") / "policy.onnx")
@@ -102,7 +102,7 @@ def test_settings_that_differ_are_told_and_the_default_ones_are_not():
     ("policy", "words"),
     [
         ("hoof_env/HorseLegRail-v0", "HorseLegRail-v0, expected hoof_env/HorseLeg-v0"),
-        ("gallop", r"expected a name \(.*run.*open-loop, shipped\).*got 'gallop'"),
+        ("gallop", r"expected a name \(.*run.*open-loop, constant, shipped\).*got 'gallop'"),
         ((1.0, 2.0), r"expected four gait parameters, got \(1\.0, 2\.0\)"),
         ((1e3, 0.0, 0.0, 0.0), "crank_speed"),
         (["6.28", "0", "0", "x"], "crank_speed: expected a finite number .* got '6.28'"),
