@@ -189,7 +189,7 @@ def reproduced(solver: str, count: str) -> float:
     }[count]
 
 
-def row(name: str, solver: str, figure: str) -> float:
+def printed_row(name: str, solver: str, figure: str) -> float:
     """A figure of a row of the committed reproduction: "simulated", "published", the size of its "error", or
     another reading by its name."""
     names = {"exact": EXACT, "printed": PRINTED, "probable": PROBABLE}
@@ -244,7 +244,7 @@ SOURCES: dict[str, Callable[..., float]] = {
     "gain": gain,
     "evidence": evidence,
     "reproduced": reproduced,
-    "row": row,
+    "printed_row": printed_row,
     "level": level,
     "detail": detail,
     "returned": returned,
