@@ -63,6 +63,10 @@ class Args:
     """of each; otherwise those of the shipped agent"""
     episodes: int | None = None
     """least of each search for a gait"""
+    most: int | None = None
+    """most of each search for a gait"""
+    restarts: int = 3
+    """searches for a gait"""
     observation: tuple[str, ...] = ()
     """groups that the agents observe; otherwise all of the id that depend on no force"""
     runs: Path = Path("runs/bar")
@@ -100,6 +104,8 @@ def gait(name: str, args: Args) -> Path:
         open_loop.Args(
             f"hoof_env/{name}",
             episodes=args.episodes,
+            most=args.most,
+            restarts=args.restarts,
             start=start if start and start.is_file() else None,
             out=path,
         )

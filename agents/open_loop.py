@@ -72,7 +72,7 @@ TOLERANCES = {"tolx": 1e-4, "tolfun": 0, "tolfunhist": 0, "tolstagnation": 10**9
 
 EPISODES = {"constant": 10_240, "phase": 20_480}
 MOST = 10
-"""Least episodes of a search, by family, and most of them in that unit."""
+"""Least episodes of a search, by family, and the most of them in that unit by default."""
 
 KEPT = (
     "return",
@@ -103,7 +103,9 @@ class Args:
     restarts: int = 3
     """searches, of seeds 0, 1, ..."""
     episodes: int | None = None
-    """least of each search; otherwise 10240, or 20480 for "phase"; ten times as many are the most"""
+    """least of each search; otherwise 10240, or 20480 for "phase\""""
+    most: int | None = None
+    """most of each search; otherwise ten times the least"""
     easier: tuple[str, ...] = ("drive=motor",)
     """arguments of the environment in which every third search begins"""
     test_episodes: int = 512
@@ -254,7 +256,8 @@ class Search:
     Attributes:
         objective: costs of candidates.
         seed: seed of the search and of its starts.
-        least: episodes before it may end; ten times as many end it.
+        least: episodes before it may end.
+        most: episodes that end it.
         tick: called with a number of episodes and the lowest cost in them.
         looks: episodes spent and mean return of the distribution's mean, over the same starts at each look.
         interrupted: True once Ctrl-C has ended it.
@@ -264,6 +267,7 @@ class Search:
     objective: Objective
     seed: int
     least: int
+    most: int
     tick: Callable[[int, float], Any]
 
     def __post_init__(self) -> None:
@@ -294,7 +298,7 @@ class Search:
         best = [start]
         first = self.objective.spent
         try:
-            count = MOST * self.least // ROWS
+            count = self.most // ROWS
             costs = lambda points: self._costs(points, STARTS)  # noqa: E731
             for k, (candidates, values) in enumerate(generations(strategy, costs, count)):
                 lowest = [candidates[i] for i in np.argsort(values)[: FINALISTS - 2]]
@@ -366,6 +370,7 @@ def optimise(args: Args) -> dict[str, Any]:
         "harmonics": objective.family.harmonics,
         "objective": "return",
         "least_episodes_of_a_search": episodes,
+        "most_episodes_of_a_search": args.most or MOST * episodes,
         "test_episodes": args.test_episodes,
         "easier": parse_pairs("--easier", args.easier),
         "start": known_gait(args),
@@ -394,6 +399,8 @@ def check(args: Args) -> int:
         check_number("harmonics", args.harmonics, low=1, high=8)
     episodes = args.episodes or EPISODES[args.family]
     check_number("episodes", episodes, low=3 * ROWS, high=1e7)
+    if args.most is not None:
+        check_number("most", args.most, low=episodes, high=1e8)
     return episodes
 
 
@@ -434,11 +441,13 @@ def search_once(objective: Objective, seed: int, about: dict[str, Any], bar: Any
             easier = Objective(about["env_id"], kwargs, about["family"], about["harmonics"] or None)
             easier.family = family
             easier.blind = family.clock  # a gait locked to the crank stays so: it is only a start
-            way = Search(easier, seed + 1000, about["least_episodes_of_a_search"] // MOST, tick)
+            least = about["least_episodes_of_a_search"]
+            way = Search(easier, seed + 1000, least // MOST, least, tick)
             start, _ = way.run(start)
             origin += ", through easier settings"
             spent_before = easier.spent
-    search = Search(objective, seed, about["least_episodes_of_a_search"], tick)
+    bounds = about["least_episodes_of_a_search"], about["most_episodes_of_a_search"]
+    search = Search(objective, seed, *bounds, tick)
     x, cost = search.run(start)
     parameters = {key: value.tolist() for key, value in family.decode(x).items()}
     return {

@@ -61,7 +61,7 @@ class Bowl:
 
 
 def searched(objective, seed, least, start=None, tick=lambda *_: None):
-    search = Search(objective, seed, least, tick)
+    search = Search(objective, seed, least, open_loop.MOST * least, tick)
     return search, search.run(start)[0]
 
 
