@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from hoof_env.envs.shipped import shipped_returns
 from hoof_env.errors import MissingExtraError
 from hoof_env.evaluation.scores import METRICS, Score, cell
 from hoof_env.paper.report import format_error, format_number
@@ -102,6 +103,7 @@ class Report:
             worse=worse(agent, next(score for score in gaits if score.policy == "run")),
             agent=agent.policy,
             open_loop=OPEN_LOOP,
+            published=shipped_returns("HorseLeg-v0"),
             gaits=[score.policy for score in gaits],
             learning=self.learning,
             curve=data_uri(self.learning.curve) if self.learning else "",
