@@ -119,7 +119,6 @@ def answers() -> list[Data]:
         for name in ("stiffness", "approach_floor"):
             value = float(getattr(base, name))
             ends[name] = [rows_of(gait, {name: value * (1 + sign * PART)}) for sign in (-1, 1)]
-        # The exponent of a `Ground` is a multiple of 1/8: a slope across two of these
         ends["crank speed"] = [rows_of(gait, {}, 0.0, 1 + sign * PART) for sign in (-1, 1)]
         ends["level"] = [rows_of(gait, {}, sign * RISE) for sign in (-1, 1)]
         for row, value in middle.items():
@@ -128,13 +127,13 @@ def answers() -> list[Data]:
                 steps = 2 * RISE / 1e-3 if name == "level" else 2 * PART / 0.01
                 slope = (high[row] - low[row]) / steps
                 entry[name] = slope if row == "change" else 100.0 * slope / value
-            entry["exponent"] = _answer_to_exponent(gait, row)
+            entry["exponent"] = _answer_to_exponent(gait, row, value)
             found.append(entry)
     return found
 
 
-def _answer_to_exponent(gait: str, row: str) -> float:
-    """Return the change of a row for 1 % of the exponent, along the force itself: K d^n is replaced."""
+def _answer_to_exponent(gait: str, row: str, middle: float) -> float:
+    """Return by how much a row of this value grows as the exponent grows by 1 %."""
     n = ground_of().exponent
     values = []
     for sign in (-1, 1):
@@ -150,7 +149,7 @@ def _answer_to_exponent(gait: str, row: str) -> float:
             }[row]
         )
     slope = (values[1] - values[0]) / 2
-    return slope if row == "change" else 100.0 * slope / (0.5 * (values[0] + values[1]))
+    return slope if row == "change" else 100.0 * slope / middle
 
 
 def _with_exponent(gait: str, restitution: float, exponent: float) -> tuple[float, float]:
@@ -230,12 +229,12 @@ def suspended() -> list[Data]:
         for factor in STIFFNESSES:
             for restitution in DAMPED:
                 stiffness = factor * ground_of().stiffness
-                found = _turn(gait, ground_of(PAPER_LAW, restitution, stiffness=stiffness))
+                found = turn(gait, ground_of(PAPER_LAW, restitution, stiffness=stiffness))
                 rows.append({"gait": gait, "factor": factor, "restitution": restitution, **found})
     return rows
 
 
-def _turn(gait: str, ground: Ground) -> Data:
+def turn(gait: str, ground: Ground) -> Data:
     """Return forces and energy of one turn of the crank, when the gait has settled."""
     engine = TrunkEngine(Limb(LEG, drive=Prescribed()), SUSPENDED, ground, sim_dt=DT, strides=True)
     parameters = load_gait(gait, DEFAULT_PRESET)
