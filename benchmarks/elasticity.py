@@ -188,6 +188,7 @@ def measure_episodes() -> list[Data]:
         print(f"episodes: {name}, {policy}", flush=True)
         env_id = f"hoof_env/{name}"
         peaks: dict[str, float] = {}
+        highest: dict[str, float] = {}
         failed: dict[str, float] = {}
         for restitution in RESTITUTIONS:
             with runs.make_env(env_id, restitution=restitution, **settings) as env:
@@ -198,8 +199,16 @@ def measure_episodes() -> list[Data]:
                     found = find_policy(chosen, env, env_id)
                 episodes = play(env, found, SEEDS)
             peaks[f"{restitution:g}"] = float(np.mean([one["stance_peak_n"] for one in episodes]))
+            highest[f"{restitution:g}"] = float(np.mean([one["highest_grf_n"] for one in episodes]))
             failed[f"{restitution:g}"] = float(np.mean([one["failed"] for one in episodes]))
-        row = {"id": name, "policy": policy, "settings": settings, "peaks": peaks, "failed": failed}
+        row = {
+            "id": name,
+            "policy": policy,
+            "settings": settings,
+            "peaks": peaks,
+            "highest": highest,
+            "failed": failed,
+        }
         rows.append(row | {"change": change(peaks["1"], peaks["0"])})
     return rows
 
@@ -271,14 +280,14 @@ def tables(data: Data) -> dict[str, str]:
 def _setups(data: Data) -> str:
     head = ["set-up"]
     for gait in GAITS:
-        head += [f"{gait}: elastic [N]", "inelastic [N]", f"{gait}: change", "median over 1 mm", "range"]
+        head += [f"{gait}: elastic [N]", "inelastic [N]", f"{gait}: change", "median over 1 mm"]
     rows = []
     for name in SETUPS:
         cells = [name]
         for gait in GAITS:
             row = find(data["landings"], gait=gait, setup=name, law=PAPER_LAW, restitution=0.0)
             cells += [f"{row['elastic']:.0f}", f"{row['peak']:.0f}", percent(row["change"])]
-            cells += [percent(row["median"]), f"{row['lowest']:+.1f} to {row['highest']:+.1f}"]
+            cells.append(percent(row["median"]))
         rows.append(cells)
     return markdown_table(head, rows)
 
@@ -369,7 +378,7 @@ def _own(data: Data) -> str:
 
 
 def _episodes(data: Data) -> str:
-    head = ["id", "gait", *(f"{cr:g} [N]" for cr in RESTITUTIONS), "1 against 0"]
+    head = ["id", "gait", *(f"{cr:g} [N]" for cr in RESTITUTIONS), "1 against 0", "highest force"]
     rows = []
     for row in data["episodes"]:
         name = "shipped agent" if row["policy"] == "policy" else row["policy"]
@@ -380,6 +389,7 @@ def _episodes(data: Data) -> str:
                 name if speed is None else f"{name}, {speed:g} m/s",
                 *(f"{row['peaks'][f'{cr:g}']:.0f}" for cr in RESTITUTIONS),
                 percent(row["change"]),
+                percent(change(row["highest"]["1"], row["highest"]["0"])),
             ]
         )
     return markdown_table(head, rows)

@@ -76,7 +76,7 @@ def _over_setups(axis: Any, data: dict[str, Any], gait: str) -> None:
         )
         axis.plot([0, 1], [exact, exact], "k*", ms=10, label="the same, at the paper's level alone")
     axis.set_xticks(places, [name.replace(", ", "\n") for name in SETUPS])
-    axis.set_ylim(-85, 45)
+    axis.set_ylim(-85, 100)
     axis.set_title(f"{gait}, one landing, by set-up of the trunk")
 
 
