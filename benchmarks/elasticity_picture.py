@@ -37,7 +37,7 @@ def draw(data: dict[str, Any], path: Path) -> None:
         figure, axes = plt.subplots(2, 2, figsize=(10, 7.6), layout="constrained")
         for gait, axis in zip(GAITS, axes[0], strict=True):
             _over_setups(axis, data, gait)
-        axes[0, 0].legend(loc="lower right", fontsize=7.5)
+        axes[0, 0].legend(loc="upper left", fontsize=7.5)
         _over_mass(axes[1, 0], data)
         _over_restitution(axes[1, 1], data)
         for axis in axes.flat:
@@ -118,9 +118,9 @@ def _over_restitution(axis: Any, data: dict[str, Any]) -> None:
     curve = np.array(sorted(returned.values()))
     axis.plot(*curve.T, "--", color=GREY, lw=1, label="a free mass without a leg")
     axis.axvline(returned[PAPER_LAW, 0.0][0], color="black", lw=0.8, ls=":")
-    axis.text(
-        returned[PAPER_LAW, 0.0][0] - 0.01, -75, "the paper's\ninelastic ground", fontsize=8, ha="right"
-    )
+    paper = returned[PAPER_LAW, 0.0][0]
+    axis.text(paper - 0.01, 30, "the paper's inelastic ground", fontsize=8, ha="right")
+    axis.set_ylim(-105, 42)
     axis.set_xlim(1.02, -0.02)
     axis.invert_xaxis()
     axis.set_xlabel("restitution that the law returns in a free impact [-]")
