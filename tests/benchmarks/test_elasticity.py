@@ -20,6 +20,7 @@ from benchmarks.elasticity_runs import (
     landing,
     steady,
 )
+from benchmarks.pages import filled
 from benchmarks.prescribed import contact_on
 from hoof_env.ground.laws import FACTORS, NORMAL_LAWS
 
@@ -118,7 +119,7 @@ def test_the_paper_calls_ground_inelastic_that_returns_two_thirds():
 
 def test_the_page_has_the_tables_of_its_data(data):
     page = elasticity.PAGE.read_text(encoding="utf-8")
-    assert elasticity.filled(page, elasticity.tables(data)) == page
+    assert filled(page, elasticity.tables(data)) == page
 
 
 @pytest.mark.parametrize("gait", GAITS)
