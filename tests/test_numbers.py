@@ -30,7 +30,7 @@ ROOT = Path(__file__).parents[1]
 PAGES = (
     "README.md",
     *(f"docs/{name}.md" for name in ("index", "agents", "engine", "help", "horse", "own_task", "paper")),
-    *(f"docs/{name}.md" for name in ("project", "start", "task", "view")),
+    *(f"docs/{name}.md" for name in ("project", "start", "task", "view", "elasticity", "parameters")),
 )
 """Pages whose results are marked."""
 
@@ -230,6 +230,40 @@ def claims(count: str) -> float:
     return {"all": len(of_paper), "printed": held - turned, "turned": turned}[count]
 
 
+def elasticity(*words: str) -> float:
+    """A figure of elastic against inelastic ground, "GAIT; SET-UP; FIGURE" of landings under the paper's law,
+    "...; size" without its sign, "steady; GAIT; SET-UP", or "free mass; FIGURE"."""
+    keys = " ".join(words).split("; ")
+    data = json.loads((ROOT / "docs/evidence/elasticity.json").read_text(encoding="utf-8"))
+    if keys[0] == "free mass":
+        rows = (row for row in data["free_mass"] if row["law"] == "lankarani-nikravesh")
+        return next(row[keys[1]] for row in rows if row["restitution"] == 0.0)
+    part = "landings"
+    if keys[0] == "steady":
+        part = "steady"
+        keys = [*keys[1:], "change"]
+    gait, setup, figure, *size = keys
+    rows = (row for row in data[part] if (row["law"], row["restitution"]) == ("lankarani-nikravesh", 0.0))
+    found = next(row[figure] for row in rows if (row["gait"], row["setup"]) == (gait, setup))
+    return abs(found) if size else found
+
+
+def parameters(*words: str) -> float:
+    """A figure of the ground's parameters: "GAIT; STIFFNESS; RESTITUTION; FIGURE" under the suspended trunk,
+    or "fixed; GAIT; RESTITUTION; FIGURE" of the energy under the fixed one."""
+    keys = " ".join(words).split("; ")
+    data = json.loads((ROOT / "docs/evidence/parameters.json").read_text(encoding="utf-8"))
+    if keys[0] == "fixed":
+        rows = (row for row in data["energy"] if [row["gait"], f"{row['restitution']:g}"] == keys[1:3])
+    else:
+        rows = (
+            row
+            for row in data["suspended"]
+            if [row["gait"], f"{row['factor']:g}", f"{row['restitution']:g}"] == keys[:3]
+        )
+    return next(rows)[keys[3]]
+
+
 SOURCES: dict[str, Callable[..., float]] = {
     "score": score,
     "row": row,
@@ -249,6 +283,8 @@ SOURCES: dict[str, Callable[..., float]] = {
     "detail": detail,
     "returned": returned,
     "claims": claims,
+    "elasticity": elasticity,
+    "parameters": parameters,
 }
 
 
