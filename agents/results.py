@@ -21,8 +21,10 @@ import hashlib
 import json
 import math
 import re
+import subprocess
 import sys
 from collections.abc import Iterable, Sequence
+from contextlib import suppress
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Annotated, Any
@@ -265,12 +267,26 @@ def make_row(
     episodes = played(policy, env_id, FINAL_SEEDS)
     mean, interval = figures(episodes)
     versions = runs.versions()
+    versions.pop("commit", None)
     row = Row(
         env_id, kind, policy, digest_of(policy, env_id), _FINAL, mean, interval,
-        training or {}, effort or {}, command, versions.pop("commit", ""), versions, note,
+        training or {}, effort or {}, command, commit_of_code(), versions, note,
     )  # fmt: skip
     check_blindness(row)
     return row
+
+
+def commit_of_code() -> str:
+    """Return the commit whose code runs, with "-dirty" where a Python file differs from it; "" without git.
+    Rows and pages that were written a moment ago do not count."""
+    git = ["git", "-C", str(ROOT)]
+    with suppress(OSError, subprocess.SubprocessError):
+        head = subprocess.run(
+            [*git, "rev-parse", "--short=12", "HEAD"], capture_output=True, text=True, check=True, timeout=10
+        )
+        same = subprocess.run([*git, "diff", "--quiet", "HEAD", "--", "*.py"], timeout=10).returncode == 0
+        return head.stdout.strip() + ("" if same else "-dirty")
+    return ""
 
 
 def returns_of_runs(place: Path, env_id: str) -> dict[str, float]:
