@@ -29,6 +29,7 @@ from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Annotated, Any
 
+import gymnasium as gym
 import numpy as np
 from tyro.conf import Positional, subcommand
 
@@ -156,6 +157,11 @@ def read_row(path: Path) -> Row:
             raise ValueError(f"returns {row.mean['return']}, {row.runs}")
         if not all(isinstance(text, str) for text in (row.env_id, row.policy, row.digest, row.command)):
             raise TypeError("env_id, policy, digest and command must be texts")
+        # A file must not cause an import
+        if row.env_id not in gym.registry or ":" in row.policy:
+            raise ValueError(f"no registered id {row.env_id!r}, or a function as policy {row.policy!r}")
+        if ".." in Path(row.policy).parts:
+            raise ValueError(f"a policy outside the repository, {row.policy!r}")
     except (OSError, ValueError, TypeError, KeyError, AttributeError, HoofEnvError) as error:
         raise DataFileError(f"row {path}: expected one as agents.results writes it: {error!r}") from None
     return row
@@ -170,7 +176,7 @@ def rows_of(env_id: str, folder: Path = RESULTS) -> dict[str, Row]:
 
 def best_blind(rows: dict[str, Row]) -> Row | None:
     """Return the row of the best policy that sees nothing; None without one."""
-    blind = [rows[kind] for kind in ("constant", "open-loop", "blind") if kind in rows]
+    blind = [rows[kind] for kind in WITHOUT_FEEDBACK if kind in rows]
     return max(blind, key=lambda row: row.mean["return"], default=None)
 
 

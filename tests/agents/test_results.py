@@ -40,6 +40,10 @@ DAMAGES = [
     ("seeds backwards", lambda data: data | {"seeds": [5, 3]}, r"seeds \(5, 3\)"),
     ("a return that is none", lambda data: data | {"mean": {"return": math.nan}}, "returns nan|NaN"),
     ("an unknown entry", lambda data: data | {"secret": 1}, "secret"),
+    ("a module as id", lambda data: data | {"env_id": "payload:hoof_env/HorseLeg-v0"}, "no registered id"),
+    ("an unknown id", lambda data: data | {"env_id": "hoof_env/Cow-v0"}, "no registered id"),
+    ("a function", lambda data: data | {"policy": "payload:act"}, "a function as policy"),
+    ("a way out", lambda data: data | {"policy": "../payload/run"}, "outside the repository"),
     ("a policy that is no text", lambda data: data | {"policy": 3}, "must be texts"),
 ]
 
