@@ -36,7 +36,7 @@ from agents.cards import POLICIES
 from agents.command import run
 from agents.ship import shown_command, write_index
 from hoof_env._output import markdown_table
-from hoof_env.envs.open_loop import gait_file, open_loop_record
+from hoof_env.envs.open_loop import check_blind, gait_file, open_loop_record
 from hoof_env.envs.policies import STANDS_FOR
 from hoof_env.envs.shipped import SHIPPED
 from hoof_env.errors import DataFileError, HoofEnvError, ParameterError, check_choice, parse_json
@@ -213,7 +213,7 @@ def check_policy(kind: str, policy: str, env_id: str) -> None:
     is_file = kind not in ("zero", "run", "shipped") and ".." not in Path(policy).parts
     if policy not in names and not (is_file and (is_plain or (policy.endswith(".json") and place.is_file()))):
         raise DataFileError(
-            f"policy {policy!r} of a row {kind!r}: expected a name ({', '.join(names)}), for a policy that was"
+            f"policy {policy!r} of a row {kind!r}: expected a name ({', '.join(names)}), for one that was"
             f" found or trained also a gait's .json or a folder with {ABOUT} and {WEIGHTS} and no {FILE}"
         )
 
@@ -335,16 +335,24 @@ def returns_of_runs(place: Path, env_id: str) -> dict[str, float]:
     Args:
         place: folder of run folders, which play them, or table in which they are.
         env_id: id of the environment.
+
+    Raises:
+        DataFileError: there is none.
     """
     if place.is_file():
         with place.open(newline="", encoding="utf-8") as file:
-            rows = [row for row in csv.DictReader(file) if ", seed " in row["policy"]]
-        return {row["policy"].rpartition(" ")[2]: float(row["return"]) for row in rows}
-    found = {}
+            rows = [row for row in csv.DictReader(file) if ", seed " in (row.get("policy") or "")]
+        found = {row["policy"].rpartition(" ")[2]: float(row["return"]) for row in rows}
+    else:
+        found = {}
     for folder in sorted(record.parent for record in place.rglob(runs.RECORD)):
         record = runs.read_record(folder)
         episodes = score_vector(str(folder), env_id, FINAL_SEEDS, **record.get("env_kwargs", {}))
         found[str(record["seed"])] = float(np.mean([episode["return"] for episode in episodes]))
+    if not found:
+        raise DataFileError(
+            f"runs {place}: expected folders of training runs, or a table of them, found none"
+        )
     return found
 
 
@@ -377,6 +385,9 @@ def check_blindness(row: Row) -> None:
         return
     arguments = arguments_of(row.policy, row.env_id)
     with runs.make_env(row.env_id, **arguments) as env:
+        if is_model(row.policy) and row.policy != "shipped":
+            # What it observes, for a replay may miss what is seen seldom
+            check_blind(env.unwrapped.settings)  # type: ignore[attr-defined]
         policy = find_policy(place_of(row.policy), env, row.env_id)
     prove(policy, row.env_id, range(FINAL_SEEDS.start, FINAL_SEEDS.start + 20), arguments)
 
