@@ -415,9 +415,9 @@ def check_replay(row: Row) -> str:
         # The last bits of an action differ between processors, and chaos makes more of them; the interval is
         # that of the replay, for a row must not choose how well it has to agree
         room = (bounds[1] - bounds[0]) / 2 if bounds else 0.005 * abs(value) + 1e-9
-        recorded = [value, *(row.interval95.get(key) or [value] * 2)]
-        again = [mean[key], *(bounds or [mean[key]] * 2)] if key in mean else [math.nan] * 3
-        if not max(abs(one - other) for one, other in zip(recorded, again, strict=True)) <= room:
+        recorded: list[float] = [value, *(row.interval95.get(key) or [value] * 2)]
+        replayed: list[float] = [mean[key], *(bounds or [mean[key]] * 2)] if key in mean else [math.nan] * 3
+        if not max(abs(one - other) for one, other in zip(recorded, replayed, strict=True)) <= room:
             raise DataFileError(
                 f"row {row.name}: expected {key} {value:.6g} within {room:.2g}, replayed {mean.get(key)};"
                 f" interval {row.interval95.get(key)}, replayed {bounds}"
