@@ -24,7 +24,7 @@ from agents import open_loop, results, runs, train
 from agents.command import run
 from agents.ship import CHOOSING_SEEDS, shown_command
 from hoof_env.envs.open_loop import BLIND, GAITS, check_blind
-from hoof_env.errors import OutputError, ParameterError, check_choice
+from hoof_env.errors import OutputError, ParameterError, check_choice, check_number
 from hoof_env.evaluation.episodes import FINAL_SEEDS, score_vector
 from hoof_env.policies.saved import ABOUT, WEIGHTS
 
@@ -199,6 +199,8 @@ def main(argv: list[str] | None = None) -> None:
     import tyro
 
     args = tyro.cli(Args, args=argv, prog="python -m agents.bar", description=__doc__)
+    if args.seeds is not None:
+        check_number("seeds", args.seeds, low=1, high=1000)
     for name in args.ids:
         check_choice("ids", name, IDS)
         blind_groups(f"hoof_env/{name}", args.observation)

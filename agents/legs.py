@@ -86,6 +86,7 @@ def search(restarts: int) -> dict[str, dict[str, Any]]:
             args = open_loop.Args(
                 env_id=env_id,
                 env_kwargs=(json.dumps(env_kwargs),),
+                family="constant",
                 restarts=restarts,
                 out=Path("runs/legs", f"{preset}-{name}.json"),
             )

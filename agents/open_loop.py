@@ -156,9 +156,14 @@ class Family(NamedTuple):
         return {"coefficients": coefficients, "frequency_hz": frequency}
 
     def encode(self, parameters: dict[str, Any]) -> Floats:
-        """Convert parameters of this family, or of a smaller one, to a point within the box."""
+        """Convert parameters of this family, or of a smaller one, to a point within the box; `ParameterError`
+        for those of another body."""
         given = np.asarray(parameters.get("coefficients", parameters.get("constant")), float)
         given = given.reshape(1, 1, -1) if given.ndim == 1 else given
+        if given.shape[-1] != len(self.half):
+            raise ParameterError(
+                f"start: expected a gait of {len(self.half)} numbers, got {given.shape[-1]}, another body"
+            )
         coefficients = np.zeros(self.shape)
         powers, rows, _ = np.minimum(self.shape, given.shape)
         coefficients[:powers, :rows] = given[:powers, :rows]

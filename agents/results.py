@@ -29,7 +29,6 @@ from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Annotated, Any
 
-import gymnasium as gym
 import numpy as np
 from tyro.conf import Positional, subcommand
 
@@ -39,15 +38,17 @@ from agents.cards import POLICIES
 from agents.command import run
 from agents.ship import shown_command, write_index
 from hoof_env._output import markdown_table
-from hoof_env.envs.open_loop import gait_file, open_loop_record
+from hoof_env.envs.open_loop import check_blind, gait_file, open_loop_record
 from hoof_env.envs.policies import STANDS_FOR
 from hoof_env.envs.shipped import SHIPPED
 from hoof_env.errors import DataFileError, HoofEnvError, ParameterError, check_choice, parse_json
 from hoof_env.evaluation.episodes import FINAL_SEEDS, score_vector
 from hoof_env.evaluation.scores import METRICS
 from hoof_env.evaluation.statistics import estimate, iqm
-from hoof_env.policies.find import find_policy, is_model
+from hoof_env.policies.find import find_policy, is_model, names_of, read_policy_record
 from hoof_env.policies.record import environment_of
+from hoof_env.policies.saved import ABOUT, FILE, WEIGHTS
+from hoof_env.tasks.registry import TASKS
 
 ROOT = Path(__file__).parents[1]
 RESULTS = ROOT / "results"
@@ -149,29 +150,50 @@ def read_row(path: Path) -> Row:
         if not isinstance(data, dict):
             raise TypeError("not an object")
         row = Row(**data | {"seeds": tuple(data["seeds"])})
-        check_choice("kind", row.kind, KINDS)
-        first, stop = row.seeds
-        if not (isinstance(first, int) and isinstance(stop, int) and 0 <= first < stop):
-            raise ValueError(f"seeds {row.seeds}")
-        if not math.isfinite(row.mean["return"]) or not all(math.isfinite(x) for x in row.runs.values()):
-            raise ValueError(f"returns {row.mean['return']}, {row.runs}")
-        if not all(isinstance(text, str) for text in (row.env_id, row.policy, row.digest, row.command)):
-            raise TypeError("env_id, policy, digest and command must be texts")
-        # A file must not cause an import
-        if row.env_id not in gym.registry or ":" in row.policy:
-            raise ValueError(f"no registered id {row.env_id!r}, or a function as policy {row.policy!r}")
-        if ".." in Path(row.policy).parts:
-            raise ValueError(f"a policy outside the repository, {row.policy!r}")
-    except (OSError, ValueError, TypeError, KeyError, AttributeError, HoofEnvError) as error:
+        _check_entries(row)
+    except (OSError, ValueError, TypeError, KeyError, AttributeError, OverflowError, HoofEnvError) as error:
         raise DataFileError(f"row {path}: expected one as agents.results writes it: {error!r}") from None
     return row
+
+
+def _check_entries(row: Row) -> None:
+    """Raise an error that names the entry of a row which is not as `Row` says. A row causes no import: its id
+    is one of this package."""
+    texts = (row.env_id, row.policy, row.digest, row.command, row.commit, row.note)
+    if not all(isinstance(text, str) for text in texts):
+        raise TypeError("env_id, policy, digest, command, commit and note must be texts")
+    check_choice("env_id", row.env_id, [task.id for task in TASKS.values()])
+    check_choice("kind", row.kind, KINDS)
+    first, stop = row.seeds
+    if not (type(first) is type(stop) is int and 0 <= first < stop):
+        raise ValueError(f"seeds {row.seeds}")
+    if not _are_numbers([row.mean["return"], *row.mean.values(), *row.runs.values()]):
+        raise ValueError(f"returns {row.mean['return']}, mean {row.mean}, runs {row.runs}")
+    if not all(bounds is None or _are_numbers(bounds, 2) for bounds in row.interval95.values()):
+        raise ValueError(f"interval95 {row.interval95}")
+    if not (row.effort.keys() <= {"steps", "episodes", "runs"} and _are_numbers(row.effort.values())):
+        raise ValueError(f"effort {row.effort}")
+    if not all(isinstance(version, str) for version in row.versions.values()):
+        raise TypeError(f"versions {row.versions}")
+
+
+def _are_numbers(values: Iterable[Any], count: int | None = None) -> bool:
+    """True if values are finite numbers, and so many."""
+    found = list(values)
+    return count in (None, len(found)) and all(
+        type(value) in (int, float) and math.isfinite(value) for value in found
+    )
 
 
 def rows_of(env_id: str, folder: Path = RESULTS) -> dict[str, Row]:
     """Return the rows of an id by kind, in the order of `KINDS`."""
     name = env_id.rpartition("/")[2]
     files = {kind: folder / f"{name}-{kind}.json" for kind in KINDS}
-    return {kind: read_row(file) for kind, file in files.items() if file.is_file()}
+    rows = {kind: read_row(file) for kind, file in files.items() if file.is_file()}
+    for kind, row in rows.items():
+        if (row.env_id, row.kind) != (env_id, kind):
+            raise DataFileError(f"row {files[kind]}: expected {env_id}, {kind}; got {row.env_id}, {row.kind}")
+    return rows
 
 
 def best_blind(rows: dict[str, Row]) -> Row | None:
@@ -181,6 +203,29 @@ def best_blind(rows: dict[str, Row]) -> Row | None:
 
 
 # -- policies and their digests ----------------------------------------------------------------
+
+
+def check_policy(kind: str, policy: str, env_id: str) -> None:
+    """Raise `DataFileError` unless a row may have a policy, which runs no code of a file and imports nothing:
+    a name of the id's, a gait, or a folder with plain data alone."""
+    with runs.make_env(env_id) as env:
+        names = [kind] if kind in ("zero", "shipped") else names_of(env)
+    place = ROOT / policy
+    is_plain = (place / ABOUT).is_file() and (place / WEIGHTS).is_file() and not (place / FILE).exists()
+    is_file = kind not in ("zero", "run", "shipped") and ".." not in Path(policy).parts
+    if policy not in names and not (is_file and (is_plain or (policy.endswith(".json") and place.is_file()))):
+        raise DataFileError(
+            f"policy {policy!r} of a row {kind!r}: expected a name ({', '.join(names)}), for one that was"
+            f" found or trained also a gait's .json or a folder with {ABOUT} and {WEIGHTS} and no {FILE}"
+        )
+
+
+def check_published(row: Row) -> None:
+    """Raise `DataFileError` unless a row has the episodes of the tables and a policy of this repository."""
+    if row.kind != "stock" and row.seeds != _FINAL:
+        raise DataFileError(f"row {row.name}: expected the episodes of the tables, {_FINAL}, got {row.seeds}")
+    if Path(row.policy).is_absolute():
+        raise DataFileError(f"row {row.name}: expected a policy within the repository, got {row.policy}")
 
 
 def digest_of(policy: str, env_id: str) -> str:
@@ -219,9 +264,13 @@ def arguments_of(policy: str, env_id: str) -> dict[str, Any]:
     """Return the arguments of the environment in which a policy of a folder plays: what it observes."""
     if policy == "shipped" or not is_model(policy):
         return {}
-    from hoof_env.policies.find import read_policy_record
-
-    return environment_of(policy, read_policy_record(place_of(policy)), env_id)[1]
+    _, arguments = environment_of(policy, read_policy_record(place_of(policy)), env_id)
+    if others := arguments.keys() - {"observation"}:
+        raise DataFileError(
+            f"policy {policy}: expected the environment of {env_id}, of which a row's policy may choose its"
+            f" observation alone; its record has {', '.join(sorted(others))}"
+        )
+    return arguments
 
 
 def played(policy: str, env_id: str, seeds: range) -> list[dict[str, float]]:
@@ -270,6 +319,7 @@ def make_row(
     if kind == "stock":
         return stock_row(env_id)
     policy = policy or kind
+    check_policy(kind, policy, env_id)
     episodes = played(policy, env_id, FINAL_SEEDS)
     mean, interval = figures(episodes)
     versions = runs.versions()
@@ -301,16 +351,24 @@ def returns_of_runs(place: Path, env_id: str) -> dict[str, float]:
     Args:
         place: folder of run folders, which play them, or table in which they are.
         env_id: id of the environment.
+
+    Raises:
+        DataFileError: there is none.
     """
     if place.is_file():
         with place.open(newline="", encoding="utf-8") as file:
-            rows = [row for row in csv.DictReader(file) if ", seed " in row["policy"]]
-        return {row["policy"].rpartition(" ")[2]: float(row["return"]) for row in rows}
-    found = {}
+            rows = [row for row in csv.DictReader(file) if ", seed " in (row.get("policy") or "")]
+        found = {row["policy"].rpartition(" ")[2]: float(row["return"]) for row in rows}
+    else:
+        found = {}
     for folder in sorted(record.parent for record in place.rglob(runs.RECORD)):
         record = runs.read_record(folder)
         episodes = score_vector(str(folder), env_id, FINAL_SEEDS, **record.get("env_kwargs", {}))
         found[str(record["seed"])] = float(np.mean([episode["return"] for episode in episodes]))
+    if not found:
+        raise DataFileError(
+            f"runs {place}: expected folders of training runs, or a table of them, found none"
+        )
     return found
 
 
@@ -343,6 +401,9 @@ def check_blindness(row: Row) -> None:
         return
     arguments = arguments_of(row.policy, row.env_id)
     with runs.make_env(row.env_id, **arguments) as env:
+        if is_model(row.policy) and row.policy != "shipped":
+            # What it observes, for a replay may miss what is seen seldom
+            check_blind(env.unwrapped.settings)  # type: ignore[attr-defined]
         policy = find_policy(place_of(row.policy), env, row.env_id)
     prove(policy, row.env_id, range(FINAL_SEEDS.start, FINAL_SEEDS.start + 20), arguments)
 
@@ -358,19 +419,24 @@ def check_replay(row: Row) -> str:
         if row.digest != again.digest or row.mean != again.mean or row.runs != again.runs:
             raise DataFileError(f"row {row.name}: expected the curves of {CURVES.name}, got other returns")
         return f"{again.mean['return']:.2f}, read off the curves"
+    check_policy(row.kind, row.policy, row.env_id)
     if row.digest != digest_of(row.policy, row.env_id):
         raise DataFileError(
             f"row {row.name}: the policy {row.policy!r} has other numbers than when it was scored; score it"
             " again"
         )
-    mean, _ = figures(played(row.policy, row.env_id, range(*row.seeds)))
+    mean, interval = figures(played(row.policy, row.env_id, range(*row.seeds)))
     for key, value in row.mean.items():
-        bounds = row.interval95.get(key)
-        # The last bits of an action differ between processors, and chaos makes more of them
+        bounds = interval.get(key)
+        # The last bits of an action differ between processors, and chaos makes more of them; the interval is
+        # that of the replay, for a row must not choose how well it has to agree
         room = (bounds[1] - bounds[0]) / 2 if bounds else 0.005 * abs(value) + 1e-9
-        if key not in mean or abs(mean[key] - value) > room:
+        recorded: list[float] = [value, *(row.interval95.get(key) or [value] * 2)]
+        replayed: list[float] = [mean[key], *(bounds or [mean[key]] * 2)] if key in mean else [math.nan] * 3
+        if not max(abs(one - other) for one, other in zip(recorded, replayed, strict=True)) <= room:
             raise DataFileError(
-                f"row {row.name}: expected {key} {value:.6g} within {room:.2g}, replayed {mean.get(key)}"
+                f"row {row.name}: expected {key} {value:.6g} within {room:.2g}, replayed {mean.get(key)};"
+                f" interval {row.interval95.get(key)}, replayed {bounds}"
             )
     if row.runs and abs(max(row.runs.values()) - row.mean["return"]) > 0.05 * abs(row.mean["return"]):
         raise DataFileError(f"row {row.name}: the best of its runs is not the policy that it names")
@@ -546,10 +612,12 @@ Command = (
 )
 
 
-def confirmed(files: Iterable[Path]) -> Iterable[Row]:
-    """Replay files of rows and yield the rows."""
+def confirmed(files: Iterable[Path], are_new: bool) -> Iterable[Row]:
+    """Replay files of rows and yield the rows; new ones must be fit for the tables."""
     for file in files:
         row = read_row(file)
+        if are_new:
+            check_published(row)
         print(f"{row.name}: {check_replay(row)}", flush=True)
         yield row
 
@@ -580,7 +648,7 @@ def main(argv: list[str] | None = None) -> None:
         write_index(POLICIES, SHIPPED)
     else:
         files = args.rows or sorted(RESULTS.glob("*.json"))
-        rows = list(confirmed(files))
+        rows = list(confirmed(files, isinstance(args, Add)))
         for row in rows if isinstance(args, Add) else ():
             print(f"taken: {row.write()}", file=sys.stderr)
 

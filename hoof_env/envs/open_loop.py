@@ -81,6 +81,8 @@ def open_loop(parameters: Mapping[str, Any], env: Any, blind: bool = True) -> Sc
     """
     env = env.unwrapped
     if "constant" in parameters:
+        if env.action_form != "rates":
+            raise ParameterError("constant: expected an environment of one leg, got a horse")
         constant = np.asarray(parameters["constant"], float)
         env.batch.body.check_reachable("constant", constant)
         return Scripted(towards(env, lambda observation, time: constant), env.dt)
@@ -170,8 +172,14 @@ def open_loop_record(path: Path) -> dict[str, Any]:
         if set(parameters) not in ({"constant"}, {"coefficients"}, {"coefficients", "frequency_hz"}):
             raise ValueError(f"parameters {sorted(parameters)}")
         for name, value in parameters.items():
-            if not _has_shape(name, np.shape(value)) or not np.isfinite(np.asarray(value, float)).all():
+            numbers = np.asarray(value)
+            if not (_has_shape(name, numbers.shape) and numbers.dtype.kind in "if"):
                 raise ValueError(f"{name} {value!r}")
+            if not np.isfinite(numbers).all() or (name == "frequency_hz" and not 0 < numbers <= 1e3):
+                raise ValueError(f"{name} {value!r}")
+        for name in ("env_kwargs", "versions"):
+            if not isinstance(record.get(name, {}), dict):
+                raise TypeError(f"{name} {record[name]!r}")
     except (OSError, ValueError, TypeError, KeyError, AttributeError) as error:
         raise DataFileError(
             f"open-loop gait {path}: expected the JSON object of agents.open_loop with form and parameters:"

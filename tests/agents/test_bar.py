@@ -65,6 +65,9 @@ def test_a_bar_that_sees_the_ground_is_refused(tmp_path):
         bar.main(args)
     with pytest.raises(ParameterError, match=r"ids: expected one of .*HorseLeg-v0.*got 'HorseLegs-v0'"):
         bar.main(["--ids", "HorseLegs-v0"])
+    for seeds in ("0", "-1"):
+        with pytest.raises(ParameterError, match=f"seeds: .*got {seeds}"):
+            bar.main(["--seeds", seeds])
     assert not list(tmp_path.iterdir())
 
 

@@ -2,13 +2,18 @@
 
 import json
 import math
+import shutil
 from dataclasses import replace
 
 import pytest
+import torch
+from stable_baselines3 import PPO
 
 from agents import results
 from agents.results import Row, check_replay, filled, make_row, read_row
+from agents.runs import make_env
 from hoof_env.errors import DataFileError, ParameterError
+from hoof_env.policies.saved import save_policy
 
 LEG = "hoof_env/HorseLeg-v0"
 FILES = sorted(results.RESULTS.glob("*.json"))
@@ -40,11 +45,19 @@ DAMAGES = [
     ("seeds backwards", lambda data: data | {"seeds": [5, 3]}, r"seeds \(5, 3\)"),
     ("a return that is none", lambda data: data | {"mean": {"return": math.nan}}, "returns nan|NaN"),
     ("an unknown entry", lambda data: data | {"secret": 1}, "secret"),
-    ("a module as id", lambda data: data | {"env_id": "payload:hoof_env/HorseLeg-v0"}, "no registered id"),
-    ("an unknown id", lambda data: data | {"env_id": "hoof_env/Cow-v0"}, "no registered id"),
-    ("a function", lambda data: data | {"policy": "payload:act"}, "a function as policy"),
-    ("a way out", lambda data: data | {"policy": "../payload/run"}, "outside the repository"),
     ("a policy that is no text", lambda data: data | {"policy": 3}, "must be texts"),
+    ("a number too large", lambda data: data | {"mean": {"return": 10**400}}, "OverflowError"),
+    (
+        "a figure that is no number",
+        lambda data: data | {"mean": data["mean"] | {"slip_m": "3"}},
+        "mean .*'3'",
+    ),
+    ("an interval of one", lambda data: data | {"interval95": {"return": [1.0]}}, r"interval95 .*\[1\.0\]"),
+    ("an interval that is a list", lambda data: data | {"interval95": [1]}, "values"),
+    ("an effort in words", lambda data: data | {"effort": {"steps": "many"}}, "effort .*many"),
+    ("seeds that are none", lambda data: data | {"seeds": [False, True]}, "seeds"),
+    ("another package's id", lambda data: data | {"env_id": "CartPole-v1"}, "env_id: expected one of"),
+    ("an id that imports", lambda data: data | {"env_id": f"spy:{LEG}"}, "env_id: expected one of"),
 ]
 
 
@@ -66,6 +79,80 @@ def test_a_row_that_does_not_replay_is_refused(row):
         check_replay(replace(row, digest="0" * 64))
     with pytest.raises(DataFileError, match="best of its runs is not the policy"):
         check_replay(replace(row, runs={"0": 500.0, "1": 3.0}))
+
+
+def test_a_row_does_not_choose_how_well_it_must_agree(row):
+    wide = {"return": (-1e4, 1e4)}
+    with pytest.raises(DataFileError, match=r"expected return 500 .*interval \(-10000"):
+        check_replay(replace(row, mean={"return": 500.0}, interval95=wide))
+    with pytest.raises(DataFileError, match=r"expected return 139|expected return 14"):
+        check_replay(replace(row, interval95=wide))
+
+
+def test_a_row_imports_no_module_and_runs_no_pickle(row, tmp_path, monkeypatch):
+    (tmp_path / "spy.py").write_text("raise SystemExit('imported')")
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.syspath_prepend(tmp_path)
+    run = tmp_path / "run"
+    shutil.copytree(results.ROOT / "results" / "policies" / "HorseLeg-v0-blind", run)
+    (run / "policy.json").rename(run / "model.zip")  # what plays where plain data are incomplete
+    for kind, policy in (
+        ("run", "spy:act"), ("shipped", "spy:act"), ("blind", "spy:act"), ("blind", str(run)),
+        ("blind", "results/../../elsewhere"), ("zero", "constant"), ("blind", "missing.json"),
+    ):  # fmt: skip
+        with pytest.raises(DataFileError, match=r"policy .* of a row"):
+            check_replay(replace(row, kind=kind, policy=policy, digest=""))
+        with pytest.raises(DataFileError, match=r"policy .* of a row"):
+            make_row(LEG, kind, policy)
+
+
+@pytest.mark.parametrize(
+    "change", [{"episode_seconds": 30.0}, {"friction": 0.3}, {"drive": "motor"}], ids=str
+)
+def test_a_policy_of_another_world_is_no_row(tmp_path, change):
+    run = tmp_path / "run"
+    shutil.copytree(results.ROOT / "results" / "policies" / "HorseLeg-v0-blind", run)
+    record = json.loads((run / "run.json").read_text())
+    record["env_kwargs"] |= change
+    (run / "run.json").write_text(json.dumps(record))
+    with pytest.raises(DataFileError, match=f"its record has {next(iter(change))}"):
+        make_row(LEG, "blind", str(run))
+
+
+def test_a_blind_agent_observes_nothing_of_the_ground_however_seldom_it_looks(tmp_path):
+    """A policy whose replay cannot differ, for it ignores what it observes."""
+    run = tmp_path / "run"
+    run.mkdir()
+    with make_env(LEG) as env:
+        model = PPO("MlpPolicy", env, n_steps=8, batch_size=8)
+        torch.nn.init.zeros_(model.policy.action_net.weight)
+        assert save_policy(model, run)
+    (run / "run.json").write_text(json.dumps({"env_id": LEG, "algo": "ppo", "actions": "rates"}))
+    with pytest.raises(ParameterError, match=r"depend on no force.* got trunk, hoof"):
+        make_row(LEG, "blind", str(run))
+
+
+def test_runs_that_are_not_there_are_told(tmp_path):
+    for place in (tmp_path / "nowhere", results.CURVES):
+        with pytest.raises(DataFileError, match=r"runs .*found none"):
+            results.returns_of_runs(place, LEG)
+
+
+def test_only_rows_of_the_published_episodes_are_taken(row, tmp_path, monkeypatch):
+    monkeypatch.setattr(results, "check_replay", lambda row: "not played")
+    with pytest.raises(DataFileError, match=r"expected the episodes of the tables.*1000006"):
+        results.main(["add", str(row.write(tmp_path))])
+    away = replace(row, seeds=results._FINAL, policy=str(tmp_path / "gait.json"))
+    with pytest.raises(DataFileError, match="expected a policy within the repository"):
+        results.main(["add", str(away.write(tmp_path))])
+
+
+def test_a_file_of_another_row_is_told(row, tmp_path):
+    row.write(tmp_path).rename(tmp_path / "HorseLegRail-v0-zero.json")
+    with pytest.raises(
+        DataFileError, match=r"expected hoof_env/HorseLegRail-v0, zero; got hoof_env/HorseLeg"
+    ):
+        results.rows_of("hoof_env/HorseLegRail-v0", tmp_path)
 
 
 def test_a_row_that_claims_to_see_nothing_must_see_nothing(row):

@@ -83,8 +83,14 @@ FILES = [
             ({"coefficients": [COEFFICIENTS[0][:2]]}, r"coefficients \[\[\[5\.0"),
             (None, "NoneType"),
             ({"constant": [0.0, 0.0, 0.0, float("nan")]}, "constant .*nan"),
+            ({"constant": ["6", "0", "0", "0"]}, "constant .*'6'"),
+            ({"constant": [True, False, False, False]}, "constant .*True"),
+            ({"constant": [10**400, 0, 0, 0]}, "constant .*000"),
+            ({**CLOCKED, "frequency_hz": 1e308}, r"frequency_hz 1e\+308"),
         )
     ),
+    ({**GAIT, "env_kwargs": [1]}, rf"{NO_GAIT}.*env_kwargs \[1\]"),
+    ({**GAIT, "versions": None}, f"{NO_GAIT}.*versions None"),
     ("", NO_GAIT),
     ("[]", NO_GAIT),
     ("{}", f"{NO_GAIT}.*'parameters'"),
@@ -107,6 +113,10 @@ def test_a_file_for_an_environment_whose_actions_mean_something_else(tmp_path):
     path = tmp_path / "gait.json"
     path.write_text(json.dumps({**GAIT, "env_id": "hoof_env/Horse-v0"}))
     with pytest.raises(DataFileError, match=r"expected the form 'offsets of .*' of HorseLegEnv, whose act"):
+        load_open_loop(path, horse())
+    content = {"form": horse().unwrapped.action_form, "parameters": {"constant": [6.0, 0.0, 0.0, 0.0]}}
+    path.write_text(json.dumps(content))
+    with pytest.raises(DataFileError, match="constant: expected an environment of one leg, got a horse"):
         load_open_loop(path, horse())
 
 
