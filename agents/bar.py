@@ -125,8 +125,21 @@ def agents_of(name: str, args: Args, groups: list[str]) -> list[Path]:
             train.main(command)
         if not is_through(folder):
             raise OutputError(f"{folder}: the training was interrupted; the same command goes on with it")
+        check_run(folder, groups, args.steps)
         folders.append(folder)
     return folders
+
+
+def check_run(folder: Path, groups: list[str], steps: int | None) -> None:
+    """Raise `OutputError` for a finished run with another observation, or with fewer steps than asked for."""
+    record = runs.read_record(folder)
+    seen = record.get("env_kwargs", {}).get("observation")
+    trained = record["finished"]["steps"]
+    if seen != groups or trained < (steps or 0):
+        raise OutputError(
+            f"{folder}: expected a run that observes {', '.join(groups)} for {steps or 'the usual'} steps,"
+            f" got one of {seen} and {trained:,} steps; name another --runs"
+        )
 
 
 def is_through(folder: Path) -> bool:

@@ -29,7 +29,9 @@ class Proof:
         friction, stiffness: of the other ground [-, N/m^n].
         episodes: episodes that went on in the other world until they ended in the real one.
         of: episodes that were played.
-        difference: largest difference of a return from the policy's own; 0 proves blindness.
+        difference: largest difference of a return from the policy's own, in the episodes that went on.
+        actions: largest difference of an action from the policy's own, while an episode goes on in both
+            worlds. Zero differences prove blindness.
         elsewhere: largest difference of returns between the worlds, which shows that the ground matters.
     """
 
@@ -38,6 +40,7 @@ class Proof:
     episodes: int
     of: int
     difference: float
+    actions: float
     elsewhere: float
 
 
@@ -54,7 +57,8 @@ def prove(
 
     Raises:
         ParameterError: the id has no native vector environment.
-        DataFileError: a return differs, so the policy sees the ground.
+        DataFileError: an action or a return differs, so the policy sees the ground; or nothing is proved, as
+            most episodes ended early on each other ground, or no return depends on it.
     """
     kwargs = dict(env_kwargs or {})
     real = make_rows(env_id, len(seeds), **kwargs)
@@ -67,41 +71,55 @@ def prove(
         ground = {"friction": friction, "stiffness": factor * stiffness}
         other = make_rows(env_id, len(seeds), **kwargs | ground)
         assert other is not None
-        own, here, there, whole = replay(policy, real, other, seeds)
+        own, here, there, whole, actions = replay(policy, real, other, seeds)
         proof = Proof(
             **ground,
             episodes=int(whole.sum()),
             of=len(seeds),
             difference=float(np.abs(own - here)[whole].max(initial=0.0)),
+            actions=actions,
             elsewhere=float(np.abs(here - there)[whole].max(initial=0.0)),
         )
         if 2 * proof.episodes >= proof.of:
             break
     assert proof is not None
-    if proof.difference or not proof.episodes:
+    if proof.difference or proof.actions:
         raise DataFileError(
-            f"policy on {env_id}: expected actions that do not depend on the ground; replayed from a ground"
-            f" with friction {proof.friction:g}, {proof.episodes} of {proof.of} episodes differ by up to"
+            f"policy on {env_id}: expected actions that do not depend on the ground; with friction"
+            f" {proof.friction:g} they differ by up to {proof.actions:.3g}, and replayed they differ by up to"
             f" {proof.difference:.3g} in their returns (observed: {', '.join(settings.observation)})"
+        )
+    if 2 * proof.episodes < proof.of or not proof.elsewhere:
+        raise DataFileError(
+            f"policy on {env_id}: expected episodes on other ground that prove something; {proof.episodes} of"
+            f" {proof.of} last there, and their returns differ by {proof.elsewhere:.3g} between the grounds"
         )
     return proof
 
 
-def replay(policy: Any, real: Any, other: Any, seeds: Sequence[int]) -> tuple[Any, Any, Any, Any]:
+def replay(policy: Any, real: Any, other: Any, seeds: Sequence[int]) -> tuple[Any, Any, Any, Any, float]:
     """Play a policy in two worlds, and the actions of the other one in the real one.
 
     Returns:
         Returns of the policy in the real world, of the replayed actions there, and of the policy in the other
-        world, each of shape (n,); and the episodes that lasted in the other world as long as in the real one.
+        world, each of shape (n,); the episodes that lasted in the other world as long as in the real one; and
+        the largest difference of the actions while an episode goes on in both worlds.
     """
-    own, _ = _episodes(policy, [real], seeds)
-    (here, there), whole = _episodes(policy, [real, other], seeds)
-    return own[0], here, there, whole
+    (own,), _, own_actions = _episodes(policy, [real], seeds)
+    (here, there), whole, other_actions = _episodes(policy, [real, other], seeds)
+    difference = 0.0
+    for (mine, is_mine), (theirs, is_theirs) in zip(own_actions, other_actions, strict=False):
+        gap = np.abs(np.asarray(mine, float) - theirs)[is_mine & is_theirs]
+        difference = max(difference, float(gap.max(initial=0.0)))
+    return own, here, there, whole, difference
 
 
-def _episodes(policy: Any, worlds: Sequence[Any], seeds: Sequence[int]) -> tuple[Any, Any]:
+def _episodes(
+    policy: Any, worlds: Sequence[Any], seeds: Sequence[int]
+) -> tuple[Any, Any, list[tuple[Any, Any]]]:
     """Play an episode for each seed in each world, with the actions of the last; return the returns, shape
-    (worlds, n), and the rows whose last world was not over before another one."""
+    (worlds, n), the rows whose last world was not over before another one, and the actions of each step with
+    the rows that were going on in the last world."""
     start = dict(getattr(policy, "start", None) or {})
     seen = [world.reset(seed=list(seeds), options=start)[0] for world in worlds]
     count = len(seeds)
@@ -109,8 +127,11 @@ def _episodes(policy: Any, worlds: Sequence[Any], seeds: Sequence[int]) -> tuple
     going = np.ones((len(worlds), count), bool)
     whole = np.ones(count, bool)
     fresh = np.ones(count, bool)
+    state = None
+    taken = []
     while going.any():
-        actions, _ = policy.predict(seen[-1], episode_start=fresh, deterministic=True)
+        actions, state = policy.predict(seen[-1], state, episode_start=fresh, deterministic=True)
+        taken.append((actions, going[-1].copy()))
         fresh = np.zeros(count, bool)
         for k, world in enumerate(worlds):
             seen[k], rewards, terminated, truncated, _ = world.step(actions)
@@ -118,4 +139,4 @@ def _episodes(policy: Any, worlds: Sequence[Any], seeds: Sequence[int]) -> tuple
             going[k] &= ~(terminated | truncated)
         # What an ended episode of the last world would have done is not known
         whole &= going[-1] | ~going[:-1].any(0)
-    return totals, whole
+    return totals, whole, taken

@@ -240,15 +240,20 @@ def digest_of(policy: str, env_id: str) -> str:
         path = ROOT / policy if policy.endswith(".json") else gait_file(env_id, family)
         return _sha(json.dumps(open_loop_record(path)["parameters"], sort_keys=True).encode())
     if policy == "shipped":
-        return _sha((SHIPPED / name / "policy.safetensors").read_bytes())
+        return _of_plain(SHIPPED / name)
     if is_model(policy):
         try:
-            return _sha((ROOT / policy / "policy.safetensors").read_bytes())
+            return _of_plain(ROOT / policy)
         except OSError as error:
             raise DataFileError(
                 f"policy {policy}: expected a folder with policy.safetensors: {error}"
             ) from None
     return ""
+
+
+def _of_plain(folder: Path) -> str:
+    """Return the digest of a policy of plain data: its weights, and what normalises and bounds them."""
+    return _sha(b"".join((folder / name).read_bytes() for name in (WEIGHTS, ABOUT)))
 
 
 def _sha(content: bytes) -> str:
@@ -650,7 +655,9 @@ def main(argv: list[str] | None = None) -> None:
         files = args.rows or sorted(RESULTS.glob("*.json"))
         rows = list(confirmed(files, isinstance(args, Add)))
         for row in rows if isinstance(args, Add) else ():
-            print(f"taken: {row.write()}", file=sys.stderr)
+            old = rows_of(row.env_id).get(row.kind)
+            replaced = f", in place of one with {old.mean['return']:.2f}" if old else ""
+            print(f"taken: {row.write()}{replaced}", file=sys.stderr)
 
 
 if __name__ == "__main__":

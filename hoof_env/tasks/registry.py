@@ -170,8 +170,8 @@ RACING: Mapping[str, Any] = MappingProxyType(
 _SUSPENDED = (
     "The trunk moves along x and y. The leg must bear `trunk_share` of the weight of trunk and leg. A"
     " constant force carries the rest, and a vertical spring and damper stand for the animal's other legs."
-    " They push and pull by more than the weight within a stride: give [their figures](../task.md#the-trunk)"
-    " beside any force of the ground."
+    " They push and pull by more than the weight within a stride: report"
+    " [their figures](../task.md#the-trunk) next to any force of the ground."
 )
 
 _FOUR_LEGS = (

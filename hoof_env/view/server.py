@@ -105,7 +105,7 @@ def is_own_name(name: str, address: str, hosts: Collection[str] = ()) -> bool:
         address: address at which the server listens.
         hosts: further names, given by the user.
     """
-    name = name.lower()
+    name = name.lower().removesuffix(".")
     if name in {address.lower(), *HERE, *(host.lower() for host in hosts)}:
         return True
     try:
@@ -187,6 +187,9 @@ def start(
     count("port", port, low=0, most=65535)
     if ":" in address:
         raise ParameterError(f"address: expected an IPv4 address or a name, got {address!r}")
+    for name in hosts:
+        if not name or any(mark in name for mark in ":/ "):
+            raise ParameterError(f"host: expected a name without scheme and port, got {name!r}")
     check_folder(out)
     try_out(setup)
     pages = Pages(setup, out)

@@ -53,6 +53,21 @@ def test_even_a_little_of_the_ground_is_found():
         prove(weak, LEG, SEEDS, SHORT)
 
 
+def test_a_glance_that_changes_no_whole_episode_is_found():
+    """A policy that sees a load once, in a step of its own: its actions differ where the loads do."""
+    with make_env(LEG) as env:
+        place = env.unwrapped.observation_names.index("running peak force")
+    glance = Scripted(lambda seen, time: (seen[..., [place] * 4] > 0.3) * (time == 0.6)[..., None], 0.02)
+    with pytest.raises(DataFileError, match=r"with friction .* they differ by up to 1"):
+        prove(glance, LEG, SEEDS, SHORT)
+
+
+def test_ground_that_changes_nothing_proves_nothing():
+    """A leg that never touches the ground."""
+    with pytest.raises(DataFileError, match="expected episodes on other ground that prove something"):
+        prove(policy_of("zero"), LEG, SEEDS, SHORT | {"hip_height": 3.0})
+
+
 def test_blind_groups_are_all_that_depend_on_no_force():
     assert bar.blind_groups(LEG) == ["crank", "gait"]
     assert bar.blind_groups("hoof_env/HorseLegSpeed-v0") == ["crank", "gait", "target"]
@@ -117,8 +132,9 @@ def test_a_replay_of_a_gait_is_the_gait(tmp_path):
 
     policy = policy_of("run")
     real, other = (make_rows(LEG, 8, **SHORT, **ground) for ground in ({}, {"friction": 0.1}))
-    own, here, there, whole = replay(policy, real, other, SEEDS)
+    own, here, there, whole, actions = replay(policy, real, other, SEEDS)
     assert whole.all()
+    assert actions == 0.0
     np.testing.assert_array_equal(own, here)
     np.testing.assert_array_equal(own, [one["return"] for one in play_rows(real, policy, SEEDS)])
     assert (there != here).all()
