@@ -16,9 +16,10 @@ import numpy as np
 from hoof_env.errors import DataFileError, ParameterError
 from hoof_env.evaluation.episodes import make_rows
 
-OTHER_GROUNDS = ((0.05, 10.0), (0.2, 3.0), (0.3, 1.5))
+OTHER_GROUNDS = ((0.05, 10.0), (0.05, 0.2), (0.2, 3.0), (0.2, 0.5), (0.3, 1.5), (0.3, 0.7))
 """Friction of other grounds, and factors of their stiffness, the most unlike first. On the first of them some
-animals fall, and an episode that is over has no more actions to replay."""
+animals fall, and an episode that is over has no more actions to replay. A ground that needs another number of
+substeps is passed over: the crank's motion has the error of its step, and would differ by that."""
 
 
 @dataclass(frozen=True)
@@ -71,6 +72,8 @@ def prove(
         ground = {"friction": friction, "stiffness": factor * stiffness}
         other = make_rows(env_id, len(seeds), **kwargs | ground)
         assert other is not None
+        if other.batch.engine.substeps != real.batch.engine.substeps:
+            continue
         own, here, there, whole, actions = replay(policy, real, other, seeds)
         proof = Proof(
             **ground,
