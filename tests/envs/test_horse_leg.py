@@ -94,7 +94,7 @@ def test_assumed_contact_settings_hardly_matter_to_the_run(change):
 def test_policies_have_names_and_do_what_they_say():
     env = gym.make(LEG)
     assert policy_names(env) == [
-        "carrying_walk", "run", "walk", "idle", "random", "bang-bang", "drag", "airborne",
+        "carrying_walk", "run", "walk", "zero", "idle", "random", "bang-bang", "drag", "airborne",
     ]  # fmt: skip
     duty = {}
     for name in ("drag", "airborne", "idle"):
