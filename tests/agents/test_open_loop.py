@@ -31,7 +31,13 @@ def small(monkeypatch):
 def arguments(path, **changes):
     return replace(
         Args(
-            env_kwargs=SHORT, restarts=2, episodes=64 * 4, easier=(), test_episodes=8, out=path / "gait.json"
+            env_kwargs=SHORT,
+            restarts=2,
+            episodes=64 * 4,
+            most=64 * 6,
+            easier=(),
+            test_episodes=8,
+            out=path / "gait.json",
         ),
         **changes,
     )
