@@ -483,7 +483,8 @@ def table(env_id: str, columns: Sequence[str], folder: Path = RESULTS) -> str:
     best = best_blind(rows)
     lines = []
     for kind, row in rows.items():
-        title = KINDS[kind] + (", best run" if row.spread and kind in ("blind", "shipped") else "")
+        is_best = row.spread and row.mean["return"] > row.spread[2] - 0.1  # a table of runs has one decimal
+        title = KINDS[kind] + (", best run" if is_best and kind in ("blind", "shipped") else "")
         title += f" (`{row.policy}`)" if kind == "run" else ""
         title = f"**{title}: best without feedback**" if row is best else title
         lines.append([title, effort_cell(row), *(cell(row, key) for key in columns), runs_cell(row)])
@@ -495,7 +496,7 @@ def overview(folder: Path = RESULTS) -> str:
     """Return the table of all ids: returns by kind."""
     names = sorted({path.stem.rpartition("-v0-")[0] for path in folder.glob("*-v0-*.json")})
     head = ["id", *(KINDS[kind] for kind in ("zero", "run", "constant")), "**best without feedback**"]
-    head += [KINDS["stock"], "shipped agent: best run", "all runs"]
+    head += [KINDS["stock"], "shipped agent", "all its runs"]
     lines = []
     for name in names:
         rows = rows_of(f"hoof_env/{name}-v0", folder)
