@@ -16,8 +16,6 @@ from collections.abc import Callable
 from typing import Any, NamedTuple
 
 import numpy as np
-from numba import carray  # type: ignore[attr-defined]
-
 from hoof_env.dynamics.form import EngineLayout, engine_layout
 from hoof_env.dynamics.hoof import law_of, level_ground, lift_heel, remember_contacts
 from hoof_env.dynamics.layout import PLAIN, Features
@@ -28,11 +26,24 @@ from hoof_env.dynamics.observables import count_stride, keep_account, report_leg
 from hoof_env.dynamics.parts import FIXED, Result
 from hoof_env.dynamics.reactions import reactions_of
 from hoof_env.dynamics.stepping import begin_step, end_step, next_stage, weigh_stage
-from hoof_env.simd import any_lane, block_at, columns, full_like, lane_sum, load_rows, rows, where
-from hoof_env.simd.compile import inline_llvm, inline_source, kernel
+from hoof_env.simd import (
+    Cell,
+    any_lane,
+    block_at,
+    columns,
+    cond,
+    full_like,
+    lane_sum,
+    load_rows,
+    loop,
+    one_of,
+    rows,
+    when,
+    where,
+)
+from hoof_env.simd.compile import Kernel, inline_llvm, inline_source
 from hoof_env.simd.kept import Kept, Kernels
-from hoof_env.simd.memory import address, doubles, offset
-from hoof_env.simd.reach import fingerprint, refresh
+from hoof_env.simd.memory import address, doubles
 
 LANES = 8
 """Number of environments side by side in a batch: one vector of 512 bits."""
@@ -104,42 +115,46 @@ class Joints(NamedTuple):
     check: Any
 
 
-@inline_llvm
-def unpack_model(model, tables, ground, small, lanes_are_legs, law, form):  # type: ignore[no-untyped-def]
-    """Return the `Model` of a record and its arrays; `small` points to room for 8 + 3 form.gait doubles."""
-    record = model[0]
-    # copied to the stack: the compiler could not rule out that a store to `data` changes the record
-    for k in range(4):
-        small[k] = record.fractions[k]
-        small[4 + k] = record.weights[k]
-    settings = offset(small, 8)
-    for k in range(12):
-        settings[k] = record.settings[k]
+STATIC = ("legs", "kind", "eighths", "friction_law", "interpolated", "is_terrain", "new_rates", "strides", "motors",
+          "averages", "stages", "fractions", "weights")  # fmt: skip
+"""Fields of `MODEL` that are known when a kernel is traced."""
+
+
+def static_of(model: Any) -> tuple[tuple[str, Any], ...]:
+    """Return the fields of a model that its kernels are made for, with their values."""
+    return tuple((name, _plain(model[0][name])) for name in STATIC)
+
+
+def _plain(value: Any) -> Any:
+    return tuple(value.tolist()) if value.shape else value.item()
+
+
+def unpack_model(record, tables, ground, lanes_are_legs, law, form):  # type: ignore[no-untyped-def]
+    """Return the `Model` of a record and its arrays."""
     # higher harmonics have the filters of the first
-    for k in range(12, 3 * form.gait):
-        settings[k] = record.settings[k % 3 + 9]
+    places = [*range(12), *(k % 3 + 9 for k in range(12, 3 * form.gait))]
     return Model(
-        record.kind,
-        record.eighths,
-        record.friction_law,
-        record.interpolated,
-        record.is_terrain,
-        record.new_rates,
-        record.strides,
-        record.motors,
-        lanes_are_legs,
-        form,
-        record.cells,
-        address(tables),
-        settings,
-        record.averages,
-        record.stages,
-        small,
-        offset(small, 4),
-        carray(address(ground), ground.shape),
-        record.ground_origin,
-        record.ground_per_metre,
-        law,
+        kind=record.kind,
+        eighths=record.eighths,
+        friction_law=record.friction_law,
+        interpolated=record.interpolated,
+        is_terrain=record.is_terrain,
+        new_rates=record.new_rates,
+        strides=record.strides,
+        motors=record.motors,
+        lanes_are_legs=lanes_are_legs,
+        form=form,
+        cells=record.cells,
+        tables=address(tables),
+        settings=[record.settings[k] for k in places],
+        averages=record.averages,
+        stages=record.stages,
+        fractions=record.fractions,
+        weights=record.weights,
+        ground_cells=ground,
+        ground_origin=record.ground_origin if record.is_terrain else 0.0,
+        ground_per_metre=record.ground_per_metre if record.is_terrain else 0.0,
+        law=law,
     )
 
 
@@ -207,41 +222,53 @@ def run_steps(  # type: ignore[no-untyped-def]
     trunk, legs, leg_count, model, account, constants, reactions, h, steps, keeps_account, reacts, joints
 ):
     """Advance by `steps` of `h` [s] and evaluate forces and accelerations at the end."""
-    stage = 0
-    elapsed = 0.0
+    stage = Cell(0)
+    elapsed = Cell(0.0)
     begin_step(trunk, legs, leg_count, model)
     # one loop over all stages of all steps, not two: `evaluate`, which is large, then has a single call
-    for turn in range(steps * model.stages + 1):
-        evaluate(trunk, legs, leg_count, model, elapsed)
-        if stage == 0:
+    for turn in loop(steps * model.stages + 1):
+        evaluate(trunk, legs, leg_count, model, elapsed.value)
+
+        @when(stage.value == 0)
+        def _() -> None:
             # counted from the end, so that limits are always checked at the last step
             left = steps * model.stages - turn
-            looks = turn > 0 and left % (CHECK_EVERY * model.stages) == 0
-            for i in range(leg_count):
+            for i in loop(leg_count):
                 leg = block_at(legs, i)
                 remember_contacts(leg)
-                if model.strides and turn > 0:
-                    count_stride(trunk, leg, model.form, h)
-                if reacts and (turn > 0 or steps == 0):
-                    joints.react(trunk, leg, block_at(constants, i), block_at(reactions, i))
-                if model.form.has_limits and looks:
-                    joints.check(trunk, leg, block_at(constants, i), model)
-            if model.form.has_limits and looks:
-                check_trunk(trunk, model)
-        if turn < steps * model.stages:
-            weight = model.weights[stage]
-            if keeps_account:
-                keep_account(trunk, legs, leg_count, model, account, h * weight)
+                if model.strides:
+                    when(turn > 0)(lambda: count_stride(trunk, leg, model.form, h))
+                if reacts:
+                    when((turn > 0) | (steps == 0))(
+                        lambda: joints.react(trunk, leg, block_at(constants, i), block_at(reactions, i))
+                    )
+            if model.form.has_limits:
+
+                @when((turn > 0) & (left % (CHECK_EVERY * model.stages) == 0))
+                def _() -> None:
+                    for i in loop(leg_count):
+                        joints.check(trunk, block_at(legs, i), block_at(constants, i), model)
+                    check_trunk(trunk, model)
+
+        @when(turn < steps * model.stages)
+        def _() -> None:
+            weight = one_of(model.weights[: model.stages], stage.value)
+            when(keeps_account)(lambda: keep_account(trunk, legs, leg_count, model, account, h * weight))
             weigh_stage(trunk, legs, leg_count, model, weight)
-            elapsed = model.fractions[stage] * h
-            stage += 1
-            if stage < model.stages:
-                next_stage(trunk, legs, leg_count, model, elapsed)
-            else:
+            elapsed.value = one_of(model.fractions[: model.stages], stage.value) * h
+            stage.value = stage.value + 1
+
+            def end() -> None:
                 end_step(trunk, legs, leg_count, model, h)
                 begin_step(trunk, legs, leg_count, model)
-                stage = 0
-                elapsed = 0.0
+                stage.value = 0
+                elapsed.value = 0.0
+
+            cond(
+                stage.value < model.stages,
+                lambda: next_stage(trunk, legs, leg_count, model, elapsed.value),
+                end,
+            )
 
 
 @inline_llvm
@@ -257,7 +284,7 @@ def load(trunk, legs, leg_count, account, memory, at, n, row, far, lanes, form):
     read_trunk(trunk, memory)
     if form.has_limits:
         clear_limits(trunk)
-    for i in range(leg_count):
+    for i in loop(leg_count):
         read_leg(block_at(legs, i), leg_memory_of(at, i, n, row, far, lanes, form), form)
     for k in range(form.account_size):
         account[k] = 0.0
@@ -323,14 +350,23 @@ def store_trunk(trunk, account, memory, good, keeps_account, form):  # type: ign
     """Store the report, and where `good` holds what changes of the trunk."""
     report_trunk(trunk, memory.report)
     store(memory.state, trunk.state, form.trunk_state, good)
-    if keeps_account:
+
+    @when(keeps_account)
+    def _() -> None:
         for k in range(form.account_size):
             account[k] = account[k] + memory.account[k]
         store(memory.account, account, form.account_size, good)
 
 
 def advance_of(
-    legs: int, lanes: int, lanes_are_legs: bool, reacts: bool, law: Any, form: EngineLayout, joints: Joints
+    legs: int,
+    lanes: int,
+    lanes_are_legs: bool,
+    reacts: bool,
+    law: Any,
+    form: EngineLayout,
+    joints: Joints,
+    is_start: bool = False,
 ) -> Callable[..., None]:
     """Return the function of a kernel, which advances environments `begin` to `end` by substeps of h [s]; if
     their number is negative, environments with the result `RESET_REQUESTED` are started.
@@ -342,53 +378,44 @@ def advance_of(
         law, form, joints: law of contact (`hoof.law_of`), engine's layouts, kernels of the legs' structure.
     """
 
-    def advance(  # type: ignore[no-untyped-def]
-        data, model, tables, ground, constants, reactions, h, steps, keeps_account, begin, end
-    ):
-        leg_count = legs if legs else model[0].legs
+    def prepare(data, model, tables, ground, constants, reactions):  # type: ignore[no-untyped-def]
+        leg_count = legs
         trunk = rows(doubles(form.trunk_size * lanes), lanes, form.trunk)
         of_legs = rows(doubles(leg_count * form.leg_size * lanes), lanes, form.leg)
         account = rows(doubles(form.account_size * lanes), lanes, form.account)
         shapes = rows(doubles(leg_count * form.constants_size * lanes), lanes, form.constants)
         forces = rows(doubles(leg_count * form.reactions_size * lanes), lanes, form.reactions)
-        unpacked = unpack_model(model, tables, ground, doubles(8 + 3 * form.gait), lanes_are_legs, law, form)
+        unpacked = unpack_model(model, tables, ground, lanes_are_legs, law, form)
         at = address(data)
         row = data.shape[1]
         # lanes are neighbouring columns; lanes that are legs are as far apart as the legs' rows in one column
         far = form.leg_rows * row if lanes_are_legs else 1
         if reacts or form.has_limits:
             read_shapes(shapes, leg_count, constants, lanes, lanes_are_legs, form)
-        for n in range(begin, end, 1 if lanes_are_legs else lanes):
+
+        def advance_group(n, h, steps, keeps_account):  # type: ignore[no-untyped-def]
             memory = columns(at, lanes, form.trunk_memory, n, row, 0 if lanes_are_legs else 1)
             before = memory.result
             starts = before == RESET_REQUESTED
-            if steps < 0 and not any_lane(starts):
-                continue
-            load(trunk, of_legs, leg_count, account, memory, at, n, row, far, lanes, form)
-            if steps < 0:
-                start_motion(trunk, of_legs, leg_count, unpacked, starts)
-            run_steps(
-                trunk,
-                of_legs,
-                leg_count,
-                unpacked,
-                account,
-                shapes,
-                forces,
-                h,
-                max(steps, 0),
-                keeps_account,
-                reacts,
-                joints,
-            )
-            result, good = judge(trunk, of_legs, leg_count, before, steps < 0, lanes_are_legs, form)
-            memory.result = result
-            store_trunk(trunk, account, memory, good, keeps_account, form)
-            store_legs(trunk, of_legs, leg_count, good, at, n, row, far, lanes, form)
-            if reacts:
-                store_reactions(forces, leg_count, reactions, n, row, lanes, lanes_are_legs, form)
 
-    return advance
+            @when(any_lane(starts) if is_start else True)
+            def _() -> None:
+                load(trunk, of_legs, leg_count, account, memory, at, n, row, far, lanes, form)
+                if is_start:
+                    start_motion(trunk, of_legs, leg_count, unpacked, starts)
+                run_steps(
+                    trunk, of_legs, leg_count, unpacked, account, shapes, forces, h, steps, keeps_account, reacts, joints
+                )  # fmt: skip
+                result, good = judge(trunk, of_legs, leg_count, before, is_start, lanes_are_legs, form)
+                memory.result = result
+                store_trunk(trunk, account, memory, good, keeps_account, form)
+                store_legs(trunk, of_legs, leg_count, good, at, n, row, far, lanes, form)
+                if reacts:
+                    store_reactions(forces, leg_count, reactions, n, row, lanes, lanes_are_legs, form)
+
+        return advance_group
+
+    return prepare
 
 
 KERNELS = {"leg": (1, 1, False), "four": (1, 4, True), "batch": (0, LANES, False)}
@@ -402,38 +429,46 @@ BY_LEGS = {1: "leg", 4: "four"}
 _KEPT = Kept()
 
 
+class AdvanceKernels:
+    """Kernels of engines with one law of contact and one set of features, each made when it is first needed."""
+
+    def __init__(self, contact_law: Any, features: Features) -> None:
+        self._law = law_of(contact_law)
+        self._form = engine_layout(features)
+        self._joints = Joints(reactions_of(features.structure), joint_check_of(features.structure))
+        self._made: dict[Any, Kernel] = {}
+
+    def function(self, which: str, legs: int, reacts: bool = False, is_start: bool = False) -> Any:
+        """Return the function of a kernel, for kernels that contain it."""
+        own, lanes, lanes_are_legs = KERNELS[which]
+        count = own or legs
+        parts = (reacts, self._law, self._form, self._joints, is_start)
+        return advance_of(count, lanes, lanes_are_legs, *parts)
+
+    def get(self, which: str, does: str, static: tuple[tuple[str, Any], ...], is_start: bool = False) -> Kernel:
+        """Return a kernel for models with these values."""
+        key = (which, does, static, is_start)
+        if key not in self._made:
+            legs = dict(static)["legs"]
+            prepare = self.function(which, legs, does == "react", is_start)
+            step = 1 if KERNELS[which][2] else KERNELS[which][1]
+
+            def advance(  # type: ignore[no-untyped-def]
+                data, model, tables, ground, constants, reactions, h, steps, keeps_account, begin, end
+            ):
+                group = prepare(data, model, tables, ground, constants, reactions)
+                for n in loop(begin, end, step):
+                    group(n, h, 0 if is_start else steps, keeps_account != 0)
+
+            advance.__name__ = f"{'start' if is_start else does}_{which}"
+            kinds = ["matrix", (MODEL, dict(static)), "matrix", "matrix", "matrix", "matrix"]
+            kinds += ["double", "index", "truth", "index", "index"]
+            self._made[key] = Kernel(advance, kinds)
+        return self._made[key]
+
+
 def advance_kernels(contact_law: Callable[..., Any] | None = None, features: Features = PLAIN) -> Any:
-    """Return the kernels `advance_leg`, `advance_four`, `advance_batch`, and `react_leg` and so on, which
-    also compute joint reactions.
-
-    Args:
-        contact_law: law of contact as in `hoof.law_of`; None is that of `ground.laws`.
-        features: features of the engine; each combination has kernels of its own.
-
-    Raises:
-        ParameterError: the law of contact reaches something that cannot be read.
-    """
-    identity = fingerprint(contact_law)
-    key = (contact_law, features, identity)
-    return _KEPT.get(key, lambda: _new_kernels(contact_law, features, identity), contact_law is not None)
-
-
-def _new_kernels(contact_law: Callable[..., Any] | None, features: Features, identity: str) -> Kernels:
-    refresh(contact_law)
-    law = law_of(contact_law)
-    form = engine_layout(features)
-    joints = Joints(reactions_of(features.structure), joint_check_of(features.structure))
-    if features != PLAIN:
-        identity += f" {tuple(features)}"
-
-    def new_kernel(name: str, legs: int, lanes: int, lanes_are_legs: bool, reacts: bool) -> Any:
-        advance = advance_of(legs, lanes, lanes_are_legs, reacts, law, form, joints)
-        advance.__name__ = name
-        return kernel(advance, identity, threads=not lanes_are_legs and lanes > 1)
-
-    kernels = {}
-    for does in ("advance", "react"):
-        for which, (legs, lanes, lanes_are_legs) in KERNELS.items():
-            name = f"{does}_{which}"
-            kernels[name] = new_kernel(name, legs, lanes, lanes_are_legs, reacts=does == "react")
-    return Kernels(**kernels)
+    """Return the kernels of engines with a law of contact and features."""
+    return _KEPT.get(
+        (contact_law, features), lambda: AdvanceKernels(contact_law, features), contact_law is not None
+    )

@@ -6,7 +6,6 @@ from collections.abc import Callable
 from typing import Any
 
 import numpy as np
-from numba.core.errors import NumbaError
 from numpy.typing import ArrayLike, NDArray
 
 from hoof_env.dynamics import engine_states, layout, memory
@@ -35,7 +34,7 @@ class EngineMotion(EngineMemory):
     num_threads: int
     blocks: list[range]
     contact_law: Callable[..., Any] | None
-    _run: Any
+    _kernel: Any
 
     @property
     def substep(self) -> float:
@@ -153,10 +152,14 @@ class EngineMotion(EngineMemory):
 
     def _go_substeps(self, substeps: int, account: bool) -> None:
         try:
-            common = (*self.arrays, self.substep, substeps, account)
+            run = self._kernel(is_start=substeps < 0)
+            given: list[Any] = []
+            for array in self.arrays:
+                given += [array.ctypes.data, *array.shape[-2:]] if array.ndim > 1 else [array.ctypes.data]
+            common = (*given, self.substep, max(substeps, 0), account)
             calls = [(*common, block.start, block.stop) for block in self.blocks]
-            run_together(self._run, calls, self.num_threads)
-        except (NumbaError, NotCompiledError) as error:
+            run_together(run, calls, self.num_threads)
+        except NotCompiledError as error:
             if self.contact_law is None:
                 raise
             raise compilation_error("contact_law", error) from error

@@ -7,9 +7,21 @@ from typing import Any, NamedTuple
 
 from hoof_env.ground.laws import friction_part, normal_force
 from hoof_env.ground.terrain import surface
-from hoof_env.simd import absolute, any_lane, cross, dot, full_like, maximum, perpendicular, vector, where
+from hoof_env.simd import (
+    absolute,
+    any_lane,
+    cond,
+    cross,
+    dot,
+    full_like,
+    maximum,
+    perpendicular,
+    vector,
+    where,
+)
 from hoof_env.simd.compile import inline_llvm
 from hoof_env.simd.math import clip, root_power
+from hoof_env.simd.values import rounded
 from hoof_env.simd.user_functions import function_name, inline_foreign, number_of
 
 
@@ -113,27 +125,30 @@ def force_of(point):  # type: ignore[no-untyped-def]
 def press_rigidly(trunk, point, memory, penetration, rate, sliding_speed, model):  # type: ignore[no-untyped-def]
     """Compute the forces on a point of a rigid hoof, which is the sole itself."""
     nothing = 0.0 * absolute(penetration)  # 0, but NaN where the penetration is NaN
-    force = nothing
-    spring = nothing
-    friction = nothing
     inverse_speed = memory.inverse_approach_speed
     inside = penetration > 0.0
-    # branches on all lanes together, to save time in the air; `where` chooses in each lane
-    if any_lane(inside):
-        if any_lane(inside & (inverse_speed == 0.0)):
-            entering = inverse_entry_speed(trunk, memory, penetration, rate, model)
-            inverse_speed = where(inverse_speed > 0.0, inverse_speed, entering)
+
+    def meets():  # type: ignore[no-untyped-def]
+        latched = latch(trunk, memory, inside, inverse_speed, penetration, rate, model)
         pushed, stored = model.law(
-            trunk.settings, point.stiffness_scale, penetration, rate, inverse_speed, model.eighths
+            trunk.settings, point.stiffness_scale, penetration, rate, latched, model.eighths
         )
         laws = trunk.settings
         part = friction_part(
             absolute(sliding_speed), model.friction_law, laws.friction_slow, laws.friction_fast
         )
         grip = laws.friction * point.friction_scale * part * pushed  # Eq. 15
-        friction = where(inside, where(sliding_speed > 0.0, -grip, grip), nothing)
-        force = where(inside, pushed, nothing)
-        spring = where(inside, stored, nothing)
+        return (
+            where(inside, pushed, nothing),
+            where(inside, stored, nothing),
+            where(inside, where(sliding_speed > 0.0, -grip, grip), nothing),
+            latched,
+        )
+
+    # branches on all lanes together, to save time in the air; `where` chooses in each lane
+    force, spring, friction, inverse_speed = cond(
+        any_lane(inside), meets, (nothing, nothing, nothing, inverse_speed)
+    )
     point.spring_force = spring
     point.inverse_approach_speed = inverse_speed
     point.normal = force
@@ -157,21 +172,21 @@ def press_through_spring(trunk, leg, point, memory, model):  # type: ignore[no-u
     along = point.deflection[1]
     speed = point.slide
     depth_rate = point.penetration_rate
-    elastic = stiffness[0] * deflection
+    elastic = rounded(stiffness[0] * deflection)
     penetration = point.penetration - deflection
-    free_return_rate = -elastic * leg.inverse_damping[0]  # of a spring that nothing presses
+    free_return_rate = rounded(-elastic * leg.inverse_damping[0])  # of a spring that nothing presses
     nothing = 0.0 * absolute(penetration)
-    spring = nothing
-    resistance = nothing
     inverse_speed = memory.inverse_approach_speed
     inside = penetration > 0.0
-    if any_lane(inside):
-        if any_lane(inside & (inverse_speed == 0.0)):
-            entering = inverse_entry_speed(trunk, memory, penetration, depth_rate - free_return_rate, model)
-            inverse_speed = where(inverse_speed > 0.0, inverse_speed, entering)
+
+    def meets():  # type: ignore[no-untyped-def]
+        approach = depth_rate - free_return_rate
+        latched = latch(trunk, memory, inside, inverse_speed, penetration, approach, model)
         pushed = ground_spring(laws, point.stiffness_scale, maximum(penetration, 0.0), model.eighths)
         spring = where(inside, pushed, nothing)
-        resistance = where(inside, laws.chi * spring * inverse_speed + laws.dashpot, nothing)
+        return spring, where(inside, laws.chi * spring * latched + laws.dashpot, nothing), latched
+
+    spring, resistance, inverse_speed = cond(any_lane(inside), meets, (nothing, nothing, inverse_speed))
     # the balance of the docstring, with Eq. 14 for the ground, solved for s'
     rate = (spring + resistance * depth_rate - elastic) / (damping[0] + resistance)
     pushes = inside & (rate > free_return_rate)
@@ -191,6 +206,17 @@ def press_through_spring(trunk, leg, point, memory, model):  # type: ignore[no-u
     point.inverse_approach_speed = inverse_speed
     point.normal = force
     point.friction = -held
+
+
+@inline_llvm
+def latch(trunk, memory, inside, inverse_speed, penetration, rate, model):  # type: ignore[no-untyped-def]
+    """Return 1 / v0 [s/m] of points that are in the ground, kept from when they entered it."""
+
+    def entered():  # type: ignore[no-untyped-def]
+        entering = inverse_entry_speed(trunk, memory, penetration, rate, model)
+        return where(inverse_speed > 0.0, inverse_speed, entering)
+
+    return cond(any_lane(inside & (inverse_speed == 0.0)), entered, inverse_speed)
 
 
 @inline_llvm

@@ -14,10 +14,8 @@ from hoof_env.dynamics.parts import Result
 from hoof_env.ground.terrain import surface
 from hoof_env.leg.closed_form import carry, meet
 from hoof_env.leg.mechanism import Dyad
-from hoof_env.simd import any_lane, full_like, lane_sum, minimum, vector, where
+from hoof_env.simd import any_lane, full_like, lane_sum, minimum, vector, when, where
 from hoof_env.simd.compile import inline_llvm
-from hoof_env.simd.types import Lanes
-from hoof_env.simd.unrolled import Traced, call, unrolled
 
 CHECK_EVERY = 5
 """Whole steps from one look to the next: to find all joints takes square roots and quotients."""
@@ -98,45 +96,46 @@ def joint_check_of(structure: Structure) -> Any:
     """
     mechanism = structure.mechanism
 
-    @unrolled(lambda trunk, *others: Lanes(trunk.count))
-    def bound(trunk: Traced, leg: Traced, shape: Traced) -> Traced:
+    @inline_llvm
+    def bound(trunk, leg, shape):  # type: ignore[no-untyped-def]
         """Return a height below which no joint is: their places need not be found for it."""
-        low = call(least_height, trunk, leg, shape.part("reach"))
+        low = least_height(trunk, leg, shape.reach)
         for name in mechanism.sole:
-            low = call(minimum, low, call(height_of_sole, trunk, leg, shape.part(f"sole_{name}")))
+            low = minimum(low, height_of_sole(trunk, leg, getattr(shape, f"sole_{name}")))
         return low
 
-    @unrolled(lambda trunk, *others: Lanes(trunk.count))
-    def lowest_joint(trunk: Traced, leg: Traced, shape: Traced, model: Traced) -> Traced:
+    @inline_llvm
+    def lowest_joint(trunk, leg, shape, model):  # type: ignore[no-untyped-def]
         """Return the height above the ground of the lowest joint."""
-        crank = call(moved, call(vector, leg.part("cosine"), leg.part("sine")), shape)
+        crank = moved(vector(leg.cosine, leg.sine), shape)
         places = {mechanism.centre: crank * 0.0, mechanism.pin: crank}
-        places |= {name: shape.part(f"pivot_{name}") for name in mechanism.pivots}
+        places |= {name: getattr(shape, f"pivot_{name}") for name in mechanism.pivots}
         for step in mechanism.steps:
-            constant = shape.part(f"point_{step.point}")
+            constant = getattr(shape, f"point_{step.point}")
             if not isinstance(step, Dyad):
-                places[step.point] = call(carry, places[step.origin], places[step.toward], constant)
+                places[step.point] = carry(places[step.origin], places[step.toward], constant)
                 continue
             ends = (places[step.first], places[step.second])
             if mechanism.is_corner(step):
-                places[step.point] = call(carry, *ends, constant.part("place"))
+                places[step.point] = carry(*ends, constant.place)
             else:
-                places[step.point] = call(meeting, constant, *ends)
-        lowest = call(clearance, trunk, leg, places[mechanism.centre], model)
+                places[step.point] = meeting(constant, *ends)
+        lowest = clearance(trunk, leg, places[mechanism.centre], model)
         for name in mechanism.points[1:]:
             if name not in mechanism.feet:
-                lowest = call(minimum, lowest, call(clearance, trunk, leg, places[name], model))
+                lowest = minimum(lowest, clearance(trunk, leg, places[name], model))
         return lowest
 
     @inline_llvm
     def check_joints(trunk, leg, shape, model):  # type: ignore[no-untyped-def]
         low = trunk.settings.limits[4]
-        if not (model.is_terrain or any_lane(bound((trunk, leg, shape)) < low + ROUNDING)):
-            return
-        is_low = where(lowest_joint((trunk, leg, shape, model)) < low, 1.0, 0.0)
-        if model.lanes_are_legs:
-            is_low = lane_sum(full_like(trunk, 0.0), is_low)
-        record_violation(trunk, is_low > 0.0, LOW_JOINT)
+
+        @when(model.is_terrain or any_lane(bound(trunk, leg, shape) < low + ROUNDING))
+        def _() -> None:
+            is_low = where(lowest_joint(trunk, leg, shape, model) < low, 1.0, 0.0)
+            if model.lanes_are_legs:
+                is_low = lane_sum(full_like(trunk, 0.0), is_low)
+            record_violation(trunk, is_low > 0.0, LOW_JOINT)
 
     return check_joints
 

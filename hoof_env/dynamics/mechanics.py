@@ -23,7 +23,19 @@ from hoof_env.dynamics.layout import MAX_STATE, Moving
 from hoof_env.dynamics.parts import FIXED, FREE, RAIL, SUSPENDED
 from hoof_env.gait import COS, OFFSET, SIN, SPEED
 from hoof_env.leg.profile import locate, look_up
-from hoof_env.simd import absolute, block_at, cross, dot, full_like, lane_sum, perpendicular, vector, where
+from hoof_env.simd import (
+    absolute,
+    block_at,
+    cond,
+    cross,
+    dot,
+    full_like,
+    lane_sum,
+    loop,
+    perpendicular,
+    vector,
+    where,
+)
 from hoof_env.simd.compile import inline_llvm, inline_source
 from hoof_env.simd.math import clip, cos_sin
 
@@ -45,9 +57,9 @@ def evaluate(trunk, legs, leg_count, model, elapsed):  # type: ignore[no-untyped
     if model.kind != FIXED:
         clear_trunk(trunk, model.kind)
     # a loop of its own: the addresses of all look-ups are known before the first waits for memory
-    for i in range(leg_count):
+    for i in loop(leg_count):
         find_crank(block_at(legs, i), model)
-    for i in range(leg_count):
+    for i in loop(leg_count):
         leg = block_at(legs, i)
         look_up_functions(trunk, leg, model)
         place_frame(trunk, leg, model.form.harmonics, elapsed)
@@ -55,7 +67,7 @@ def evaluate(trunk, legs, leg_count, model, elapsed):  # type: ignore[no-untyped
             gather_leg(trunk, leg, model.kind, model.lanes_are_legs)
     if model.kind != FIXED:
         move_trunk(trunk, model.kind)
-    for i in range(leg_count):
+    for i in loop(leg_count):
         leg = block_at(legs, i)
         meet_ground(trunk, leg, model)
         set_up_crank(trunk, leg, model.motors, elapsed)
@@ -63,7 +75,7 @@ def evaluate(trunk, legs, leg_count, model, elapsed):  # type: ignore[no-untyped
             load_trunk(trunk, leg, model.kind, model.motors, model.lanes_are_legs)
     if model.kind != FIXED:
         accelerate_trunk(trunk, model.kind)
-    for i in range(leg_count):
+    for i in loop(leg_count):
         accelerate_crank(trunk, block_at(legs, i), model.motors)
 
 
@@ -167,10 +179,15 @@ def gait_parameter_at(leg, k, elapsed):  # type: ignore[no-untyped-def]
     value = leg.state.gait[k]
     rate = leg.state.gait_rate[k]
     acceleration = leg.gait_acceleration[k]
-    if elapsed != 0.0:
-        value = value + elapsed * (rate + 0.5 * elapsed * acceleration)
-        rate = rate + elapsed * acceleration
-    return value, rate, acceleration
+
+
+    def moved():  # type: ignore[no-untyped-def]
+        return (
+            value + elapsed * (rate + 0.5 * elapsed * acceleration),
+            rate + elapsed * acceleration,
+        )
+
+    return (*cond(elapsed != 0.0, moved, (value, rate)), acceleration)
 
 
 @inline_llvm
@@ -231,7 +248,7 @@ def gather_legs(trunk, legs, leg_count, model):  # type: ignore[no-untyped-def]
     """Compute the legs' functions and frames at the present state, and their sums about the trunk's centre of
     mass (E6): what the momentum of all bodies needs, without forces."""
     clear_trunk(trunk, model.kind)
-    for i in range(leg_count):
+    for i in loop(leg_count):
         leg = block_at(legs, i)
         find_crank(leg, model)
         look_up_functions(trunk, leg, model)

@@ -23,7 +23,7 @@ from numpy.typing import ArrayLike
 
 from hoof_env.dynamics.mechanics import add
 from hoof_env.errors import Floats
-from hoof_env.simd import absolute, block_at, dot, maximum, minimum, perpendicular, sqrt, where
+from hoof_env.simd import absolute, block_at, dot, loop, maximum, minimum, perpendicular, sqrt, where
 from hoof_env.simd.compile import inline_llvm
 
 REVOLUTION = 2 * math.pi
@@ -75,7 +75,7 @@ def keep_account(trunk, legs, leg_count, model, account, weight):  # type: ignor
     damper = trunk.settings.damper * (velocity.imag * velocity.imag)
     account.drag_loss = account.drag_loss + weight * drag
     account.damper_loss = account.damper_loss + weight * damper
-    for i in range(leg_count):
+    for i in loop(leg_count):
         leg = block_at(legs, i)
         find_drives(trunk, leg)
         toe = leg.toe.penetration_rate

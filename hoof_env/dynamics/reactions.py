@@ -15,8 +15,6 @@ from __future__ import annotations
 from collections.abc import Iterable
 from typing import Annotated, Any, NamedTuple
 
-from numba.core import types
-
 from hoof_env.dynamics.hoof import force_of
 from hoof_env.dynamics.leg_constants import PAPER_STRUCTURE, Structure
 from hoof_env.leg.closed_form import carry, meet, meet_acceleration, meet_rate
@@ -24,7 +22,7 @@ from hoof_env.leg.mechanism import FRAME, Dyad, Mechanism
 from hoof_env.simd import cross, full_like, perpendicular, vector, where
 from hoof_env.simd.compile import inline_llvm
 from hoof_env.simd.layout import Block, Layout, Row, Size
-from hoof_env.simd.unrolled import Traced, call, store, unrolled
+from hoof_env.simd.values import Plane
 
 JOINT_ROWS = Size("joint_rows", 2 * len(PAPER_STRUCTURE.mechanism.joints))
 WELDS = Size("welds", len(PAPER_STRUCTURE.mechanism.welds))
@@ -139,23 +137,23 @@ def hinge_force(hinge, first, second, inverse, turn_one, turn_two):  # type: ign
     return (inverse * turn_one) * two + (inverse * turn_two) * one
 
 
-Loads = dict[str, Traced]
+Loads = dict[str, Any]
 """Forces by the names of the points at which they act."""
 
 
-def _add(loads: Loads, point: str, force: Traced) -> None:
+def _add(loads: Loads, point: str, force: Any) -> None:
     loads[point] = loads[point] + force if point in loads else force
 
 
 class _Statics:
     """Forces of one leg as they become known: `pins` are those on a body in a pin, by body and point."""
 
-    def __init__(self, structure: Structure, constants: Traced, points: dict[str, Traced]) -> None:
+    def __init__(self, structure: Structure, constants: Any, points: dict[str, Any]) -> None:
         self.structure = structure
         self.mechanism = structure.mechanism
         self.constants = constants
         self.points = points
-        self.pins: dict[tuple[int, str], Traced] = {}
+        self.pins: dict[tuple[int, str], Any] = {}
         self.ground: dict[int, Loads] = {}
 
     def rest(self, bodies: Iterable[int], unknown: Iterable[str]) -> Loads:
@@ -166,7 +164,7 @@ class _Statics:
             body = self.mechanism.bodies[i]
             loads_of = solid_loads if body.name in self.structure.off_centre else rod_loads
             ends = (self.points[body.tail], self.points[body.head])
-            loads = call(loads_of, self.constants.part(f"body_{body.name}"), *ends).items()
+            loads = loads_of(getattr(self.constants, f"body_{body.name}"), *ends)
             for point, force in zip((body.tail, body.head), loads, strict=True):
                 _add(rest, point, force)
             for point, force in self.ground.get(i, {}).items():
@@ -176,17 +174,17 @@ class _Statics:
                     _add(rest, point, -self.pin(i, point))
         return rest
 
-    def pin(self, body: int, point: str) -> Traced:
+    def pin(self, body: int, point: str) -> Any:
         """Return the force on a body in a pin, if need be from those on all others there."""
         if (body, point) not in self.pins:
             others = [self.pins[other, point] for other in self.mechanism.at(point) if other != body]
             self.pins[body, point] = -_sum(others)
         return self.pins[body, point]
 
-    def turn(self, rest: Loads, about: str) -> Traced:
+    def turn(self, rest: Loads, about: str) -> Any:
         """Return the moment of forces about a point."""
         arms = [point for point in rest if point != about]
-        return _sum([call(moment, self.points[p], self.points[about], rest[p]) for p in arms])
+        return _sum([moment(self.points[p], self.points[about], rest[p]) for p in arms])
 
     def solve_group(self, dyad: Dyad, one: tuple[int, ...], two: tuple[int, ...]) -> None:
         """Find the pins of the two parts that meet in a dyad's point."""
@@ -198,11 +196,11 @@ class _Statics:
                 _add(rest_two, point, self.pins[body, point])
         corners = (self.points[point], self.points[first], self.points[second])
         if self.mechanism.is_corner(dyad):
-            inverse = self.constants.part(f"point_{point}").part("inverse")
+            inverse = getattr(self.constants, f"point_{point}").inverse
         else:
-            inverse = call(inverse_area, *corners)
+            inverse = inverse_area(*corners)
         turns = (self.turn(rest_one, first), self.turn(rest_two, second))
-        force = call(hinge_force, *corners, inverse, *turns)
+        force = hinge_force(*corners, inverse, *turns)
         rest = _sum(list(rest_two.values()))
         on_two = -force
         for body in self.mechanism.at(point):
@@ -234,12 +232,12 @@ class _Statics:
         found = [weld for weld in self.mechanism.welds if weld[0] in part]
         return sorted(found, key=lambda weld: pairs.index({*weld}))
 
-    def lock(self, weld: tuple[int, int]) -> Traced:
+    def lock(self, weld: tuple[int, int]) -> Any:
         """Return the moment on the first body of a weld by the second."""
         (point,) = (j.point for j in self.mechanism.joints if {j.i, j.j} == {*weld})
         return self.turn(self.rest([weld[0]], {point}), point)
 
-    def joint(self, number: int) -> Traced:
+    def joint(self, number: int) -> Any:
         """Return the force on the first body of a joint by the second: of all bodies on its side of the
         joint."""
         cut = self.mechanism.joints[number]
@@ -262,39 +260,39 @@ def _side(mechanism: Mechanism, number: int, start: int) -> list[int]:
     return side
 
 
-def _sum(forces: list[Traced]) -> Traced:
+def _sum(forces: list[Any]) -> Any:
     total = forces[0]
     for force in forces[1:]:
         total = total + force
     return total
 
 
-def _trace_points(mechanism: Mechanism, g: Traced, motion: Traced) -> dict[str, Traced]:
+def _trace_points(mechanism: Mechanism, g: Any, motion: Any) -> dict[str, Any]:
     """Write the motion of all points."""
     frame = (
-        motion.part("frame_turn"),
-        motion.part("beta_rate"),
-        motion.part("beta_acc"),
-        motion.part("lift"),
+        motion.frame_turn,
+        motion.beta_rate,
+        motion.beta_acc,
+        motion.lift,
     )
     frame_turn, beta_rate, beta_acc, lift = frame
-    points = {mechanism.centre: call(resting, g, lift)}
+    points = {mechanism.centre: resting(g, lift)}
     for name in mechanism.pivots:
-        points[name] = call(turning, g.part(f"pivot_{name}"), *frame)
-    rate = call(crank_rate, g, beta_rate, motion.part("theta_rate"))
-    acc = call(crank_rate, g, beta_acc, motion.part("theta_acc"))
-    arm = call(crank_pin, g, motion.part("crank_turn"))
-    points[mechanism.pin] = call(turning, arm, frame_turn, rate, acc, lift)
+        points[name] = turning(getattr(g, f"pivot_{name}"), *frame)
+    rate = crank_rate(g, beta_rate, motion.theta_rate)
+    acc = crank_rate(g, beta_acc, motion.theta_acc)
+    arm = crank_pin(g, motion.crank_turn)
+    points[mechanism.pin] = turning(arm, frame_turn, rate, acc, lift)
     for step in mechanism.steps:
-        constant = g.part(f"point_{step.point}")
+        constant = getattr(g, f"point_{step.point}")
         if not isinstance(step, Dyad):
-            points[step.point] = call(carried_point, constant, points[step.origin], points[step.toward])
+            points[step.point] = carried_point(constant, points[step.origin], points[step.toward])
             continue
         ends = (points[step.first], points[step.second])
         if mechanism.is_corner(step):
-            points[step.point] = call(carried_point, constant.part("place"), *ends)
+            points[step.point] = carried_point(constant.place, *ends)
         else:
-            points[step.point] = call(meeting_point, constant, *ends)
+            points[step.point] = meeting_point(constant, *ends)
     return points
 
 
@@ -325,16 +323,25 @@ def force_on_second(g, motion):  # type: ignore[no-untyped-def]
     return where(g.toe_is_first > 0.5, motion.heel_force, motion.toe_force)
 
 
+def store(rows: Any, values: list[Any]) -> None:
+    """Write numbers, or planar vectors, to rows one after the other."""
+    at = 0
+    for each in values:
+        for part in (each.a, each.b) if isinstance(each, Plane) else (each,):
+            rows[at] = part
+            at += 1
+
+
 def reactions_of(structure: Structure) -> Any:
     """Return the kernel that keeps the `Reactions` of one leg with a structure."""
     mechanism = structure.mechanism
 
-    @unrolled(lambda *kinds: types.void)
-    def solve(g: Traced, motion: Traced, reactions: Traced) -> None:
+    @inline_llvm
+    def solve(g: Any, motion: Any, reactions: Any) -> None:
         statics = _Statics(structure, g, _trace_points(mechanism, g, motion))
-        forces = [call(force_on_first, g, motion), call(force_on_second, g, motion)]
+        forces = [force_on_first(g, motion), force_on_second(g, motion)]
         if len(mechanism.feet) == 1:
-            forces = [motion.part("toe_force")]
+            forces = [motion.toe_force]
         for foot, force in zip(mechanism.feet, forces, strict=True):
             _add(statics.ground.setdefault(mechanism.body_of_foot(foot), {}), foot, force)
         for group in reversed(mechanism.groups):
@@ -346,10 +353,10 @@ def reactions_of(structure: Structure) -> Any:
         for pivot in mechanism.pivots:
             held = [statics.pin(body, pivot) for body in mechanism.at(pivot) if body != FRAME]
             if held:
-                hip = hip + call(moment, statics.points[pivot], statics.points[mechanism.centre], _sum(held))
+                hip = hip + moment(statics.points[pivot], statics.points[mechanism.centre], _sum(held))
         joints = [statics.joint(number) for number in range(len(mechanism.joints))]
         locks = [statics.lock(weld) for weld in mechanism.welds]
-        store(reactions, 0, [*joints, *locks, driver, hip])
+        store(reactions, [*joints, *locks, driver, hip])
 
     @inline_llvm
     def react(trunk, leg, constants, reactions):  # type: ignore[no-untyped-def]
@@ -367,6 +374,6 @@ def reactions_of(structure: Structure) -> Any:
             force_of(leg.toe),
             force_of(leg.heel),
         )
-        solve((constants, motion, reactions))
+        solve(constants, motion, reactions)
 
     return react

@@ -18,7 +18,7 @@ from hoof_env.dynamics.hoof import begin_springs, clear_springs, end_springs, mo
 from hoof_env.dynamics.mechanics import MOVING
 from hoof_env.dynamics.parts import FIXED, FREE
 from hoof_env.gait import INNER, SPEED
-from hoof_env.simd import block_at, where
+from hoof_env.simd import block_at, loop, when, where
 from hoof_env.simd.compile import inline_llvm
 from hoof_env.simd.math import clip
 
@@ -55,7 +55,7 @@ def begin_step(trunk, legs, leg_count, model):  # type: ignore[no-untyped-def]
         if model.averages:
             for k in range(MOVING):
                 trunk.mean_rates[k] = 0.0
-    for i in range(leg_count):
+    for i in loop(leg_count):
         leg = block_at(legs, i)
         filter_accelerations(leg, model.form.gait, model.settings)
         leg.theta = leg.state.crank_angle
@@ -71,15 +71,18 @@ def begin_step(trunk, legs, leg_count, model):  # type: ignore[no-untyped-def]
 def weigh_stage(trunk, legs, leg_count, model, weight):  # type: ignore[no-untyped-def]
     """Add the derivatives at the present stage to their means, if the scheme averages: otherwise the last
     stage's derivatives are those of the step."""
-    if not model.averages or weight == 0.0:
+    if not model.averages:
         return
-    if model.kind != FIXED:
-        advance_rows(model.kind, trunk.mean_rates, trunk.mean_rates, weight, trunk.rates)
-    for i in range(leg_count):
-        leg = block_at(legs, i)
-        leg.mean_theta_rate = leg.mean_theta_rate + weight * leg.theta_rate
-        leg.mean_theta_acceleration = leg.mean_theta_acceleration + weight * leg.theta_acceleration
-        weigh_springs(leg, model.form.springs, weight)
+
+    @when(weight != 0.0)
+    def _() -> None:
+        if model.kind != FIXED:
+            advance_rows(model.kind, trunk.mean_rates, trunk.mean_rates, weight, trunk.rates)
+        for i in loop(leg_count):
+            leg = block_at(legs, i)
+            leg.mean_theta_rate = leg.mean_theta_rate + weight * leg.theta_rate
+            leg.mean_theta_acceleration = leg.mean_theta_acceleration + weight * leg.theta_acceleration
+            weigh_springs(leg, model.form.springs, weight)
 
 
 @inline_llvm
@@ -100,7 +103,7 @@ def next_stage(trunk, legs, leg_count, model, elapsed):  # type: ignore[no-untyp
     """Move `elapsed` [s] from the step's start with the derivatives of the present stage."""
     if model.kind != FIXED:
         advance_rows(model.kind, trunk.stage, trunk.state.moving, elapsed, trunk.rates)
-    for i in range(leg_count):
+    for i in loop(leg_count):
         leg = block_at(legs, i)
         is_motor = leg.settings.is_motor > 0.0
         # a prescribed crank is where its filter says at each stage, not where the scheme would bring it
@@ -127,7 +130,7 @@ def end_step(trunk, legs, leg_count, model, h):  # type: ignore[no-untyped-def]
         rates = trunk.mean_rates if model.averages else trunk.rates
         advance_rows(model.kind, trunk.state.moving, trunk.state.moving, h, rates)
     trunk.state.time = trunk.state.time + h
-    for i in range(leg_count):
+    for i in loop(leg_count):
         leg = block_at(legs, i)
         is_motor = leg.settings.is_motor > 0.0
         angle, spin = prescribed(leg, h)

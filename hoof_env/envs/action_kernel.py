@@ -7,10 +7,11 @@ from typing import Any
 
 from hoof_env.envs.addresses import AT
 from hoof_env.envs.observation_kernel import inputs_reader
-from hoof_env.simd import full_like, read, rows, write
+from hoof_env.simd import full_like, loop, read, rows, write
 from hoof_env.simd.compile import inline_llvm, inline_source
 from hoof_env.simd.math import clip
 from hoof_env.simd.memory import singles_at
+from hoof_env.simd.values import Index
 from hoof_env.simd.user_functions import inline_foreign, number_of, numbers_of
 from hoof_env.tasks.body import BodyKernels
 from hoof_env.tasks.episode import ACTIONS, Memories
@@ -45,12 +46,14 @@ def _reader(k: int, size: int, scalar: bool) -> Callable[..., Any]:
 
     @inline_llvm
     def read_number(like, acted, n):  # type: ignore[no-untyped-def]
-        return (clip(float(acted[n * size + k]), 1.0), *rest(like, acted, n))
+        return (clip(acted[n * size + k], 1.0), *rest(like, acted, n))
 
     return read_number if scalar else read_lanes
 
 
-def converter(action_map: ActionMap | None, layouts: Memories, body: BodyKernels) -> Callable[..., Any]:
+def converter(
+    action_map: ActionMap | None, layouts: Memories, body: BodyKernels, model: Any
+) -> Callable[..., Any]:
     """Return a part of kernels that writes the body's actions of row n and, with lanes, of its neighbours;
     `scratch` is room for as many numbers as the map has actions, for each lane."""
     if action_map is None:
@@ -66,7 +69,7 @@ def converter(action_map: ActionMap | None, layouts: Memories, body: BodyKernels
     all_of = numbers_of(action_map.title, of_body)
     write_all = _writer(0, of_body, number_of(action_map.title))
     read_all = _reader(0, given, action_map.scalar)
-    inputs_of = inputs_reader(layouts)
+    inputs_of = inputs_reader(layouts, model)
 
     @inline_source
     def convert(addresses, lanes, task, n, scratch):  # type: ignore[no-untyped-def]
@@ -79,7 +82,7 @@ def converter(action_map: ActionMap | None, layouts: Memories, body: BodyKernels
     @inline_source
     def convert_one_by_one(addresses, lanes, task, n, scratch):  # type: ignore[no-untyped-def]
         acted = singles_at(addresses[AT.acted])
-        for lane in range(lanes):
+        for lane in loop(Index(str(lanes))):
             row = n + lane
             like = rows(scratch, 1, None)
             actions = read_all(like, acted, row)

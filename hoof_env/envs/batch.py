@@ -13,7 +13,6 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
-from numba.core.errors import NumbaError
 from numpy.typing import NDArray
 
 from hoof_env.dynamics.parts import broken
@@ -154,7 +153,7 @@ class EpisodeBatch(BatchKernels, BatchChanges):
             return
         try:
             self._compile()
-        except (NumbaError, NotCompiledError) as error:
+        except NotCompiledError as error:
             raise compilation_error(task.id, error, MOVED) from error
 
     def _check_settings(self) -> None:

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from hoof_env.dynamics.advance import static_of
 from hoof_env.dynamics.engine import TrunkEngine
 from hoof_env.dynamics.form import engine_layout
 from hoof_env.envs.addresses import ADDRESSES, END
@@ -23,6 +24,33 @@ from hoof_env.simd.layout import views
 from hoof_env.tasks.observation import MIDDLE
 
 Floats = NDArray[np.float64]
+
+
+CHANGING = ("episode_steps", "substeps", "part_substeps")
+"""Whole numbers of a task's record that kernels read when they run."""
+
+
+def known_of(record: Any) -> tuple[tuple[str, Any], ...]:
+    """Return the fields of a task's record that kernels are made for: truths and whole numbers."""
+    kinds = record.dtype.fields
+    names = [name for name in kinds if kinds[name][0].base.kind in "ib" and name not in CHANGING]
+    values = [record[0][name] for name in names]
+    return tuple(
+        (name, tuple(value.tolist()) if value.shape else value.item())
+        for name, value in zip(names, values, strict=True)
+    )
+
+
+class Held(int):
+    """Address of an array, which it keeps alive."""
+
+    array: NDArray[Any]
+
+    @classmethod
+    def of(cls, array: NDArray[Any]) -> Held:
+        made = cls(array.ctypes.data)
+        made.array = array
+        return made
 
 
 class BatchKernels:
@@ -83,6 +111,10 @@ class BatchKernels:
         functions = [part for entry in (*self.entries, *self.true_entries) for part in functions_of(entry)]
         self.has_own_entries = bool(from_outside(functions))
         self.measurements = InfoLayout(self.engine.features, tuple(self.body.hips))
+        self.find()
+
+    def _choose(self) -> None:
+        """Find the kernels for what is known of the present records of engine and task."""
         self.kernels = k = step_kernels(
             self.task.terms,
             self.task.entries,
@@ -90,6 +122,8 @@ class BatchKernels:
             self.engine.features,
             self.body.kernels,
             self.task.action_map,
+            known_of(self.task_record),
+            static_of(self.engine.arrays[1]),
         )
         # Few environments, or the paper's solver, which works on the engine's memory between two kernels.
         runs_scalar = self.engine.runs_scalar or self.paper
@@ -100,7 +134,6 @@ class BatchKernels:
         )
         if self.paper:
             self.kernel = self._step_paper
-        self.find()
 
     def find(self) -> None:
         """Find the addresses of the arrays, after any of them was replaced."""
@@ -120,7 +153,8 @@ class BatchKernels:
         self.addresses = ADDRESSES.of(*arrays, columns=range(self.engine.columns))
         # A block of columns for each thread; the paper's solver runs on one, with all of them.
         blocks = [range(self.engine.columns)] if self.paper else self.engine.blocks
-        self._blocks = [(ADDRESSES.of(*arrays, columns=block),) for block in blocks]
+        self._blocks = [(Held.of(ADDRESSES.of(*arrays, columns=block)),) for block in blocks]
+        self._choose()
 
     def check_mapped(self) -> None:
         """Check that a map of actions from outside gave numbers.
@@ -162,14 +196,17 @@ class BatchKernels:
 
     def compile_measured(self) -> None:
         """Compile or load the kernel of `measured`, which few use: making a batch leaves it out."""
-        self.kernels.observers.measure_one(self.addresses, np.zeros((len(self.names), 0)))
+        self._measure(np.zeros((len(self.names), 0)))
+
+    def _measure(self, out: Floats) -> None:
+        self.kernels.observers.measure_one(self.addresses.ctypes.data, out.ctypes.data, out.shape[1])
 
     def _run_idle(self, *kernels: Any) -> None:
         """Run kernels on no environment."""
         idle = self.addresses.copy()
         idle[END] = 0
         for run in kernels:
-            run(idle)
+            run(idle.ctypes.data)
 
     def direct_kernel(self) -> Any:
         """Return `kernel` without numba's dispatch by types, which takes a hundredth of a single step. It
@@ -177,10 +214,9 @@ class BatchKernels:
         if self.paper:
             return self.kernel
         # Not compiled yet in a process that unpickled the batch.
-        if not self.kernel.overloads:
+        if self.kernel.call is None:
             self._run_idle(self.kernel)
-        (compiled,) = self.kernel.overloads.values()
-        return compiled.entry_point
+        return self.kernel.call
 
     def _step_paper(self, addresses: NDArray[np.int64]) -> int:
         """Take a control step with the paper's solver between the kernels; return the code of a step."""
@@ -199,12 +235,12 @@ class BatchKernels:
             # The kernel measures all rows; only those under the present conditions are right.
             def measure(rows: NDArray[np.int64]) -> None:
                 measured = np.zeros_like(out)
-                self.kernels.observers.measure_one(self.addresses, measured)
+                self._measure(measured)
                 out[:, rows] = measured[:, rows]
 
             under_each(self, np.arange(self.num_envs), measure, for_kernels=True)
         else:
-            self.kernels.observers.measure_one(self.addresses, out)
+            self._measure(out)
         return dict(zip(names, out, strict=True))
 
     def alone(self, env: int) -> TrunkEngine:
@@ -233,4 +269,4 @@ class BatchKernels:
         data[:] = kept
         # NaN at the point of failure, with which a state would be refused
         self.episode_rows.x_before[envs] = self.engine.report["x"][envs]
-        self.observe_kernel(self.addresses)
+        self.observe_kernel(self.addresses.ctypes.data)

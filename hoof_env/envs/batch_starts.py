@@ -137,11 +137,11 @@ def start(
     groups = batch.addresses.copy()
     groups[BEGIN] = which.min() // LANES * LANES
     groups[END] = min(batch.engine.columns, (which.max() // LANES + 1) * LANES)
-    batch.observe_kernel(groups)
+    batch.observe_kernel(groups.ctypes.data)
     if batch.frames.size or batch.past_actions.size:
         fill_past(batch, which)
         # Again, with what the first one saw as all that was ever seen.
-        batch.observe_kernel(groups)
+        batch.observe_kernel(groups.ctypes.data)
     return drawn
 
 

@@ -9,7 +9,7 @@ from typing import Any
 
 from hoof_env.dynamics.advance import LANES
 from hoof_env.envs.batch import EpisodeBatch
-from hoof_env.simd.cache import COMPILED, given_folder
+from hoof_env.simd.compile import COMPILED, folder
 from hoof_env.tasks.registry import TASKS
 
 
@@ -48,7 +48,7 @@ def compile_kernels(say: Callable[[str], None]) -> list[str]:
         make()
         if new := COMPILED[count:]:
             say(f"{name}: {time.monotonic() - start:.1f} s for {', '.join(new)}")
-    folder = given_folder() or "numba's own folders; NUMBA_CACHE_DIR names another"
+    place = folder()
     compiled = COMPILED[first:]
-    say(f"{f'{len(compiled)} kernels compiled' if compiled else 'nothing to compile'}; they are in {folder}")
+    say(f"{f'{len(compiled)} kernels compiled' if compiled else 'nothing to compile'}; they are in {place}")
     return compiled

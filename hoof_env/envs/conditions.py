@@ -66,10 +66,10 @@ OF_BATCH = (
 OF_ENGINE = ("trunk", "ground", "limbs", "terrain", "substeps", "step_limits", "_model")
 """Attributes of a batch, and of its engine, that follow from these settings."""
 
-KERNEL = "kernel"
+KERNEL = "kernel mark"
 """Name of the part of conditions that is one object where kernels give the same results."""
 
-PLACES = ("addresses", "_blocks")
+PLACES = ("addresses", "_blocks", "kernels", "kernel", "observe_kernel")
 """Attributes that hold addresses of arrays, which a copy has to find again."""
 
 

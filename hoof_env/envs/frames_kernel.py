@@ -11,6 +11,7 @@ from collections.abc import Callable
 from typing import Any
 
 from hoof_env.envs.addresses import AT, memories
+from hoof_env.simd import loop, whole
 from hoof_env.simd.compile import inline_llvm, inline_source
 from hoof_env.simd.math import clip
 from hoof_env.simd.memory import singles_at
@@ -20,7 +21,7 @@ from hoof_env.tasks.episode import Memories
 @inline_llvm
 def move_on(kept, first, last, size):  # type: ignore[no-untyped-def]
     """Move blocks of `size` numbers from `first` on one place on; the block at `last` is lost."""
-    for k in range(last * size - 1, first * size - 1, -1):
+    for k in range(last * size - 1, first * size - 1, -1):  # known when the kernel is traced
         kept[k + size] = kept[k]
 
 
@@ -37,17 +38,19 @@ def remember(addresses, lanes, task, n):  # type: ignore[no-untyped-def]
     """Make room for the frame of this step and keep its action, in row n and its neighbours."""
     if task.frames > 0:
         row_size = task.frames * task.frame_size
-        for row in range(n, n + lanes):
+        for lane in range(lanes):
+            row = n + lane
             frames = singles_at(addresses[AT.frames] + 4 * row * row_size)
             move_on(frames, task.first_frame, task.frames - 1, task.frame_size)
     if task.keeps_actions:
         row_size = task.kept_actions * task.action_size
         asked = singles_at(addresses[AT.actions])
-        for row in range(n, n + lanes):
+        for lane in range(lanes):
+            row = n + lane
             kept = singles_at(addresses[AT.past_actions] + 4 * row * row_size)
             move_on(kept, 0, task.kept_actions - 1, task.action_size)
             for k in range(task.action_size):
-                kept[k] = clip(float(asked[row * task.action_size + k]), 1.0)
+                kept[k] = clip(asked[row * task.action_size + k], 1.0)
 
 
 def delayed_actions(layouts: Memories) -> Callable[..., Any]:
@@ -60,9 +63,10 @@ def delayed_actions(layouts: Memories) -> Callable[..., Any]:
             size = task.action_size
             kept = singles_at(addresses[AT.past_actions])
             acted = singles_at(addresses[AT.acted])
-            for row in range(n, n + lanes):
+            for lane in range(lanes):
+                row = n + lane
                 _, _, episode = memories(addresses, 0, layouts, row)
-                place = row * task.kept_actions + int(episode.action_delay)
+                place = row * task.kept_actions + whole(episode.action_delay)
                 copied(acted, row * size, kept, place * size, size)
 
     return put_action
@@ -77,14 +81,16 @@ def publisher(layouts: Memories) -> Callable[..., Any]:
         if task.frames > 0:
             frames = singles_at(addresses[AT.frames])
             size = task.frame_size
-            for row in range(n, n + lanes):
+            for lane in range(lanes):
+                row = n + lane
                 _, _, episode = memories(addresses, 0, layouts, row)
-                place = row * task.frames + task.first_frame + int(episode.observation_delay)
+                place = row * task.frames + task.first_frame + whole(episode.observation_delay)
                 copied(observations, row * task.observation_size, frames, place * size, task.history * size)
         if task.last_actions > 0:
             kept = singles_at(addresses[AT.past_actions])
             size = task.action_size
-            for row in range(n, n + lanes):
+            for lane in range(lanes):
+                row = n + lane
                 to = row * task.observation_size + task.history * task.frame_size
                 copied(observations, to, kept, row * task.kept_actions * size, task.last_actions * size)
 

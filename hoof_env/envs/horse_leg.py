@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from hoof_env.dynamics.parts import broken
 from hoof_env.envs.arguments import EnvArguments, takes
+from hoof_env.envs.batch_kernels import Held
 from hoof_env.envs.base import LegBase, array_of, generator_of
 from hoof_env.envs.batch_reports import ending_of
 from hoof_env.envs.batch_starts import check_options
@@ -75,7 +76,7 @@ class HorseLegEnv(LegBase, gym.Env[NDArray[np.float32], NDArray[np.float32]]):
         self._views: tuple[Any, ...] = (
             batch.actions[0].data,
             batch.direct_kernel(),
-            batch.addresses,
+            Held.of(batch.addresses),
             bool(batch.drawn_names),
             paid,
             batch.episode_rows.terms[:, 0],

@@ -2,26 +2,21 @@
 
 from __future__ import annotations
 
-import operator
 from collections.abc import Callable
-from functools import lru_cache, partial
 from typing import Any
-
-from numba.core import types
 
 from hoof_env.dynamics.advance import LANES, MODEL
 from hoof_env.dynamics.layout import Features
 from hoof_env.envs.addresses import AT, BEGIN, END, memories
 from hoof_env.envs.frames_kernel import publisher
-from hoof_env.simd import full_like, rows, set_lane, where, write
-from hoof_env.simd.compile import inline_llvm, inline_source, kernel
-from hoof_env.simd.kept import Kept, Kernels
+from hoof_env.simd import full_like, loop, rows, set_lane, when, where, write
+from hoof_env.simd.compile import Kernel, inline_llvm, inline_source
+from hoof_env.simd.kept import Kernels
 from hoof_env.simd.math import clip, tanh
 from hoof_env.simd.memory import address, doubles, matrix_at, offset, record_at, singles_at
 from hoof_env.simd.noise import uniform
-from hoof_env.simd.reach import fingerprint
-from hoof_env.simd.unrolled import Traced, call, unrolled, when
-from hoof_env.simd.user_functions import inline_foreign, number_of
+from hoof_env.simd.user_functions import inline_foreign, number_of, scalar_part
+from hoof_env.simd.values import Index
 from hoof_env.tasks.body import BodyKernels
 from hoof_env.tasks.episode import Memories, memories_of, task_type
 from hoof_env.tasks.observation import Entry, ObservationInputs
@@ -66,29 +61,22 @@ def _put_all(entries: tuple[Entry, ...], layouts: Memories, scaled: bool, consta
         for entry, slot in zip(entries, slots_of(entries)[0], strict=True)
     ]
 
-    # numba cannot loop over functions.
-    @unrolled(lambda *kinds: types.void)
-    def put_all(*arguments: Traced) -> None:
+    def put_all(*arguments):  # type: ignore[no-untyped-def]
         for put in puts:
             put(*arguments)
 
     return put_all
 
 
-shared_part = lru_cache(maxsize=256)(inline_llvm)
-"""Part of kernels made of a function of this package, compiled once for all tasks."""
-
-
 def _put(entry: Entry, slot: int, scaled: bool) -> Callable[..., Any]:
-    """Return a function of an unrolled kernel that puts one entry of this package into its slot."""
-    measure = shared_part(entry.measure)
-    scale = shared_part(entry.scale.apply) if scaled and entry.scale.apply is not None else None
+    """Return a part of kernels that puts one entry of this package into its slot."""
+    measure = inline_llvm(entry.measure)
+    scale = inline_llvm(entry.scale.apply) if scaled and entry.scale.apply is not None else None
 
-    def put(addresses: Traced, lanes: Traced, scene: Traced, numbers: Traced, n: Traced) -> None:
-        column = scene.part("task").part("observation_columns")[slot]
-        with when(call(operator.ge, column, 0)):
-            number = call(measure, scene)
-            numbers[slot] = number if scale is None else call(scale, number, scene)
+    def put(addresses, lanes, scene, numbers, n):  # type: ignore[no-untyped-def]
+        if scene.task.observation_columns[slot] >= 0:
+            number = measure(scene)
+            numbers[slot] = number if scale is None else scale(number, scene)
 
     return put
 
@@ -98,10 +86,11 @@ def _put_foreign(
 ) -> Callable[..., Any]:
     """Return the same for an entry from outside this package, with checks that its functions return numbers;
     lane by lane if they take no lanes."""
-    measure = inline_foreign(entry.measure)
+    adapt = scalar_part if entry.scalar else (lambda function: function)
+    measure = inline_foreign(adapt(entry.measure))
     given = constants_reader(tuple(constants.index(one.name) for one in entry.constants))
     apply = entry.scale.apply
-    scale = inline_foreign(apply) if scaled and apply is not None else inline_llvm(lambda x, scene: x)
+    scale = inline_foreign(adapt(apply)) if scaled and apply is not None else inline_llvm(lambda x, scene: x)
     number = number_of(entry.title)
     scaled_number = number_of(f"the scale of {entry.title}")
 
@@ -114,7 +103,7 @@ def _put_foreign(
     @inline_llvm
     def put_one_by_one(addresses, lanes, scene, numbers, n):  # type: ignore[no-untyped-def]
         if scene.task.observation_columns[slot] >= 0:
-            for lane in range(lanes):
+            for lane in loop(Index(str(lanes))):
                 trunk, leg, episode = memories(addresses, 0, layouts, n + lane)
                 own = ObservationInputs(
                     trunk, leg, episode, scene.task, scene.ground, scene.ground_origin, scene.ground_per_metre
@@ -122,7 +111,7 @@ def _put_foreign(
                 measured = number(measure(own, *given(own.task)))
                 set_lane(numbers, slot, lane, scaled_number(scale(measured, own)))
 
-    return partial(call, put_one_by_one if entry.scalar else put_entry)
+    return put_one_by_one if entry.scalar else put_entry
 
 
 class Observers(Kernels):
@@ -157,13 +146,16 @@ def from_outside(functions: list[Callable[..., Any]]) -> list[Callable[..., Any]
     return [function for function in functions if not str(function.__module__).startswith("hoof_env.")]
 
 
-_OBSERVERS = Kept()
-
-
 def observers_of(
-    entries: tuple[Entry, ...], terms: int, features: Features, body: BodyKernels, own: Own
+    entries: tuple[Entry, ...],
+    terms: int,
+    features: Features,
+    body: BodyKernels,
+    own: Own,
+    task: tuple[tuple[str, Any], ...],
+    model: tuple[tuple[str, Any], ...],
 ) -> Observers:
-    """Return the kernels of the observation for some entries; tasks with the same ones share them.
+    """Return the kernels of the observation for some entries.
 
     Args:
         entries: entries that can be observed.
@@ -171,65 +163,54 @@ def observers_of(
         features: features of the engine.
         body: the body's own parts.
         own: what terms and entries declare.
+        task, model: what is known of the records of task and engine when kernels are traced.
     """
-    foreign = from_outside([part for entry in entries for part in functions_of(entry)])
-    # Helpers and constants of a user's function may have changed since, as in a notebook.
-    key = (entries, terms, features, body, own, fingerprint(*foreign))
-    kernels: Observers = _OBSERVERS.get(key, lambda: _made(*key[:-1]), bool(foreign))
-    return kernels
-
-
-def _made(
-    entries: tuple[Entry, ...], terms: int, features: Features, body: BodyKernels, own: Own
-) -> Observers:
-    """Make the kernels; numba compiles them when they are called."""
     layouts = memories_of(body.episode, terms, features, body.legs, own)
     slots = slots_of(entries)[2]
     room = room_of(slots)
     task_record = task_type(terms, slots, layouts.gait, (*body.task_fields, *own.fields))
-    flags = [(entry.scalar, entry.scale.saturates) for entry in entries], (terms, features, body.legs)
-    parts = [part for entry in entries for part in functions_of(entry)]
-    identity = fingerprint(*parts, flags, layouts.episode.names, str(task_record.descr))
-    identity += f" {own}" if any(own) else ""
     put_measured = _put_all(entries, layouts, False, own.constants)
-    inputs_of = inputs_reader(layouts)
+    inputs_of = inputs_reader(layouts, model)
     put_scaled = _put_all(entries, layouts, True, own.constants)
     observe = _observe(slots_of(entries)[1:], layouts, inputs_of, put_scaled)
-    task_at = record_at(task_record)
+    task_at = record_at(task_record, task)
 
-    def observer(name: str, lanes: int) -> Callable[..., None]:
+    def observer(name: str, lanes: int) -> Kernel:
         def observe_all(addresses):  # type: ignore[no-untyped-def]
-            task = task_at(addresses[AT.task])[0]
+            task = task_at(addresses[AT.task])
             memory = doubles(2 * room * lanes)
-            for n in range(addresses[BEGIN], addresses[END], lanes):
+            for n in loop(addresses[BEGIN], addresses[END], lanes):
                 observe(addresses, lanes, task, n, memory, 0)
 
         observe_all.__name__ = name
-        return observe_all
+        return Kernel(observe_all, ["addresses"])
 
-    def measure_one(addresses, out):  # type: ignore[no-untyped-def]
-        task = task_at(addresses[AT.task])[0]
+    def measure_one(addresses, out, size):  # type: ignore[no-untyped-def]
+        task = task_at(addresses[AT.task])
         numbers = rows(doubles(slots), 1, None)
-        for n in range(out.shape[1]):
-            put_measured((addresses, 1, inputs_of(addresses, 1, task, n), numbers, n))
+        for n in loop(size):
+            put_measured(addresses, 1, inputs_of(addresses, 1, task, n), numbers, n)
             for slot in range(slots):
                 column = task.observation_columns[slot]
                 if column >= 0:
-                    write(numbers[slot], address(out), column * out.shape[1] + n, 1)
+                    write(numbers[slot], out, column * size + n, 1)
 
-    functions = (observer("observe_one", 1), observer("observe_batch", LANES), measure_one)
-    kernels = {function.__name__: kernel(function, identity) for function in functions}
-    return Observers(observe=observe, **kernels)
+    return Observers(
+        observe=observe,
+        observe_one=observer("observe_one", 1),
+        observe_batch=observer("observe_batch", LANES),
+        measure_one=Kernel(measure_one, ["addresses", "pointer", "index"]),
+    )
 
 
-def inputs_reader(layouts: Memories) -> Callable[..., Any]:
+def inputs_reader(layouts: Memories, known: tuple[tuple[str, Any], ...]) -> Callable[..., Any]:
     """Return a part of kernels that makes the inputs of entries in row n and, with lanes, its neighbours."""
-    model_at = record_at(MODEL)
+    model_at = record_at(MODEL, known)
 
     @inline_source
     def inputs_of(addresses, lanes, task, n):  # type: ignore[no-untyped-def]
         trunk, leg, episode = memories(addresses, lanes, layouts, n)
-        model = model_at(addresses[AT.model])[0]
+        model = model_at(addresses[AT.model])
         ground = matrix_at(addresses, AT.ground)
         return ObservationInputs(
             trunk, leg, episode, task, ground, model.ground_origin, model.ground_per_metre
@@ -248,7 +229,9 @@ def _add_noise(slots: int, layouts: Memories) -> Callable[..., Any]:
         now = full_like(numbers, episode.steps + ahead)
         strength = full_like(numbers, episode.strength)
         for slot in range(slots):
-            if task.noise[slot] + task.bias[slot] > 0.0:
+
+            @when(task.noise[slot] + task.bias[slot] > 0.0)
+            def _() -> None:
                 # A bias is the noise of a time that never comes.
                 error = task.noise[slot] * uniform(key, now, slot)
                 error = error + task.bias[slot] * uniform(key, -1.0, slot)
@@ -315,7 +298,7 @@ def _observe(
         # Entries that are not observed, and the slots that fill up vectors, also go through tanh.
         for slot in range(slots):
             numbers[slot] = 0.0
-        put_scaled((addresses, lanes, inputs_of(addresses, lanes, task, n), numbers, n))
+        put_scaled(addresses, lanes, inputs_of(addresses, lanes, task, n), numbers, n)
         if task.has_privileged and within == 0:
             write_true(addresses, lanes, task, n, numbers, offset(memory, room * lanes))
         if task.is_noisy:

@@ -3,18 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from functools import partial
 from typing import Any
 
 from hoof_env.dynamics.limits import has_moved
 from hoof_env.envs.addresses import AT, memories
-from hoof_env.envs.observation_kernel import constants_reader, from_outside, shared_part
+from hoof_env.envs.observation_kernel import constants_reader, from_outside
 from hoof_env.envs.outcome import outcome_of_one
-from hoof_env.simd import columns, where
+from hoof_env.simd import columns, loop, where
 from hoof_env.simd.compile import inline_llvm
 from hoof_env.simd.memory import COLUMNS, doubles_at
-from hoof_env.simd.unrolled import Traced, call, unrolled
-from hoof_env.simd.user_functions import inline_foreign, number_of
+from hoof_env.simd.user_functions import inline_foreign, number_of, scalar_part
+from hoof_env.simd.values import Index
 from hoof_env.tasks.episode import Memories
 from hoof_env.tasks.reward import Term
 
@@ -42,11 +41,9 @@ def sum_of_terms(terms: tuple[Term, ...], layouts: Memories, constants: tuple[st
         for k, term in enumerate(terms)
     ]
 
-    # numba cannot loop over functions.
-    @unrolled(lambda *kinds: kinds[-1])
-    def compute_reward(*arguments: Traced) -> Traced:
+    def compute_reward(*arguments):  # type: ignore[no-untyped-def]
         (*inputs, total) = arguments
-        of_terms = inputs[EPISODE].part("terms")
+        of_terms = inputs[EPISODE].terms
         for k, compute in enumerate(computes):
             compute(*inputs)
             total = of_terms[k] if k == 0 else total + of_terms[k]
@@ -56,21 +53,12 @@ def sum_of_terms(terms: tuple[Term, ...], layouts: Memories, constants: tuple[st
 
 
 def _term(term: Term, k: int) -> Callable[..., Any]:
-    """Return a function of an unrolled kernel that computes the k-th term, one of this package."""
-    compute = shared_part(term.compute)
+    """Return a part of kernels that computes the k-th term, one of this package."""
+    compute = inline_llvm(term.compute)
 
-    def compute_term(
-        addresses: Traced,
-        lanes: Traced,
-        task: Traced,
-        outcome: Traced,
-        episode: Traced,
-        n: Traced,
-        spare: Traced,
-    ) -> None:
-        value = call(compute, outcome, task.part("weights")[k])
+    def compute_term(addresses, lanes, task, outcome, episode, n, spare):  # type: ignore[no-untyped-def]
         # + 0.0 makes 0 of the -0 that a weight of 0 gives.
-        episode.part("terms")[k] = value + 0.0
+        episode.terms[k] = compute(outcome, task.weights[k]) + 0.0
 
     return compute_term
 
@@ -110,7 +98,7 @@ def _keepers(layouts: Memories) -> tuple[Callable[..., Any], Callable[..., Any]]
 def _foreign_term(term: Term, k: int, layouts: Memories, constants: tuple[str, ...]) -> Callable[..., Any]:
     """Return the same for a term from outside this package, which may have constants and keep rows, with a
     check that its function returns a number; lane by lane if it takes no lanes."""
-    compute = inline_foreign(term.compute)
+    compute = inline_foreign(scalar_part(term.compute) if term.scalar else term.compute)
     number = number_of(term.title)
     given = constants_reader(tuple(constants.index(one.name) for one in term.constants))
     keep, put_back = _keepers(layouts) if term.keeps else (_do_nothing, _do_nothing)
@@ -131,11 +119,11 @@ def _foreign_term(term: Term, k: int, layouts: Memories, constants: tuple[str, .
     def compute_one_by_one(addresses, lanes, task, outcome, episode, n, spare):  # type: ignore[no-untyped-def]
         sums = columns(spare, 0, layouts.stride_sums, 0, 1, 1)
         keep(addresses, lanes, outcome, n, spare)
-        for lane in range(lanes):
+        for lane in loop(Index(str(lanes))):
             trunk, leg, own = memories(addresses, 0, layouts, n + lane)
             one = outcome_of_one(outcome, lane, trunk, leg, own, layouts, sums)
             own.terms[k] = number(compute(one, task.weights[k], *given(task))) + 0.0
         put_back(addresses, lanes, outcome, n, spare)
         clear_failed(outcome, episode)
 
-    return partial(call, compute_one_by_one if term.scalar else compute_term)
+    return compute_one_by_one if term.scalar else compute_term

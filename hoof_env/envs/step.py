@@ -11,8 +11,6 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
-import numpy as np
-
 from hoof_env.dynamics.advance import BY_LEGS, LANES, MODEL, advance_kernels
 from hoof_env.dynamics.layout import PLAIN, Features
 from hoof_env.dynamics.limits import PITCH, has_moved
@@ -29,8 +27,8 @@ from hoof_env.envs.observation_kernel import (
 )
 from hoof_env.envs.outcome import add_up, decide, find_outcome, put_together
 from hoof_env.envs.reward_kernel import is_user_term, sum_of_terms
-from hoof_env.simd import absolute, any_lane, block_at, full_like, rows, where, write
-from hoof_env.simd.compile import inline_source, kernel
+from hoof_env.simd import Cell, any_lane, block_at, cond, full_like, loop, rows, when, where, write
+from hoof_env.simd.compile import Kernel, inline_source
 from hoof_env.simd.kept import Kept, Kernels
 from hoof_env.simd.memory import (
     COLUMNS,
@@ -42,7 +40,6 @@ from hoof_env.simd.memory import (
     record_at,
     singles_at,
 )
-from hoof_env.simd.reach import fingerprint, refresh
 from hoof_env.tasks.body import BodyKernels
 from hoof_env.tasks.episode import ACTIONS, FAILED, TRUNCATED, Memories, memories_of, task_type
 from hoof_env.tasks.observation import Entry
@@ -87,6 +84,8 @@ def step_kernels(
     features: Features = PLAIN,
     body: BodyKernels = LEG_KERNELS,
     action_map: ActionMap | None = None,
+    task: tuple[tuple[str, Any], ...] = (),
+    model: tuple[tuple[str, Any], ...] = (),
 ) -> StepKernels:
     """Return the kernels of tasks with the same parts, which share them.
 
@@ -101,12 +100,10 @@ def step_kernels(
     Raises:
         ParameterError: one of the functions refers to something that cannot be read.
     """
-    key = (terms, entries, contact_law, features, body, action_map)
+    key = (terms, entries, contact_law, features, body, action_map, task, model)
     foreign = from_outside(_functions(terms, entries, contact_law, action_map))
-    # Helpers and constants of a user's function may have changed since, as in a notebook.
-    present = fingerprint(*foreign)
-    kernels: StepKernels = _KEPT.get((*key, present), lambda: _made(foreign, *key), bool(foreign))
-    return kernels
+    # Helpers and constants of a user's function may have changed since: such kernels are traced anew.
+    return _made(foreign, *key) if foreign else _KEPT.get(key, lambda: _made(foreign, *key), False)
 
 
 def _functions(
@@ -130,52 +127,54 @@ def _made(
     features: Features,
     body: BodyKernels,
     action_map: ActionMap | None,
+    task: tuple[tuple[str, Any], ...],
+    model: tuple[tuple[str, Any], ...],
 ) -> StepKernels:
-    """Make the kernels, helpers of a user's functions anew; numba compiles them when they are called."""
-    refresh(*foreign)
+    """Make the kernels; each is traced when it is called."""
     own = own_of(terms, entries)
     layouts = memories_of(body.episode, len(terms), features, body.legs, own)
     slots = slots_of(entries)[2]
     task_record = task_type(len(terms), slots, layouts.gait, (*body.task_fields, *own.fields))
-    functions = _functions(terms, entries, contact_law, action_map)
-    # All that the compiled code depends on: with the kernel's name that under which it is on disk.
-    identity = fingerprint(*functions, _flags(terms, entries), layouts.episode.names, (FAILED, TRUNCATED))
-    identity += f" {tuple(features)} {body.legs} legs, {task_record.descr}{_declared(own, action_map)}"
-    observers = observers_of(entries, len(terms), features, body, own)
+    observers = observers_of(entries, len(terms), features, body, own, task, model)
     finish = _finish(sum_of_terms(terms, layouts, own.constants), layouts, body)
-    parts = (apply, finish, observe) = _apply(layouts, body, action_map), finish, observers.observe
+    parts = (apply, finish, observe) = _apply(layouts, body, action_map, model), finish, observers.observe
     advance = advance_kernels(contact_law, features)
     # Bodies without a kernel of their own run side by side: nothing calls their `step_one`.
-    advance_one = getattr(advance, f"advance_{BY_LEGS.get(body.legs, 'batch')}")
-    advance_batch = advance.advance_batch
+    advance_one = advance.function(BY_LEGS.get(body.legs, "batch"), body.legs)
+    advance_batch = advance.function("batch", body.legs)
     sizes = (room, scratch_size, count) = room_of(slots), *_sizes(body, action_map)
-    step_one = _step("step_one", 1, advance_one, task_record, sizes, layouts, body, parts)
-    step_batch = _step("step_batch", LANES, advance_batch, task_record, sizes, layouts, body, parts)
-    task_at = record_at(task_record)
+    task_at = record_at(task_record, task)
+    model_at = record_at(MODEL, model)
+    records = (task_at, model_at)
+    step_one = _step("step_one", 1, advance_one, records, sizes, layouts, body, parts)
+    step_batch = _step("step_batch", LANES, advance_batch, records, sizes, layouts, body, parts)
     are_numbers = _are_numbers(count)
 
     def apply_one(addresses):  # type: ignore[no-untyped-def]
-        task = task_at(addresses[AT.task])[0]
+        task = task_at(addresses[AT.task])
         scratch = doubles(scratch_size)
         good = are_numbers(addresses)
-        if good:
-            for n in range(addresses[BEGIN], addresses[END]):
+
+        @when(good)
+        def _() -> None:
+            for n in loop(addresses[BEGIN], addresses[END]):
                 remember(addresses, 1, task, n)
                 apply(addresses, 1, task, n, scratch)
+
         return good
 
     def finish_one(addresses):  # type: ignore[no-untyped-def]
-        task = task_at(addresses[AT.task])[0]
+        task = task_at(addresses[AT.task])
         memory = doubles(2 * room)
         sums = doubles(layouts.sums * 2 + layouts.own_rows)
-        happened = 0
-        for n in range(addresses[BEGIN], addresses[END]):
-            happened |= finish(addresses, 1, task, n, sums)
+        happened = Cell(0)
+        for n in loop(addresses[BEGIN], addresses[END]):
+            happened.value = happened.value | finish(addresses, 1, task, n, sums)
             observe(addresses, 1, task, n, memory, 0)
-        return happened
+        return happened.value
 
     of_task = (step_one, step_batch, apply_one, finish_one)
-    kernels = {function.__name__: kernel(function, identity, function is step_batch) for function in of_task}
+    kernels = {function.__name__: Kernel(function, ["addresses"], returns=True) for function in of_task}
     return StepKernels(observers=observers, **kernels)
 
 
@@ -183,19 +182,6 @@ def _sizes(body: BodyKernels, action_map: ActionMap | None) -> tuple[int, int]:
     """Return the size of the scratch memory for each row, in numbers, and the number of actions of a row."""
     count = len(action_map.names) if action_map else body.legs * ACTIONS
     return max(body.scratch_size, count if action_map else 0), count
-
-
-def _declared(own: Own, action_map: ActionMap | None) -> str:
-    """Return what kernels depend on of the declarations of a task; "" without any."""
-    text = f" {own}" if any(own) else ""
-    return f"{text} {action_map.names} {action_map.scalar}" if action_map else text
-
-
-def _flags(terms: tuple[Term, ...], entries: tuple[Entry, ...]) -> Any:
-    """Return what kernels depend on besides the functions themselves."""
-    of_terms = [(term.scalar, not is_user_term(term)) for term in terms]
-    of_entries = [(entry.scalar, entry.scale.saturates) for entry in entries]
-    return of_terms, of_entries
 
 
 def _are_numbers(actions_per_row: int) -> Callable[..., Any]:
@@ -206,21 +192,24 @@ def _are_numbers(actions_per_row: int) -> Callable[..., Any]:
     def are_numbers(addresses):  # type: ignore[no-untyped-def]
         actions = singles_at(addresses[AT.actions])
         count = addresses[AT.data + COLUMNS]
-        good = True
+        # Stays 0 unless an action is infinite or not a number.
+        total = Cell(0.0)
         # All columns, not the block of this thread: either all threads take the step or none does.
-        for k in range(count * actions_per_row):
-            good &= absolute(float(actions[k])) < np.inf
-        return good
+        for k in loop(count * actions_per_row):
+            total.value = total.value + (actions[k] - actions[k])
+        return total.value == 0.0
 
     return are_numbers
 
 
-def _apply(layouts: Memories, body: BodyKernels, action_map: ActionMap | None) -> Callable[..., Any]:
+def _apply(
+    layouts: Memories, body: BodyKernels, action_map: ActionMap | None, model: Any
+) -> Callable[..., Any]:
     """Return a part of kernels that turns the actions of row n and, with lanes, of its neighbours into
     commands."""
     command = body.command
     put_action = delayed_actions(layouts)
-    convert = converter(action_map, layouts, body)
+    convert = converter(action_map, layouts, body, model)
 
     @inline_source
     def apply(addresses, lanes, task, n, scratch):  # type: ignore[no-untyped-def]
@@ -239,7 +228,6 @@ def _finish(compute_reward: Callable[..., Any], layouts: Memories, body: BodyKer
 
     @inline_source
     def finish(addresses, lanes, task, n, sums):  # type: ignore[no-untyped-def]
-        happened = 0
         trunk, leg, episode = memories(addresses, lanes, layouts, n)
         of_step = rows(sums, lanes, layouts.stride_sums)
         outcome = find_outcome(task, trunk, leg, episode, layouts, of_step)
@@ -250,15 +238,13 @@ def _finish(compute_reward: Callable[..., Any], layouts: Memories, body: BodyKer
         nothing = full_like(episode, 0.0)
         # Memory behind the sums, for those of one lane.
         spare = offset(sums, layouts.sums * lanes)
-        reward = compute_reward((addresses, lanes, task, outcome, episode, n, spare, nothing))
+        reward = compute_reward(addresses, lanes, task, outcome, episode, n, spare, nothing)
         write(reward, doubles_at(addresses[AT.rewards]), n, 1)
-        if any_lane(ended):
-            happened |= SOME_ENDED
-        if any_lane(switched):
-            happened |= SOME_SWITCHED
-        if any_lane(pushed):
-            happened |= SOME_PUSHED
-        return happened
+        return (
+            any_lane(ended).to_whole() * SOME_ENDED
+            | any_lane(switched).to_whole() * SOME_SWITCHED
+            | any_lane(pushed).to_whole() * SOME_PUSHED
+        )
 
     return finish
 
@@ -291,34 +277,11 @@ def _keep_sums(layouts: Memories) -> Callable[..., Any]:
     return keep_sums
 
 
-def _advance_part(advance: Any, lanes: int) -> Callable[..., Any]:
-    """Return a part of kernels that calls the engine's kernel `advance` for one part of a step."""
-    model_at = record_at(MODEL)
-
-    @inline_source
-    def advance_part(addresses, task, part, n):  # type: ignore[no-untyped-def]
-        advance(
-            matrix_at(addresses, AT.data),
-            model_at(addresses[AT.model]),
-            matrix_at(addresses, AT.tables),
-            matrix_at(addresses, AT.ground),
-            matrix_at(addresses, AT.constants),
-            cube_at(addresses, AT.reactions),
-            task.h,
-            task.part_substeps[part],
-            False,
-            n,
-            n + lanes,
-        )
-
-    return advance_part
-
-
 def _step(
     name: str,
     lanes: int,
     advance: Any,
-    task_record: np.dtype[Any],
+    records: tuple[Any, Any],
     sizes: tuple[int, int, int],
     layouts: Memories,
     body: BodyKernels,
@@ -329,7 +292,8 @@ def _step(
     Args:
         name: name of the function.
         lanes, advance: number of environments side by side, and the kernel that advances them.
-        task_record, layouts, body: parts of the task.
+        records: functions that find the records of task and model.
+        layouts, body: parts of the task.
         sizes: room for an observation, size of the scratch memory, and number of actions.
         parts: apply, finish and observe.
     """
@@ -339,35 +303,49 @@ def _step(
     sums_size = layouts.sums
     keep_sums = _keep_sums(layouts)
     are_numbers = _are_numbers(actions_per_row)
-    task_at = record_at(task_record)
-    advance_part = _advance_part(advance, lanes)
+    (task_at, model_at) = records
 
     def step(addresses):  # type: ignore[no-untyped-def]
-        if not are_numbers(addresses):
-            return NOT_A_NUMBER
-        task = task_at(addresses[AT.task])[0]
-        happened = 0
+        code = Cell(NOT_A_NUMBER)
+
+        @when(are_numbers(addresses))
+        def _() -> None:
+            code.value = take_step(addresses)
+
+        return code.value
+
+    def take_step(addresses):  # type: ignore[no-untyped-def]
+        task = task_at(addresses[AT.task])
+        happened = Cell(0)
         scratch = doubles(scratch_size * lanes)
         memory = doubles(2 * room * lanes)
         # Also for the sums of one lane, for terms that take no lanes.
         sums = doubles(sums_size * (lanes + 1) + own_rows * lanes)
         kept = doubles((body.legs * sums_size + 1) * lanes)
+        advance_group = advance(
+            matrix_at(addresses, AT.data),
+            model_at(addresses[AT.model]),
+            matrix_at(addresses, AT.tables),
+            matrix_at(addresses, AT.ground),
+            matrix_at(addresses, AT.constants),
+            cube_at(addresses, AT.reactions),
+        )
         # One group of lanes after the other: its memory stays in the cache from action to observation.
-        for n in range(addresses[BEGIN], addresses[END], lanes):
+        for n in loop(addresses[BEGIN], addresses[END], lanes):
             remember(addresses, lanes, task, n)
             # One part, but for delays by fractions of a step.
             for part in range(task.parts):
                 if part == task.acting_part:
                     apply(addresses, lanes, task, n, scratch)
-                advance_part(addresses, task, part, n)
+                advance_group(n, task.h, task.part_substeps[part], False)
                 if task.parts > 1:
                     keep_sums(addresses, lanes, n, kept, part == 0)
                 is_last = part == task.parts - 1
                 if is_last:
-                    happened |= finish(addresses, lanes, task, n, sums)
+                    happened.value = happened.value | finish(addresses, lanes, task, n, sums)
                 if is_last or part == task.seeing_part:
                     observe(addresses, lanes, task, n, memory, 0 if is_last else 1)
-        return happened
+        return happened.value
 
     step.__name__ = name
     return step

@@ -10,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 
 from hoof_env.simd import perpendicular, sqrt
-from hoof_env.simd.compile import inline_llvm, kernel
+from hoof_env.simd.compile import inline_llvm
 
 
 @inline_llvm
@@ -66,39 +66,32 @@ def carry(origin, toward, place):  # type: ignore[no-untyped-def]
     return origin + (toward - origin) * place
 
 
-@kernel
-def solve_points(theta, crank, fixed, steps, values, z, dz, ddz):  # type: ignore[no-untyped-def]
-    """Fill `z`, `dz`, `ddz` (complex, one entry a point) with every point and its derivatives by the crank
-    angle, in the frame of the leg with the crank's centre at the origin [m, m/rad, m/rad^2].
+def solve_all(theta, crank, fixed, steps, values, z, dz, ddz):  # type: ignore[no-untyped-def]
+    """Fill `z`, `dz`, `ddz` (complex, rows for crank angles `theta`, one column a point) with every point and its
+    derivatives by the crank angle, in the frame of the leg with the crank's centre at the origin [m, m/rad,
+    m/rad^2].
 
     The crank turns clockwise, its pin is at crank * exp(-i theta); `fixed` are the fixed points, `steps` and
     `values` are `geometry.tables`.
     """
     count = fixed.shape[0]
-    for k in range(count):
-        z[k] = fixed[k]
-        dz[k] = 0.0
-        ddz[k] = 0.0
-    z[count] = crank * complex(np.cos(theta), -np.sin(theta))
-    dz[count] = -1j * z[count]
-    ddz[count] = -z[count]
-    for k in range(steps.shape[0]):
-        p, a, b = steps[k, 1], steps[k, 2], steps[k, 3]
-        if steps[k, 0] == 1:
-            z[p] = meet(z[a], z[b], values[k, 0], values[k, 1], values[k, 2])
-            e1 = z[p] - z[a]
-            e2 = z[p] - z[b]
-            dz[p] = meet_rate(e1, e2, dz[a], dz[b])
-            ddz[p] = meet_acceleration(e1, e2, dz[p] - dz[a], dz[p] - dz[b], ddz[a], ddz[b])
-        else:
-            place = complex(values[k, 0], values[k, 1])
-            z[p] = carry(z[a], z[b], place)
-            dz[p] = carry(dz[a], dz[b], place)
-            ddz[p] = carry(ddz[a], ddz[b], place)
-
-
-@kernel
-def solve_all(theta, crank, fixed, steps, values, z, dz, ddz):  # type: ignore[no-untyped-def]
-    """Fill rows of `z`, `dz`, `ddz` for crank angles `theta`, see `solve_points`."""
-    for k in range(theta.shape[0]):
-        solve_points(theta[k], crank, fixed, steps, values, z[k], dz[k], ddz[k])
+    z[:, :count] = fixed
+    dz[:, :count] = 0.0
+    ddz[:, :count] = 0.0
+    z[:, count] = crank * (np.cos(theta) - 1j * np.sin(theta))
+    dz[:, count] = -1j * z[:, count]
+    ddz[:, count] = -z[:, count]
+    z, dz, ddz = z.T, dz.T, ddz.T
+    with np.errstate(all="ignore"):
+        for (kind, p, a, b), value in zip(steps.tolist(), values.tolist(), strict=True):
+            if kind == 1:
+                z[p] = meet(z[a], z[b], *value[:3])
+                e1 = z[p] - z[a]
+                e2 = z[p] - z[b]
+                dz[p] = meet_rate(e1, e2, dz[a], dz[b])
+                ddz[p] = meet_acceleration(e1, e2, dz[p] - dz[a], dz[p] - dz[b], ddz[a], ddz[b])
+            else:
+                place = complex(value[0], value[1])
+                z[p] = carry(z[a], z[b], place)
+                dz[p] = carry(dz[a], dz[b], place)
+                ddz[p] = carry(ddz[a], ddz[b], place)

@@ -17,20 +17,18 @@ from functools import lru_cache
 from typing import Any
 
 import numpy as np
-from llvmlite import ir
-from numba.core import types
 from numpy.typing import NDArray
 
 from hoof_env.errors import GeometryError, count, one_of
 from hoof_env.leg.assembly import centres, solve
 from hoof_env.leg.geometry import Geometry
-from hoof_env.simd import floor, maximum, minimum
+from hoof_env.simd import floor, maximum, minimum, steady
 from hoof_env.simd.compile import inline_llvm
-from hoof_env.simd.functions import transposed
 from hoof_env.simd.layout import Layout, Row, Vector
+from hoof_env.simd.machines import CURRENT
 from hoof_env.simd.math import ROUNDER
-from hoof_env.simd.memory import write_row
-from hoof_env.simd.types import DOUBLE, INDEX, Code, fused, instruction, spread
+from hoof_env.simd.memory import Columns, offset, read
+from hoof_env.simd.values import Index, Lanes, full, transposed
 
 
 class Functions(Layout):
@@ -266,23 +264,21 @@ def _fit(geometry: Geometry, chosen: NDArray[np.int64], cells: int) -> NDArray[n
 # one for the derivative. Each waits for the one before, so the lanes go through the powers together.
 
 
-def _polynomials(builder: Any, rows: list[Any], angles: list[Any], first: int, last: int) -> tuple[Any, Any]:
+def _polynomials(rows: list[Any], angles: list[Any], first: int, last: int) -> tuple[Any, Any]:
     """Return values and derivatives of functions `first` to `last` in each lane, a vector a lane.
 
     A lane's row of the table holds their coefficients together.
     """
     count = last - first
-    vector = ir.VectorType(DOUBLE, count)
 
     def coefficients(power: int) -> list[Any]:
-        at = INDEX(first * (DEGREE + 1) + power * count)
-        places = [builder.bitcast(builder.gep(row, [at]), vector.as_pointer()) for row in rows]
-        return [builder.load(place, align=8) for place in places]
+        at = first * (DEGREE + 1) + power * count
+        return [read(Columns("", count, None, 1, 1), row, at, 1) for row in rows]
 
     def next_power(sums: list[Any], added: list[Any]) -> list[Any]:
-        return [fused(builder, "+", builder.fmul(s, x), y) for s, x, y in zip(sums, xs, added, strict=True)]
+        return [s * x + y for s, x, y in zip(sums, xs, added, strict=True)]
 
-    xs = [spread(builder, angle, count) for angle in angles]
+    xs = [full(angle, count) for angle in angles]
     values = slopes = coefficients(0)
     for power in range(1, DEGREE + 1):
         slopes = next_power(slopes, values) if power > 1 else values
@@ -297,31 +293,51 @@ def locate(leg, cells):  # type: ignore[no-untyped-def]
     To be asked some while before `look_up`, which waits for the answer. What is not a number is in some cell,
     not a number from its middle."""
     angle = leg.theta
-    cell = (angle * (cells / TURN) + ROUNDER) - ROUNDER
+    cell = steady(angle * (cells / TURN) + ROUNDER) - ROUNDER
     # Cell 0 begins before its turn does: its row is there again at the end of the table.
     row = minimum(cells, maximum(0.0, cell - cells * floor(angle * (1 / TURN))))
     leg.row_begin = (row + leg.settings.first_row) * ROW + WHOLE
     leg.cell_angle = angle - cell * (TURN / cells)
 
 
-@instruction(lambda leg, table: types.void(leg, table))
-def look_up(code: Code, leg: Any, table: Any) -> None:
+def look_up(leg, table):  # type: ignore[no-untyped-def]
     """Fill a leg's functions and slopes, see `Functions`, where `locate` found its crank angle to be; what is
     not a number gives values that are none."""
-    (rows,), builder, fields = code.args[:1], code.builder, code.args[0].layout.fields
-    lanes, half = range(rows.count), ir.IntType(32)
+    machine, fields, lanes = CURRENT.machine, leg._layout.fields, max(leg._n, 1)
+    values, slopes = fields["functions"].start, fields["slopes"].start
+    if machine.runs_now:
+        _look_up_now(leg, table, values, slopes)
+        return
 
-    def loaded(name: str, kind: Any, per_lane: int) -> list[Any]:  # one by one: each is needed in all lanes
-        first = builder.gep(leg, [INDEX(fields[name].start * rows.count)], inbounds=True)
-        first = builder.bitcast(first, kind.as_pointer())
-        return [builder.load(builder.gep(first, [INDEX(per_lane * lane)], inbounds=True)) for lane in lanes]
+    def loaded(name: str, kind: str, per_lane: int) -> list[str]:  # one by one: each is needed in all lanes
+        first = leg._at(fields[name].start)
+        return [machine.load(machine.at(first, per_lane * lane, kind), kind, 4) for lane in range(lanes)]
 
     # What was added to the number of a row's first element is in the upper half of its bits.
-    begins = [builder.zext(begin, INDEX) for begin in loaded("row_begin", half, 2)]
-    places, angles = [builder.gep(table, [begin]) for begin in begins], loaded("cell_angle", DOUBLE, 1)
-    sloped, derivatives = _polynomials(builder, places, angles, 0, SLOPED)
-    others, _ = _polynomials(builder, places, angles, SLOPED, FUNCTIONS)
-    values, slopes = fields["functions"].start, fields["slopes"].start
+    begins = [machine.new(f"zext i32 {begin} to i64") for begin in loaded("row_begin", "i32", 2)]
+    places = [offset(table, Index(begin)) for begin in begins]
+    angles = [Lanes(x, 0) for x in loaded("cell_angle", "double", 1)]
+    sloped, derivatives = _polynomials(places, angles, 0, SLOPED)
+    others, _ = _polynomials(places, angles, SLOPED, FUNCTIONS)
     for first, found in ((values, sloped), (values + SLOPED, others), (slopes, derivatives)):
-        for k, column in enumerate(transposed(builder, found, found[0].type.count)):
-            write_row(code, rows, leg, INDEX(first + k), column)
+        for k, column in enumerate(transposed(found)):
+            leg[first + k] = Lanes(column.x, leg._n)
+
+
+def _look_up_now(leg: Any, table: Any, values: int, slopes: int) -> None:
+    """`look_up` on a machine that computes at once: all lanes together, function by function."""
+    machine = CURRENT.machine
+    begin = machine.whole_of((leg.row_begin - WHOLE).x)
+    numbers = [Lanes(x, leg._n) for x in machine.table_rows(table, begin, FUNCTIONS * (DEGREE + 1))]
+    x = leg.cell_angle
+    for first, last in ((0, SLOPED), (SLOPED, FUNCTIONS)):
+        count = last - first
+        for k in range(count):
+            c = [numbers[first * (DEGREE + 1) + power * count + k] for power in range(DEGREE + 1)]
+            value, slope = c[0], c[0]
+            for power in range(1, DEGREE + 1):
+                slope = slope * x + value if power > 1 else value
+                value = value * x + c[power]
+            leg[values + first + k] = value
+            if last == SLOPED:
+                leg[slopes + k] = slope

@@ -1,110 +1,203 @@
-"""Compilation of all kernels: with numba, cached, and without fast-math, so that a result does not depend on
-how the compiler arranged a loop."""
+"""Kernels: traced once, optimised by LLVM, kept as objects in files. No pickles; the name of a file is the digest
+of all that the machine code follows from: the instructions as traced, the processor, and LLVM's version."""
 
 from __future__ import annotations
 
+import ctypes
 import hashlib
 import os
 import sys
+import tempfile
 import time
-from collections.abc import Callable
-from contextlib import suppress
-from typing import TYPE_CHECKING, Any, TypeVar, cast
+from collections.abc import Callable, Sequence
+from functools import cache, wraps
+from pathlib import Path
+from typing import Any, TypeVar
 
-import numba
-from numba.core import event
+import llvmlite
+import llvmlite.binding as llvm
 
-from hoof_env.errors import HoofEnvError
-from hoof_env.simd.cache import keep
-from hoof_env.simd.renamed import refuse_old_names
+from hoof_env.simd.machines import Writer, running_on
+from hoof_env.simd.memory import Matrix, Pointer, Record
+from hoof_env.simd.values import Index, Lanes, Mask, rounded
 
 F = TypeVar("F", bound=Callable[..., Any])
 
-if not TYPE_CHECKING:
-    __getattr__ = refuse_old_names(__name__, {"inlined": "inline_llvm", "pasted": "inline_source"})
-
 QUIET = "HOOF_ENV_QUIET"
-"""Environment variable; 1 silences the messages about compiling kernels."""
+LEVEL = 3
+VECTORISE = False  # the code is vectors already
+COMPILED: list[str] = []
+"""Names of the kernels that this process has compiled."""
 
-
-def kernel(function: F, identity: str = "", threads: bool = False) -> F:
-    """Compile `function` with numba at its first call, and keep the result in numba's cache folder, which the
-    environment variable NUMBA_CACHE_DIR names. Of several processes that need it at once one compiles.
-
-    Args:
-        function: the kernel.
-        identity: identity of all that its code depends on besides the package's sources, see
-            `reach.fingerprint`; "" for nothing. Kernels of one source need one, and names that differ.
-        threads: true if several threads may run it at once, without Python's lock; a call takes a little
-            longer.
-
-    Raises:
-        OutputError: at the first call, the kernel has to be compiled and the folder is not writable.
-        HoofEnvError: numba is set not to compile.
-    """
-    # names in machine code are made of the qualified name: of two functions of one name the first is called
-    if identity:
-        identity = f"{function.__name__} {identity}"
-        function.__qualname__ += f".{hashlib.sha256(identity.encode()).hexdigest()[:12]}"
-    compiled: Any = numba.njit(error_model="numpy", nogil=threads)(function)
-    # with NUMBA_DISABLE_JIT, `njit` returns the function itself, which could not read fields of records
-    if not hasattr(compiled, "_cache"):
-        raise HoofEnvError("NUMBA_DISABLE_JIT is set, but kernels run compiled only: unset it")
-    keep(compiled, _say, identity)
-    return cast(F, compiled)
+TIMES: list[dict[str, Any]] = []
+"""What each kernel took: seconds of the processor of each part."""
 
 
 def inline_llvm(function: F) -> F:
-    """Compile a part of a kernel into its callers as LLVM code, so that the shapes of the caller's arrays are
-    constants there."""
-    options: Any = {"error_model": "numpy", "forceinline": True}
-    # kernels alone call these parts; wrappers for Python and C would take a third of the time to compile
-    options |= {"no_cpython_wrapper": True, "no_cfunc_wrapper": True}
-    return cast(F, numba.njit(**options)(function))
+    """Mark a part of kernels. What it takes and what it returns enters sums rounded, as what numba passes to a
+    function does; that is all this does."""
+
+    @wraps(function)
+    def part(*arguments: Any) -> Any:
+        return rounded(function(*map(rounded, arguments)))
+
+    return part  # type: ignore[return-value]
 
 
-def inline_source(function: F) -> F:
-    """Insert a part of a kernel into its callers as source, before types are inferred.
+inline_source = inline_llvm
 
-    For the large parts that call `inline_llvm` ones: numba would optimise those by themselves first, which
-    takes seconds, and then again inside the kernel.
+
+@cache
+def _machine() -> tuple[Any, Any, str]:
+    """Return LLVM's target machine and linker, and what identifies them."""
+    llvm.initialize_native_target()
+    llvm.initialize_native_asmprinter()
+    cpu = llvm.get_host_cpu_name()
+    features = llvm.get_host_cpu_features().flatten()
+    target = llvm.Target.from_default_triple().create_target_machine(
+        cpu=cpu, features=features, opt=LEVEL, reloc="pic", codemodel="small"
+    )
+    linker = llvm.create_lljit_compiler(
+        llvm.Target.from_default_triple().create_target_machine(cpu=cpu, features=features, jit=True)
+    )
+    return target, linker, f"{target.triple} {cpu} {features} {llvmlite.__version__} {LEVEL} {VECTORISE}"
+
+
+def folder() -> Path:
+    """Return the folder of stored objects."""
+    given = os.environ.get("TRACED_CACHE") or Path(__file__).parents[2] / "objects"
+    return Path(given)
+
+
+def object_code(text: str) -> bytes:
+    """Compile a module to an object."""
+    target, _, _ = _machine()
+    module = llvm.parse_assembly(text)
+    module.verify()  # of a value that left its branch, above all
+    module.triple, module.data_layout = target.triple, str(target.target_data)
+    tuning = llvm.create_pipeline_tuning_options(speed_level=LEVEL)
+    tuning.loop_vectorization = tuning.slp_vectorization = VECTORISE
+    passes = llvm.create_pass_builder(target, tuning)
+    manager = passes.getModulePassManager()
+    manager.run(module, passes)
+    return bytes(target.emit_object(module))
+
+
+_NUMBER = [0]
+
+
+def linked(content: bytes, name: str) -> tuple[Any, int]:
+    """Return what keeps an object loaded, and the address of its function."""
+    _NUMBER[0] += 1
+    library = llvm.JITLibraryBuilder().add_object_img(content).add_current_process().export_symbol(name)
+    tracker = library.link(_machine()[1], f"{name}{_NUMBER[0]}")
+    return tracker, tracker[name]
+
+
+KINDS: dict[str, tuple[str, Any]] = {
+    "pointer": ("ptr", ctypes.c_void_p),
+    "double": ("double", ctypes.c_double),
+    "index": ("i64", ctypes.c_int64),
+}
+
+
+def traced(function: Callable[..., Any], arguments: Sequence[Any], name: str) -> str:
+    """Return the instructions of a kernel.
+
+    Args:
+        function: the kernel.
+        arguments: for each argument what it is: "pointer", "addresses", "double", "index" or "truth"; or a
+            record type with the fields of it that are known, as a tuple.
+        name: of the function.
     """
-    return cast(F, numba.njit(error_model="numpy", inline="always")(function))
+    machine = Writer()
+    declared, given = [], []
+    for k, kind in enumerate(arguments):
+        x = f"%a{k}"
+        if isinstance(kind, tuple):
+            declared.append(f"ptr noalias {x}")
+            given.append(Record(x, *kind))
+            continue
+        declared.append(f"{KINDS.get(kind, ('i64',))[0] if kind != 'addresses' else 'ptr'} {x}")
+        if kind == "matrix":
+            declared[-1] = f"ptr noalias {x}, i64 {x}r, i64 {x}c"
+            given.append(Matrix(Pointer(x), Index(f"{x}r"), Index(f"{x}c")))
+        elif kind == "pointer":
+            given.append(Pointer(x))
+        elif kind == "addresses":
+            given.append(Pointer(x, "i64"))
+        elif kind == "double":
+            given.append(Lanes(x, 0))
+        else:
+            given.append(Index(x))
+    with running_on(machine):
+        result = function(*given)
+        if result is None:
+            machine.do("ret void")
+            kind = "void"
+        else:
+            x = result.x if isinstance(result, (Index, Mask)) else int(result)
+            kind = "i1" if isinstance(result, Mask) else "i64"
+            machine.do(f"ret {kind} {x}")
+    return machine.text(name, declared, kind)
 
 
-def _say(text: str) -> None:
-    if os.environ.get(QUIET, "") in ("", "0"):
-        with suppress(OSError, ValueError):  # stderr is closed
-            print(f"hoof-env: {text}", file=sys.stderr, flush=True)
+def kernel(function: F) -> F:
+    """Leave a function of the paper's solver as it is: the sketch does not trace these."""
+    return function
 
 
-class _Announcer(event.Listener):
-    """Listener that reports on stderr that kernels of this package are compiled, not read from the cache, and
-    how long the slow ones took. numba calls it when it compiles; it costs nothing otherwise."""
+class Kernel:
+    """Kernel that is traced and compiled, or loaded, at its first call."""
 
-    depth = 0
-    started = 0.0
-    has_announced = False
-    slow = ("step_", "advance_", "react_")  # first parts of the names of kernels that take long
+    def __init__(self, function: Callable[..., Any], arguments: Sequence[Any], returns: bool = False) -> None:
+        self.__name__ = function.__name__
+        self.function = function
+        self.arguments = arguments
+        self.returns = returns
+        self.call: Any = None
 
-    def on_start(self, event: Any) -> None:
-        function: Any = getattr(event.data["dispatcher"], "py_func", None)
-        # a kernel compiles those that it calls: only the outermost is announced
-        if self.depth or str(getattr(function, "__module__", "")).startswith("hoof_env."):
-            self.depth += 1
-        if self.depth == 1:
-            self.started = time.monotonic()
-            if not self.has_announced and function.__name__.startswith(self.slow):
-                _say("compiling kernels for this machine, once (about half a minute) ...")
-                self.has_announced = True
+    def __call__(self, *arguments: Any) -> Any:
+        if self.call is None:
+            self.compile()
+        return self.call(*arguments)
 
-    def on_end(self, event: Any) -> None:
-        if not self.depth:
-            return  # not a kernel of this package
-        self.depth -= 1
-        seconds = time.monotonic() - self.started
-        if not self.depth and seconds > 1:
-            _say(f"{event.data['dispatcher'].py_func.__name__} compiled in {seconds:.1f} s")
-
-
-event.register("numba:compile", _Announcer())
+    def compile(self) -> None:
+        times: dict[str, Any] = {"name": self.__name__}
+        now = time.process_time()
+        text = traced(self.function, self.arguments, "kernel")
+        times["trace"] = time.process_time() - now
+        now = time.process_time()
+        identity = _machine()[2]
+        times["target"] = time.process_time() - now
+        key = hashlib.sha256(f"{identity}\n{text}".encode()).hexdigest()
+        file = folder() / f"{self.__name__}-{key[:32]}.o"
+        now = time.process_time()
+        try:
+            content = file.read_bytes()
+        except FileNotFoundError:
+            content = object_code(text)
+            times["llvm"] = time.process_time() - now
+            COMPILED.append(self.__name__)
+            file.parent.mkdir(parents=True, exist_ok=True)
+            with tempfile.NamedTemporaryFile(dir=file.parent, delete=False) as new:
+                new.write(content)
+            os.replace(new.name, file)
+        now = time.process_time()
+        self.tracker, self.address = linked(content, "kernel")
+        times["load"] = time.process_time() - now
+        kinds: list[Any] = []
+        for kind in self.arguments:
+            if kind == "matrix":
+                kinds += [ctypes.c_void_p, ctypes.c_int64, ctypes.c_int64]
+            else:
+                kinds.append(KINDS.get(kind, (0, ctypes.c_int64))[1] if isinstance(kind, str) else ctypes.c_void_p)
+                if kind == "addresses":
+                    kinds[-1] = ctypes.c_void_p
+        result = ctypes.c_int64 if self.returns else None
+        self.call = ctypes.CFUNCTYPE(result, *kinds)(self.address)
+        times |= {"ir": len(text), "lines": text.count("\n"), "object": len(content)}
+        self.text, self.content = text, content
+        TIMES.append(times)
+        if os.environ.get("TRACED_SAY"):
+            print(times, file=sys.stderr)

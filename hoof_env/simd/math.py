@@ -14,7 +14,7 @@ from __future__ import annotations
 
 import math
 
-from hoof_env.simd import absolute, maximum, minimum, quarter_turns, sqrt, where
+from hoof_env.simd import absolute, maximum, minimum, quarter_turns, sqrt, steady, where
 from hoof_env.simd.compile import inline_llvm
 
 EXPONENT_UNIT = 8
@@ -92,7 +92,7 @@ def tanh(x):  # type: ignore[no-untyped-def]
 @inline_llvm
 def cos_sin(angle):  # type: ignore[no-untyped-def]
     """Return cosine and sine of `angle` [rad], error below 2e-16 for |angle| < 1e4."""
-    shifted = angle * TWO_OVER_PI + ROUNDER
+    shifted = steady(angle * TWO_OVER_PI + ROUNDER)
     turns = shifted - ROUNDER  # quarter turns to the nearest multiple of pi / 2
     # the first product is exact for up to 2^20 quarter turns, so no digits are lost in the difference
     r = (angle - turns * HALF_PI_HIGH) - turns * HALF_PI_LOW

@@ -1,46 +1,24 @@
-"""Memory for kernels without reference counts: the stack, addresses of a caller's arrays, and rows of lanes.
+"""Memory of kernels: the stack, arrays of the caller by their addresses, and rows of lanes in both.
 
-numba counts references to every array that a kernel slices, with atomic instructions; in a step of a hundred
-nanoseconds that is most of the time. Arrays made by `numba.carray` from these pointers are not counted.
-Memory on the stack cannot be aliased, so that loops over it become vector code, and where every index is a
-constant it becomes registers.
+On a machine that computes at once rows are a list, of which a store replaces an entry: arrays themselves do
+not change, so that JAX can follow.
 """
 
 from __future__ import annotations
 
 import math
-import operator
 from collections import namedtuple
 from typing import Any
 
 import numpy as np
-from llvmlite import ir
-from numba import carray, from_dtype  # type: ignore[attr-defined]
-from numba.core import cgutils, types
-from numba.core.extending import lower_builtin, lower_cast
-from numba.core.typing.templates import AbstractTemplate, infer_global, signature
 from numpy.typing import NDArray
 
-from hoof_env.simd.compile import inline_llvm
-from hoof_env.simd.types import (
-    DOUBLE,
-    INDEX,
-    SINGLE,
-    Code,
-    Columns,
-    Lanes,
-    Rows,
-    gathered,
-    instruction,
-    is_real,
-    pick,
-    spread,
-    wide,
-)
+from hoof_env.simd.layout import Row, Vector, _Named
+from hoof_env.simd.machines import CURRENT, wide
+from hoof_env.simd.values import Index, Lanes, Plane, Value, full, vector, word
 
 LINE = 64
 """Size of a cache line, and of the widest vector [bytes]."""
-
 
 LARGE = 2**21
 """Size of a large page of the system [bytes]."""
@@ -70,38 +48,51 @@ def aligned(*shape: int) -> NDArray[np.float64]:
 # Pointers
 
 
-@instruction(lambda count: types.CPointer(types.float64)(count))
-def doubles(code: Code, count: Any) -> Any:
-    """Return a pointer to `count` doubles on the stack of the calling function, an inlined one included; they
-    are gone when it returns. Not for use in a loop, where each turn would take more of the stack."""
-    place = code.builder.alloca(DOUBLE, size=count)
-    place.align = LINE
-    return place
+class Pointer(Value):
+    """Place of numbers, read and written as ordinary ones."""
+
+    __slots__ = ("item", "x")
+    kind = "a pointer"
+
+    def __init__(self, x: str, item: str = "double") -> None:
+        self.x = x
+        self.item = item
+
+    def __getitem__(self, k: Any) -> Any:
+        machine = CURRENT.machine
+        size = {"double": 8, "float": 4, "i64": 8, "i8": 1}[self.item]
+        value = machine.load(machine.at(self.x, word(k), self.item), self.item, size)
+        if self.item == "i64":
+            return Index(value)
+        return Lanes(machine.new(f"fpext float {value} to double") if self.item == "float" else value, 0)
+
+    def __setitem__(self, k: Any, value: Any) -> None:
+        machine = CURRENT.machine
+        x = full(value, 0).x
+        if self.item == "float":
+            x = machine.new(f"fptrunc double {x} to float")
+        machine.store(machine.at(self.x, word(k), self.item), x, self.item, 8 if self.item == "double" else 4)
 
 
-@instruction(lambda array: types.CPointer(array.dtype)(array))
-def address(code: Code, array: Any) -> Any:
-    """Return a pointer to the first element of a C-contiguous array; the caller must keep the array alive."""
-    return cgutils.create_struct_proxy(code.args[0])(code.context, code.builder, value=array).data
+def doubles(count: int) -> Pointer:
+    """Return a pointer to `count` doubles on the stack of the kernel."""
+    return Pointer(CURRENT.machine.slot("double", max(count, 1)))
 
 
-@instruction(lambda pointer, count: pointer(pointer, count))
-def offset(code: Code, pointer: Any, count: Any) -> Any:
+def offset(pointer: Pointer, count: Any) -> Pointer:
     """Return the pointer `count` elements further on."""
-    return code.builder.gep(pointer, [count])
+    return Pointer(CURRENT.machine.at(pointer.x, word(count), pointer.item, False), pointer.item)
 
 
-def _pointer_to(kind: Any) -> Any:
-    """Return a function for kernels that makes a pointer to numba's type `kind` from an address, a whole
-    number."""
-    return instruction(lambda number: types.CPointer(kind)(types.int64))(
-        lambda code, number: code.builder.inttoptr(number, code.context.get_value_type(code.result))
-    )
+def doubles_at(number: Index) -> Pointer:
+    """Return a pointer to the doubles at an address."""
+    return Pointer(CURRENT.machine.new(f"inttoptr i64 {number.x} to ptr"))
 
 
-doubles_at = _pointer_to(types.float64)
-singles_at = _pointer_to(types.float32)
-"""Functions for kernels that return a pointer to the doubles, or singles, at an address."""
+def singles_at(number: Index) -> Pointer:
+    """Return a pointer to the singles at an address."""
+    return Pointer(CURRENT.machine.new(f"inttoptr i64 {number.x} to ptr"), "float")
+
 
 COLUMNS = 2
 """Offset from the slot of a matrix in an array of `Addresses` to its number of columns."""
@@ -110,7 +101,6 @@ COLUMNS = 2
 class Addresses:
     """Addresses of some arrays, in one array of whole numbers.
 
-    A call from Python takes a tenth of a microsecond for each array; one array of addresses replaces many.
     The caller must keep the arrays alive, and make new addresses for a copy.
 
     Attributes:
@@ -131,241 +121,270 @@ class Addresses:
         return np.array([*np.ravel(rows), columns.start, columns.stop], np.int64)
 
 
-@inline_llvm
-def matrix_at(addresses, slot):  # type: ignore[no-untyped-def]
+class Matrix:
+    """Array of the caller of two or three axes."""
+
+    def __init__(self, first: Pointer, *shape: Any) -> None:
+        self.first = first
+        self.shape = shape
+
+
+def matrix_at(addresses: Pointer, slot: int) -> Matrix:
     """Return the array of doubles, of two axes, at a slot of an array of `Addresses`."""
-    return carray(doubles_at(addresses[slot]), (addresses[slot + 1], addresses[slot + 2]))
+    return Matrix(doubles_at(addresses[slot]), addresses[slot + 1], addresses[slot + 2])
 
 
-@inline_llvm
-def cube_at(addresses, slot):  # type: ignore[no-untyped-def]
+def cube_at(addresses: Pointer, slot: int) -> Matrix:
     """Return the array of doubles, of three axes, at a slot of an array of `Addresses`."""
-    shape = (addresses[slot + 1], addresses[slot + 2], addresses[slot + 3])
-    return carray(doubles_at(addresses[slot]), shape)
+    return Matrix(doubles_at(addresses[slot]), *(addresses[slot + k] for k in (1, 2, 3)))
 
 
-def record_at(kind: np.dtype[Any]) -> Any:
-    """Return a function for kernels that makes an array of one record of a type from an address."""
-    pointer = _pointer_to(from_dtype(kind))
-    return inline_llvm(lambda number: carray(pointer(number), (1,)))
+def address(matrix: Matrix) -> Pointer:
+    """Return a pointer to the first element of an array."""
+    return matrix.first
 
 
-# Rows of lanes: on the stack, and in columns of an array
+def record_at(kind: np.dtype[Any], known: tuple[tuple[str, Any], ...]) -> Any:
+    """Return a function for kernels that makes a `Record` from an address."""
+    return lambda number: Record(doubles_at(number).x, kind, dict(known))
 
 
-def _layout(constant: Any) -> Any:
-    return getattr(constant, "layout", None)
+class Record:
+    """Record of the caller: fields that are known when the kernel is traced, others are read when it runs."""
+
+    def __init__(self, place: str, kind: np.dtype[Any], known: dict[str, Any]) -> None:
+        self._place = place
+        self._fields = kind.fields
+        self._known = known
+
+    def __getattr__(self, name: str) -> Any:
+        if name in self._known:
+            return self._known[name]
+        if name not in self._fields:
+            raise AttributeError(f"{name!r}, which the record has not")
+        kind, start = self._fields[name][:2]
+        item = {"f": "double", "i": "i64"}[kind.base.kind]
+        pointer = Pointer(CURRENT.machine.at(self._place, start, "i8"), item)
+        return Field(pointer, kind.shape) if kind.shape else pointer[0]
 
 
-@instruction(lambda *kinds: Rows(kinds[1].literal_value, _layout(kinds[2]))(*kinds), literal=True)
-def rows(code: Code, pointer: Any, count: Any, layout: Any) -> Any:
-    """Return the memory at a pointer to doubles, aligned to 64 bytes, as rows of `count` lanes, a constant,
-    with the names of a layout, or None."""
-    return pointer
+class Field:
+    """Array in a record."""
+
+    def __init__(self, first: Pointer, shape: tuple[int, ...]) -> None:
+        self._first = first
+        self.shape = shape
+
+    def __len__(self) -> int:
+        return self.shape[0]
+
+    def __getitem__(self, k: Any) -> Any:
+        return self._first[k[0] * self.shape[1] + k[1] if isinstance(k, tuple) else k]
 
 
-@instruction(
-    lambda pointer, count, layout, start, row, stride: Columns(count.literal_value, _layout(layout))(
-        pointer, count, layout, types.intp, types.intp, types.intp
-    ),
-    literal=True,
-)
-def columns(code: Code, pointer: Any, count: Any, layout: Any, start: Any, row: Any, stride: Any) -> Any:
-    """Return columns of an array of doubles, `stride` apart; its rows are `row` apart, and the first number
-    of the first column is pointer[start]. They have the names of a layout, or None."""
-    record = code.context.make_helper(code.builder, code.result)
-    record.first = code.builder.gep(pointer, [start])
-    record.row = row
-    record.stride = stride
-    return record._getvalue()
+# Rows of lanes
 
 
-@instruction(lambda rows, number: rows(rows, types.intp))
-def block_at(code: Code, rows: Any, number: Any) -> Any:
-    """Return the rows of the `number`-th of several equal layouts one after the other, the first of which is
-    `rows`."""
-    return part_of(code, code.args[0], rows, code.builder.mul(number, INDEX(code.args[0].layout.size)))
+class Rows:
+    """Memory on the stack with n doubles a row, named by a layout; or, of a machine that computes at once, a
+    list of arrays."""
+
+    __slots__ = ("_empty", "_first", "_layout", "_n", "_place")
+
+    def __init__(self, place: Any, count: int, layout: Any, first: int = 0, is_empty: bool = False) -> None:
+        put = object.__setattr__
+        put(self, "_place", place)
+        put(self, "_n", count)
+        put(self, "_layout", layout)
+        put(self, "_first", first)
+        put(self, "_empty", is_empty)
+
+    # where a row is
+
+    def _part(self, start: Any, layout: Any, is_empty: bool = False) -> Any:
+        if isinstance(start, Index):
+            place = CURRENT.machine.at(self._place, word(start * self._n))
+            return type(self)(place, self._n, layout, self._first, is_empty)
+        return type(self)(self._place, self._n, layout, self._first + start, is_empty)
+
+    def _read(self, k: Any) -> Lanes:
+        if isinstance(self._place, list):
+            return Lanes(self._place[self._first + k], self._n)
+        return Lanes(
+            CURRENT.machine.load(self._at(k), wide("double", self._n), 8 * max(self._n, 1)), self._n
+        )
+
+    def _write(self, k: Any, value: Any) -> None:
+        x = full(value, self._n).x
+        if isinstance(self._place, list):
+            self._place[self._first + k] = x
+            return
+        CURRENT.machine.store(self._at(k), x, wide("double", self._n), 8 * max(self._n, 1))
+
+    def _at(self, k: Any) -> str:
+        return CURRENT.machine.at(self._place, word((k + self._first) * max(self._n, 1)))
+
+    # by number and by name
+
+    def __getitem__(self, k: Any) -> Lanes:
+        return full(math.nan, self._n) if self._empty else self._read(k)
+
+    def __setitem__(self, k: Any, value: Any) -> None:
+        if not self._empty:
+            self._write(k, value)
+
+    def __getattr__(self, name: str) -> Any:
+        if self._layout is None or name not in self._layout.fields:
+            raise AttributeError(f"{name!r}, which {self._layout and self._layout.__name__} has not")
+        start, size, kind = self._layout.fields[name]
+        if kind is Row:
+            return self._read(start) if size else full(math.nan, self._n)
+        if kind is Vector:
+            return vector(self._read(start), self._read(start + 1))
+        if isinstance(kind, _Named):
+            return self._part(start, kind)
+        return self._part(start, None, size == 0)
+
+    def __setattr__(self, name: str, value: Any) -> None:
+        start, size, kind = self._layout.fields[name]
+        if kind is Vector:
+            self._write(start, value.a)
+            self._write(start + 1, value.b)
+        elif kind is Row:
+            if size:
+                self._write(start, value)
+        else:
+            raise TypeError(f"{name}: the rows of a block or a layout are set one by one")
 
 
-def part_of(code: Code, memory: Any, value: Any, first: Any) -> Any:
-    """Return the rows or columns from row `first` on."""
-    builder = code.builder
-    if isinstance(memory, Rows):
-        return builder.gep(value, [builder.mul(first, INDEX(memory.count))], inbounds=True)
-    record = code.context.make_helper(builder, memory, value=value)
-    record.first = builder.gep(record.first, [builder.mul(first, record.row)])
-    return record._getvalue()
+class Columns(Rows):
+    """n columns of an array, `stride` apart, with rows that are `row` apart. Of a count of 0 it is one column
+    with ordinary numbers."""
+
+    __slots__ = ("_row", "_stride")
+
+    def __init__(
+        self, place: Any, count: int, layout: Any, row: Any, stride: Any, is_empty: bool = False
+    ) -> None:
+        super().__init__(place, count, layout, 0, is_empty)
+        object.__setattr__(self, "_row", row)
+        object.__setattr__(self, "_stride", stride)
+
+    def _part(self, start: Any, layout: Any, is_empty: bool = False) -> Any:
+        place = CURRENT.machine.at(self._place, word(start * self._row), inbounds=False)
+        return Columns(place, self._n, layout, self._row, self._stride, is_empty)
+
+    def _read(self, k: Any) -> Lanes:
+        return _read(Pointer(self._place), k * self._row, self._stride, self._n)
+
+    def _write(self, k: Any, value: Any) -> None:
+        _write(full(value, self._n), Pointer(self._place), k * self._row, self._stride)
 
 
-def row_type(memory: Any) -> Any:
-    """Return the type of a row."""
-    return Lanes(memory.count) if memory.count else types.float64
-
-
-def read_row(code: Code, memory: Any, value: Any, row: Any) -> Any:
-    """Return the lanes of a row."""
-    if isinstance(memory, Rows):
-        return code.builder.load(_place(code.builder, value, row, memory.count), align=8 * memory.count)
-    record = code.context.make_helper(code.builder, memory, value=value)
-    at = code.builder.mul(row, record.row)
-    return _read(code.builder, record.first, at, record.stride, max(memory.count, 1))
-
-
-def write_row(code: Code, memory: Any, value: Any, row: Any, x: Any) -> None:
-    """Store lanes in a row."""
-    if isinstance(memory, Rows):
-        code.builder.store(x, _place(code.builder, value, row, memory.count), align=8 * memory.count)
-        return
-    record = code.context.make_helper(code.builder, memory, value=value)
-    at = code.builder.mul(row, record.row)
-    _write(code.builder, x, record.first, at, record.stride, max(memory.count, 1))
-
-
-def _place(builder: Any, rows: Any, row: Any, count: int) -> Any:
-    first = builder.gep(rows, [builder.mul(row, INDEX(count))], inbounds=True)
-    return builder.bitcast(first, wide(DOUBLE, count).as_pointer())
-
-
-def _read(builder: Any, pointer: Any, at: Any, stride: Any, count: int) -> Any:
-    """Read `count` doubles from pointer[at] on, `stride` apart: one load if they are neighbours."""
-    first = builder.gep(pointer, [at])
-    element = pointer.type.pointee
-    if count == 1:
-        loaded = builder.load(first)
+def _read(pointer: Pointer, at: Any, stride: Any, n: int) -> Lanes:
+    machine = CURRENT.machine
+    first = machine.at(pointer.x, word(at), pointer.item, False)
+    size = 8 if pointer.item == "double" else 4
+    if n <= 1 or (isinstance(stride, int) and stride == 0):
+        x = machine.spread(machine.load(first, pointer.item, size), n, pointer.item)
+    elif isinstance(stride, int) and stride == 1:
+        x = machine.load(first, wide(pointer.item, n), size)
     else:
-        # a branch at run time, so that one kernel serves both orders of memory
-        with builder.if_else(builder.icmp_signed("==", stride, INDEX(1))) as (near, far):
-            with near:
-                # singles may begin at any multiple of four bytes
-                whole = builder.load(builder.bitcast(first, wide(element, count).as_pointer()), align=4)
-                after_near = builder.block
-            with far:
-                places = [builder.add(at, builder.mul(stride, INDEX(lane))) for lane in range(count)]
-                loads = [builder.load(builder.gep(pointer, [place])) for place in places]
-                collected = gathered(builder, loads)
-                after_far = builder.block
-        loaded = builder.phi(whole.type)
-        loaded.add_incoming(whole, after_near)
-        loaded.add_incoming(collected, after_far)
-    return builder.fpext(loaded, wide(DOUBLE, count)) if element == SINGLE else loaded
+        places = [machine.at(first, word(stride * lane), pointer.item, False) for lane in range(n)]
+        x = machine.gathered([machine.load(place, pointer.item, size) for place in places], pointer.item)
+    if pointer.item == "float":
+        x = machine.new(f"fpext {wide('float', n)} {x} to {wide('double', n)}")
+    return Lanes(x, n)
 
 
-def _write(builder: Any, x: Any, pointer: Any, at: Any, stride: Any, count: int) -> None:
-    first = builder.gep(pointer, [at])
-    if pointer.type.pointee == SINGLE:
-        x = builder.fptrunc(x, wide(SINGLE, count))
-    if count == 1:
-        builder.store(x, first)
-        return
-    with builder.if_else(builder.icmp_signed("==", stride, INDEX(1))) as (near, far):
-        with near:
-            builder.store(x, builder.bitcast(first, x.type.as_pointer()), align=4)
-        with far:
-            for lane in range(count):
-                place = builder.add(at, builder.mul(stride, INDEX(lane)))
-                builder.store(pick(builder, x, lane, count), builder.gep(pointer, [place]))
+def _write(value: Lanes, pointer: Pointer, at: Any, stride: Any) -> None:
+    machine, n = CURRENT.machine, value.n
+    first = machine.at(pointer.x, word(at), pointer.item, False)
+    size = 8 if pointer.item == "double" else 4
+    x = value.x
+    if pointer.item == "float":
+        x = machine.new(f"fptrunc {wide('double', n)} {x} to {wide('float', n)}")
+    if n <= 1:
+        machine.store(first, x, pointer.item, size)
+    elif isinstance(stride, int) and stride == 1:
+        machine.store(first, x, wide(pointer.item, n), size)
+    else:
+        for lane in range(n):
+            place = machine.at(first, word(stride * lane), pointer.item, False)
+            machine.store(place, machine.pick(x, lane, n, pointer.item), pointer.item, size)
 
 
-@instruction(lambda rows, pointer, start, stride: Lanes(rows.count)(rows, pointer, types.intp, types.intp))
-def read(code: Code, rows: Any, pointer: Any, start: Any, stride: Any) -> Any:
-    """Return pointer[start], pointer[start + stride], ... as the lanes of `rows`. Singles are widened."""
-    return _read(code.builder, pointer, start, stride, code.result.count)
+def rows(pointer: Pointer, count: int, layout: Any) -> Rows:
+    """Return the memory at a pointer to doubles, aligned to 64 bytes, as rows of `count` lanes with the names
+    of a layout, or None."""
+    return Rows(pointer.x, count, layout)
 
 
-@instruction(lambda x, pointer, start, stride: types.void(x, pointer, types.intp, types.intp))
-def write(code: Code, x: Any, pointer: Any, start: Any, stride: Any) -> None:
-    """Store lanes at pointer[start], pointer[start + stride], ...; they are rounded if singles are there."""
-    _write(code.builder, x, pointer, start, stride, code.args[0].count)
+def rows_of(values: list[Any], count: int, layout: Any) -> Rows:
+    """Return a list of arrays, one for each row, as rows of a machine that computes at once."""
+    return Rows(values, count, layout)
 
 
-def _same_layout(rows: Any, columns: Any) -> Any:
-    if rows.layout is not columns.layout:
-        raise TypeError(f"fill: expected one layout, got {rows} and {columns}")
-    return types.void(rows, columns)
+def columns(pointer: Pointer, count: int, layout: Any, start: Any, row: Any, stride: Any) -> Columns:
+    """Return columns of an array of doubles, `stride` apart; its rows are `row` apart, and the first number of
+    the first column is pointer[start]."""
+    place = CURRENT.machine.at(pointer.x, word(start), inbounds=False)
+    return Columns(place, count, layout, row, stride)
 
 
-@instruction(_same_layout)
-def load_rows(code: Code, rows: Any, columns: Any) -> None:
+def block_at(rows: Rows, number: Any) -> Any:
+    """Return the rows of the `number`-th of several equal layouts, the first of which is `rows`."""
+    if isinstance(number, int) and number == 0:
+        return rows
+    return rows._part(number * rows._layout.size, rows._layout)
+
+
+def load_rows(to: Rows, start: Rows) -> None:
     """Read columns into rows of the same layout."""
-    to, start = code.args
-    for k in range(to.layout.size):
-        write_row(code, to, rows, INDEX(k), read_row(code, start, columns, INDEX(k)))
+    for k in range(to._layout.size):
+        to._write(k, start._read(k))
 
 
-@instruction(lambda rows, value: Lanes(rows.count)(rows, value))
-def full_like(code: Code, rows: Any, value: Any) -> Any:
-    """Return the same value in every lane of `rows`."""
-    return code.number(code.args[1], value, code.result.count)
+def read(like: Rows, pointer: Pointer, start: Any, stride: Any) -> Lanes:
+    """Return pointer[start], pointer[start + stride], ... as the lanes of `like`."""
+    return _read(pointer, start, stride, like._n)
 
 
-@instruction(lambda x, lane: types.float64(x, types.intp))
-def lane_of(code: Code, x: Any, lane: Any) -> Any:
-    """Return one lane as an ordinary number."""
-    return x if code.args[0].count == 1 else code.builder.extract_element(x, lane)
+def write(x: Lanes, pointer: Pointer, start: Any, stride: Any) -> None:
+    """Store lanes at pointer[start], pointer[start + stride], ...; they are rounded if singles are there."""
+    _write(x, pointer, start, stride)
 
 
-@instruction(lambda rows, row, lane, x: types.void(rows, types.intp, types.intp, types.float64))
-def set_lane(code: Code, rows: Any, row: Any, lane: Any, x: Any) -> None:
+def full_like(like: Rows, value: Any) -> Lanes:
+    """Return the same value in every lane of `like`."""
+    return full(value, like._n)
+
+
+def set_lane(rows: Rows, row: Any, lane: Any, x: Any) -> None:
     """Store an ordinary number in one lane of a row."""
-    at = code.builder.add(code.builder.mul(row, INDEX(code.args[0].count)), lane)
-    code.builder.store(x, code.builder.gep(rows, [at], inbounds=True))
+    machine = CURRENT.machine
+    machine.store(machine.at(rows._at(row), word(lane)), full(x, 0).x, "double", 8)
 
 
-@instruction(types.void)
-def store_vectors(code: Code, rows: Any, vectors: Any) -> None:
-    """Store a tuple of planar vectors in rows, two rows each."""
-    memory, kind = code.args
-    for k in range(kind.count):
-        for part, x in enumerate(code.split(kind.dtype, code.builder.extract_value(vectors, k))):
-            write_row(code, memory, rows, INDEX(2 * k + part), x)
+def store_vectors(rows: Rows, vectors: tuple[Plane, ...]) -> None:
+    """Store planar vectors in rows, two rows each."""
+    for k, value in enumerate(vectors):
+        rows[2 * k] = value.a
+        rows[2 * k + 1] = value.b
 
 
-@lower_cast(types.Number, Lanes)
-def _to_lanes(context: Any, builder: Any, given: Any, kind: Any, value: Any) -> Any:
-    return Code(context, builder).number(given, value, kind.count)
+def gather_eight(pointer: Any, index: Lanes) -> tuple[Lanes, ...]:
+    """Return pointer[index] to pointer[index + 7] in every lane; the index is a double that holds a whole
+    number."""
+    from hoof_env.simd.values import transposed
 
-
-def _is_row(args: Any) -> bool:
-    return isinstance(args[0], Rows | Columns) and isinstance(args[1], types.Integer)
-
-
-@infer_global(operator.getitem)
-class _GetRow(AbstractTemplate):
-    def generic(self, args: Any, kws: Any) -> Any:
-        return signature(row_type(args[0]), *args) if _is_row(args) else None
-
-
-@infer_global(operator.setitem)
-class _SetRow(AbstractTemplate):
-    def generic(self, args: Any, kws: Any) -> Any:
-        return signature(types.none, *args) if _is_row(args) and is_real(args[2]) else None
-
-
-def absent_row(builder: Any, memory: Any) -> Any:
-    """Return NaN as the row of a field that takes no memory, instead of what lies behind it."""
-    return spread(builder, ir.Constant(DOUBLE, math.nan), max(memory.count, 1))
-
-
-def _get_row(context: Any, builder: Any, signature: Any, values: Any) -> Any:
-    memory = signature.args[0]
-    if memory.is_empty:
-        return absent_row(builder, memory)
-    row = context.cast(builder, values[1], signature.args[1], types.intp)
-    return read_row(Code(context, builder), signature.args[0], values[0], row)
-
-
-def _set_row(context: Any, builder: Any, signature: Any, values: Any) -> Any:
-    (memory, place, given) = signature.args
-    if memory.is_empty:
-        return context.get_dummy_value()
-    code = Code(context, builder)
-    row = context.cast(builder, values[1], place, types.intp)
-    x = code.number(given, values[2], max(memory.count, 1))
-    write_row(code, memory, values[0], row, x)
-    return context.get_dummy_value()
-
-
-for _memory in (Rows, Columns):
-    lower_builtin(operator.getitem, _memory, types.Integer)(_get_row)
-    for _kind in (Lanes, types.Number):
-        lower_builtin(operator.setitem, _memory, types.Integer, _kind)(_set_row)
+    machine, n = CURRENT.machine, index.n
+    if machine.runs_now:
+        found = machine.table_rows(pointer, machine.whole_of(index.x), 8)
+        return tuple(Lanes(x, n) for x in found)
+    loaded = []
+    for lane in range(max(n, 1)):
+        at = machine.new(f"fptosi double {machine.pick(index.x, lane, n)} to i64")
+        loaded.append(Lanes(machine.load(machine.at(pointer.x, at), wide("double", 8), 8), 8))
+    columns = transposed(loaded)
+    return tuple(Lanes(column.x, n) for column in columns)

@@ -72,7 +72,7 @@ def run_together(kernel: Any, calls: Sequence[tuple[Any, ...]], num_threads: int
     at Ctrl-C.
     """
     # a kernel that is not compiled yet is compiled by this thread
-    if num_threads == 1 or len(calls) == 1 or not kernel.overloads:
+    if num_threads == 1 or len(calls) == 1 or kernel.call is None:
         return [kernel(*call) for call in calls]
     # `list` and `starmap` take a call and make it without bytecode between, so that no other thread takes it
     waiting = starmap(kernel, iter(calls))

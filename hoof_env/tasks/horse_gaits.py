@@ -33,11 +33,13 @@ from hoof_env.simd import (
     read,
     sqrt,
     vector,
+    when,
     where,
 )
 from hoof_env.simd.compile import inline_llvm
 from hoof_env.simd.layout import Block, Layout, Row, Vector
 from hoof_env.simd.math import clip, cos_sin
+from hoof_env.simd.values import rounded
 
 Floats = NDArray[np.float64]
 
@@ -407,7 +409,7 @@ def command_gait(task, actions, episode, first_leg, parameters, n, scratch):  # 
                 offset = episode.offset[at]
                 offset = offset + FOLLOWED * (action - offset)
                 episode.offset[at] = offset
-                offset = task.half[k] * offset
+                offset = rounded(task.half[k] * offset)
             wanted = speed * (1.0 + offset)
             if k > 0:
                 wanted = pair.swing[k - 1] + offset
@@ -430,8 +432,11 @@ def conjugate(z):  # type: ignore[no-untyped-def]
 def refer_to_target(task, episode, switched):  # type: ignore[no-untyped-def]
     """Change the episode's gait to the reference gait of the new commanded speed in the rows `switched`; the
     kernel's form of `reference_gaits`."""
-    if not (task.follows and any_lane(switched)):
-        return
+    if task.follows:
+        when(any_lane(switched))(lambda: _refer(task, episode, switched))
+
+
+def _refer(task, episode, switched):  # type: ignore[no-untyped-def]
     speeds = task.speeds
     gaits = task.gaits
     last = len(task.speeds) - 1
