@@ -16,7 +16,6 @@ from numpy.typing import NDArray
 from hoof_env.errors import ParameterError, check_choice, check_number
 from hoof_env.leg.geometry import Geometry, load_geometry
 from hoof_env.leg.presets import DEFAULT_PRESET, Preset, preset_error_type, preset_label, read_preset
-from hoof_env.simd.compile import kernel
 from hoof_env.simd.math import clip
 
 Gait = TypeVar("Gait")
@@ -342,7 +341,6 @@ QUICK = FilterSettings(gain=100.0, crank_rate=100.0, crank_acc=1e4, swing_rate=1
 """Filters that let the crank follow a level stance: it slows down and speeds up within every stride."""
 
 
-@kernel
 def command_filters(filters, command, settings):  # type: ignore[no-untyped-def]
     """Set each filter's acceleration: bounded, towards a bounded rate, towards the command."""
     for k in range(filters.shape[0]):
@@ -355,7 +353,6 @@ def command_filters(filters, command, settings):  # type: ignore[no-untyped-def]
         filters[k].acc = clip(INNER * gain * (wanted_rate - filters[k].rate), acc_bound)
 
 
-@kernel
 def advance_motion(motion, filters, h):  # type: ignore[no-untyped-def]
     """Advance filters and crank angle by `h` [s], exactly for constant filter accelerations."""
     # before the filters: the angle is the integral of the speed from the step's start
@@ -366,7 +363,6 @@ def advance_motion(motion, filters, h):  # type: ignore[no-untyped-def]
         filters[k].rate += h * filters[k].acc
 
 
-@kernel
 def evaluate_motion(motion, filters):  # type: ignore[no-untyped-def]
     """Fill rates and accelerations of crank and swing from crank angle and filters.
 

@@ -13,6 +13,8 @@ kernels of its own.
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass
+from functools import lru_cache
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -28,6 +30,10 @@ from hoof_env.dynamics.reactions import reactions_of
 from hoof_env.dynamics.stepping import begin_step, end_step, next_stage, weigh_stage
 from hoof_env.simd import (
     Cell,
+    Matrix,
+    Number,
+    Truth,
+    Whole,
     any_lane,
     block_at,
     columns,
@@ -36,14 +42,14 @@ from hoof_env.simd import (
     lane_sum,
     load_rows,
     loop,
+    new_rows,
     one_of,
-    rows,
+    read,
     when,
     where,
 )
-from hoof_env.simd.compile import Kernel, inline_llvm, inline_source
-from hoof_env.simd.kept import Kept, Kernels
-from hoof_env.simd.memory import address, doubles
+from hoof_env.simd.compile import Kernel, inline_llvm
+from hoof_env.simd.memory import Arrays, Given, RecordType
 
 LANES = 8
 """Number of environments side by side in a batch: one vector of 512 bits."""
@@ -145,7 +151,7 @@ def unpack_model(record, tables, ground, lanes_are_legs, law, form):  # type: ig
         lanes_are_legs=lanes_are_legs,
         form=form,
         cells=record.cells,
-        tables=address(tables),
+        tables=tables.first,
         settings=[record.settings[k] for k in places],
         averages=record.averages,
         stages=record.stages,
@@ -217,7 +223,7 @@ def store(memory, rows, count, good):  # type: ignore[no-untyped-def]
         memory[k] = where(good, rows[k], memory[k])
 
 
-@inline_source
+@inline_llvm
 def run_steps(  # type: ignore[no-untyped-def]
     trunk, legs, leg_count, model, account, constants, reactions, h, steps, keeps_account, reacts, joints
 ):
@@ -271,26 +277,24 @@ def run_steps(  # type: ignore[no-untyped-def]
             )
 
 
-@inline_llvm
-def leg_memory_of(at, i, n, row, far, lanes, form):  # type: ignore[no-untyped-def]
+def leg_memory_of(data: Matrix, form: EngineLayout, i: Whole, n: Whole, lanes: int, stride: Whole = 1) -> Any:
     """Return the `LegMemory` of the i-th leg of environment n and, with lanes, of the neighbouring columns or
-    legs; `at` is the engine's array, `row` and `far` are distances from row to row and from lane to lane."""
-    return columns(at, lanes, form.leg_memory, (form.trunk_rows + i * form.leg_rows) * row + n, row, far)
+    legs, `stride` apart."""
+    return columns(data, lanes, form.leg_memory, n, form.trunk_rows + i * form.leg_rows, stride)
 
 
-@inline_source
-def load(trunk, legs, leg_count, account, memory, at, n, row, far, lanes, form):  # type: ignore[no-untyped-def]
-    """Load the environments from column n on, with an account of 0."""
+def load(trunk, legs, leg_count, account, memory, leg_memory, form):
+    """Load the environments, with an account of 0; `leg_memory` gives the memory of each leg."""
     read_trunk(trunk, memory)
     if form.has_limits:
         clear_limits(trunk)
     for i in loop(leg_count):
-        read_leg(block_at(legs, i), leg_memory_of(at, i, n, row, far, lanes, form), form)
+        read_leg(block_at(legs, i), leg_memory(i), form)
     for k in range(form.account_size):
         account[k] = 0.0
 
 
-@inline_source
+@inline_llvm
 def start_motion(trunk, legs, leg_count, model, starts):  # type: ignore[no-untyped-def]
     """Turn the velocities of the environments that start into momenta."""
     begin_step(trunk, legs, leg_count, model)
@@ -298,40 +302,37 @@ def start_motion(trunk, legs, leg_count, model, starts):  # type: ignore[no-unty
         velocities_to_momenta(trunk, legs, leg_count, model, starts)
 
 
-@inline_source
-def store_legs(trunk, legs, leg_count, good, at, n, row, far, lanes, form):  # type: ignore[no-untyped-def]
+def store_legs(trunk, legs, leg_count, good, leg_memory, form):
     """Store reports, and where `good` holds what changes of the legs."""
     for i in range(leg_count):
         leg = block_at(legs, i)
-        memory = leg_memory_of(at, i, n, row, far, lanes, form)
+        memory = leg_memory(i)
         report_leg(trunk, leg, memory.report, form)
         store(memory.state, leg.state, form.leg_state, good)
         store(memory.strides, leg.strides, form.strides, good)
         store(memory.sums, leg.sums, form.sums, good)
 
 
-@inline_source
-def store_reactions(forces, leg_count, reactions, n, row, lanes, lanes_are_legs, form):  # type: ignore[no-untyped-def]
-    """Store the joint reactions of all legs."""
+def store_reactions(forces, leg_count, reactions, n, lanes, lanes_are_legs, form):
+    """Store the joint reactions of all legs, an array of shape (legs, numbers, columns)."""
+    size = form.reactions_size
+    width = reactions.shape[2]
+    rows = Matrix(reactions.first, (0, width))
     for i in range(leg_count):
-        size = form.reactions_size
-        stride = size * row if lanes_are_legs else 1
-        out = columns(address(reactions), lanes, form.reactions, i * size * row + n, row, stride)
+        out = columns(rows, lanes, form.reactions, n, i * size, size * width if lanes_are_legs else 1)
         leg_forces = block_at(forces, i)
         for k in range(size):
             out[k] = leg_forces[k]
 
 
-@inline_source
-def read_shapes(shapes, leg_count, constants, lanes, lanes_are_legs, form):  # type: ignore[no-untyped-def]
+def read_shapes(shapes, leg_count, constants, lanes, lanes_are_legs, form):
     """Load the constants of all legs, which all environments share."""
     stride = form.constants_size if lanes_are_legs else 0
-    shared = columns(address(constants), lanes, None, 0, 1, stride)
     for k in range(leg_count * form.constants_size):
-        shapes[k] = shared[k]
+        shapes[k] = read(constants.first, k, stride, lanes)
 
 
-@inline_source
+@inline_llvm
 def judge(trunk, legs, leg_count, before, resets, lanes_are_legs, form):  # type: ignore[no-untyped-def]
     """Return the results of the environments, and where the rows of the kernel are to be stored."""
     result = find_result(trunk, legs, leg_count, lanes_are_legs, form)
@@ -345,7 +346,7 @@ def judge(trunk, legs, leg_count, before, resets, lanes_are_legs, form):  # type
     return result, good
 
 
-@inline_source
+@inline_llvm
 def store_trunk(trunk, account, memory, good, keeps_account, form):  # type: ignore[no-untyped-def]
     """Store the report, and where `good` holds what changes of the trunk."""
     report_trunk(trunk, memory.report)
@@ -358,117 +359,153 @@ def store_trunk(trunk, account, memory, good, keeps_account, form):  # type: ign
         store(memory.account, account, form.account_size, good)
 
 
-def advance_of(
-    legs: int,
-    lanes: int,
-    lanes_are_legs: bool,
-    reacts: bool,
-    law: Any,
-    form: EngineLayout,
-    joints: Joints,
-    is_start: bool = False,
-) -> Callable[..., None]:
-    """Return the function of a kernel, which advances environments `begin` to `end` by substeps of h [s]; if
-    their number is negative, environments with the result `RESET_REQUESTED` are started.
+@dataclass(frozen=True)
+class Arrangement:
+    """Which environments, or legs, a kernel advances side by side.
 
-    Args:
-        legs: number of legs, 0 for any.
-        lanes: number of environments side by side or, if `lanes_are_legs`, of legs of one environment.
-        reacts: false for a kernel without code for joint reactions.
-        law, form, joints: law of contact (`hoof.law_of`), engine's layouts, kernels of the legs' structure.
+    Attributes:
+        name: of the arrangement.
+        lanes: number of environments side by side or, if `lanes_are_legs`, of legs of one trunk.
+        lanes_are_legs: True if the lanes are the legs of one trunk.
     """
 
-    def prepare(data, model, tables, ground, constants, reactions):  # type: ignore[no-untyped-def]
-        leg_count = legs
-        trunk = rows(doubles(form.trunk_size * lanes), lanes, form.trunk)
-        of_legs = rows(doubles(leg_count * form.leg_size * lanes), lanes, form.leg)
-        account = rows(doubles(form.account_size * lanes), lanes, form.account)
-        shapes = rows(doubles(leg_count * form.constants_size * lanes), lanes, form.constants)
-        forces = rows(doubles(leg_count * form.reactions_size * lanes), lanes, form.reactions)
-        unpacked = unpack_model(model, tables, ground, lanes_are_legs, law, form)
-        at = address(data)
-        row = data.shape[1]
+    name: str
+    lanes: int
+    lanes_are_legs: bool = False
+
+    @property
+    def step(self) -> int:
+        """Number of environments that are advanced at once."""
+        return 1 if self.lanes_are_legs else self.lanes
+
+
+ONE_BY_ONE = {1: Arrangement("leg", 1), 4: Arrangement("four", 4, lanes_are_legs=True)}
+"""Arrangements that run environments one by one, by the number of their legs."""
+
+SIDE_BY_SIDE = Arrangement("batch", LANES)
+
+
+@dataclass(frozen=True)
+class EngineKind:
+    """All that the code of an engine's kernels follows from.
+
+    Attributes:
+        features: features of the engine.
+        contact_law: user's law of the normal force; None for the engine's.
+        known: fields `STATIC` of its `MODEL`, with their values.
+        reacts: True for joint reactions.
+    """
+
+    features: Features
+    contact_law: Callable[..., Any] | None
+    known: tuple[tuple[str, Any], ...]
+    reacts: bool = False
+
+    @property
+    def legs(self) -> int:
+        """Number of legs."""
+        return int(dict(self.known)["legs"])
+
+    @property
+    def arrays(self) -> dict[str, str | RecordType]:
+        """Types of the arrays that kernels take."""
+        return {**dict.fromkeys(ARRAYS, "f8"), "model": RecordType(MODEL, dict(self.known))}
+
+
+ARRAYS = ("data", "model", "tables", "ground", "constants", "reactions")
+"""Names of the arrays that an engine's kernels take, in the order of `TrunkEngine.arrays`."""
+
+
+class Advance:
+    """Engine inside a kernel: memory on the stack, and settings, of the environments that are advanced.
+
+    Args:
+        given: arrays of the kernel, with those of `ARRAYS`.
+        kind: kind of the engine.
+        arrangement: environments that are advanced at once.
+        is_start: True for a kernel that starts the environments with the result `RESET_REQUESTED`.
+    """
+
+    def __init__(self, given: Given, kind: EngineKind, arrangement: Arrangement, is_start: bool = False) -> None:
+        self.kind = kind
+        self.arrangement = arrangement
+        self.is_start = is_start
+        self.form = form = engine_layout(kind.features)
+        lanes = arrangement.lanes
+        lanes_are_legs = arrangement.lanes_are_legs
+        self.leg_count = 1 if lanes_are_legs else kind.legs
+        self.trunk = new_rows(form.trunk, lanes)
+        self.legs = new_rows(form.leg, lanes, self.leg_count)
+        self.account = new_rows(form.account, lanes)
+        self.shapes = new_rows(form.constants, lanes, self.leg_count)
+        self.forces = new_rows(form.reactions, lanes, self.leg_count)
+        self.data = given.data
+        self.reactions = given.reactions
+        law = law_of(kind.contact_law)
+        self.model = unpack_model(given.model, given.tables, given.ground, lanes_are_legs, law, form)
+        structure = kind.features.structure
+        self.joints = Joints(reactions_of(structure), joint_check_of(structure))
+        if kind.reacts or form.has_limits:
+            read_shapes(self.shapes, self.leg_count, given.constants, lanes, lanes_are_legs, form)
+
+    def __call__(self, n: Whole, h: Number, steps: Whole, keeps_account: Truth) -> None:
+        """Advance environment n and, side by side, its neighbours by `steps` of `h` [s]."""
+        lanes = self.arrangement.lanes
+        lanes_are_legs = self.arrangement.lanes_are_legs
+        form = self.form
         # lanes are neighbouring columns; lanes that are legs are as far apart as the legs' rows in one column
-        far = form.leg_rows * row if lanes_are_legs else 1
-        if reacts or form.has_limits:
-            read_shapes(shapes, leg_count, constants, lanes, lanes_are_legs, form)
+        far = form.leg_rows * self.data.shape[1] if lanes_are_legs else 1
+        memory = columns(self.data, lanes, form.trunk_memory, n, stride=0 if lanes_are_legs else 1)
+        before = memory.result
+        starts = before == RESET_REQUESTED
+        trunk, legs, leg_count = self.trunk, self.legs, self.leg_count
 
-        def advance_group(n, h, steps, keeps_account):  # type: ignore[no-untyped-def]
-            memory = columns(at, lanes, form.trunk_memory, n, row, 0 if lanes_are_legs else 1)
-            before = memory.result
-            starts = before == RESET_REQUESTED
+        def leg_memory(i: Whole) -> Any:
+            return leg_memory_of(self.data, form, i, n, lanes, far)
 
-            @when(any_lane(starts) if is_start else True)
-            def _() -> None:
-                load(trunk, of_legs, leg_count, account, memory, at, n, row, far, lanes, form)
-                if is_start:
-                    start_motion(trunk, of_legs, leg_count, unpacked, starts)
-                run_steps(
-                    trunk, of_legs, leg_count, unpacked, account, shapes, forces, h, steps, keeps_account, reacts, joints
-                )  # fmt: skip
-                result, good = judge(trunk, of_legs, leg_count, before, is_start, lanes_are_legs, form)
-                memory.result = result
-                store_trunk(trunk, account, memory, good, keeps_account, form)
-                store_legs(trunk, of_legs, leg_count, good, at, n, row, far, lanes, form)
-                if reacts:
-                    store_reactions(forces, leg_count, reactions, n, row, lanes, lanes_are_legs, form)
-
-        return advance_group
-
-    return prepare
+        @when(any_lane(starts) if self.is_start else True)
+        def _() -> None:
+            load(trunk, legs, leg_count, self.account, memory, leg_memory, form)
+            if self.is_start:
+                start_motion(trunk, legs, leg_count, self.model, starts)
+            run_steps(
+                trunk, legs, leg_count, self.model, self.account, self.shapes, self.forces, h, steps, keeps_account,
+                self.kind.reacts, self.joints,
+            )  # fmt: skip
+            result, good = judge(trunk, legs, leg_count, before, self.is_start, lanes_are_legs, form)
+            memory.result = result
+            store_trunk(trunk, self.account, memory, good, keeps_account, form)
+            store_legs(trunk, legs, leg_count, good, leg_memory, form)
+            if self.kind.reacts:
+                store_reactions(self.forces, leg_count, self.reactions, n, lanes, lanes_are_legs, form)
 
 
-KERNELS = {"leg": (1, 1, False), "four": (1, 4, True), "batch": (0, LANES, False)}
-"""Number of legs (0 for any), number of lanes, and true if the lanes are the legs of one trunk: for one leg
-alone, for four legs of one trunk side by side, and for `LANES` environments."""
+def new_kernel(kind: EngineKind, arrangement: Arrangement, is_start: bool = False) -> Kernel:
+    """Return a kernel of an engine.
+
+    Its arguments are the arrays, the substep [s], the number of substeps, and 1 for a kernel that keeps the
+    account. It advances the columns of the arrays or, if `is_start`, starts those of them whose result is
+    `RESET_REQUESTED`.
+    """
+
+    def advance(given: Given, h: Number, steps: Whole, keeps_account: Whole) -> None:
+        advance_group = Advance(given, kind, arrangement, is_start)
+        for n in loop(given.begin, given.end, arrangement.step):
+            advance_group(n, h, 0 if is_start else steps, keeps_account != 0)
+
+    does = "start" if is_start else "react" if kind.reacts else "advance"
+    threads = not arrangement.lanes_are_legs and arrangement.lanes > 1
+    return Kernel(advance, [Arrays(kind.arrays), float, int, int], f"{does}_{arrangement.name}", threads)
 
 
-BY_LEGS = {1: "leg", 4: "four"}
-"""Kernels that run environments one by one, by the number of their legs."""
-
-_KEPT = Kept()
-
-
-class AdvanceKernels:
-    """Kernels of engines with one law of contact and one set of features, each made when it is first needed."""
-
-    def __init__(self, contact_law: Any, features: Features) -> None:
-        self._law = law_of(contact_law)
-        self._form = engine_layout(features)
-        self._joints = Joints(reactions_of(features.structure), joint_check_of(features.structure))
-        self._made: dict[Any, Kernel] = {}
-
-    def function(self, which: str, legs: int, reacts: bool = False, is_start: bool = False) -> Any:
-        """Return the function of a kernel, for kernels that contain it."""
-        own, lanes, lanes_are_legs = KERNELS[which]
-        count = own or legs
-        parts = (reacts, self._law, self._form, self._joints, is_start)
-        return advance_of(count, lanes, lanes_are_legs, *parts)
-
-    def get(self, which: str, does: str, static: tuple[tuple[str, Any], ...], is_start: bool = False) -> Kernel:
-        """Return a kernel for models with these values."""
-        key = (which, does, static, is_start)
-        if key not in self._made:
-            legs = dict(static)["legs"]
-            prepare = self.function(which, legs, does == "react", is_start)
-            step = 1 if KERNELS[which][2] else KERNELS[which][1]
-
-            def advance(  # type: ignore[no-untyped-def]
-                data, model, tables, ground, constants, reactions, h, steps, keeps_account, begin, end
-            ):
-                group = prepare(data, model, tables, ground, constants, reactions)
-                for n in loop(begin, end, step):
-                    group(n, h, 0 if is_start else steps, keeps_account != 0)
-
-            advance.__name__ = f"{'start' if is_start else does}_{which}"
-            kinds = ["matrix", (MODEL, dict(static)), "matrix", "matrix", "matrix", "matrix"]
-            kinds += ["double", "index", "truth", "index", "index"]
-            self._made[key] = Kernel(advance, kinds)
-        return self._made[key]
+@lru_cache(maxsize=256)
+def _own_kernel(kind: EngineKind, arrangement: Arrangement, is_start: bool) -> Kernel:
+    return new_kernel(kind, arrangement, is_start)
 
 
-def advance_kernels(contact_law: Callable[..., Any] | None = None, features: Features = PLAIN) -> Any:
-    """Return the kernels of engines with a law of contact and features."""
-    return _KEPT.get(
-        (contact_law, features), lambda: AdvanceKernels(contact_law, features), contact_law is not None
-    )
+def engine_kernel(kind: EngineKind, arrangement: Arrangement, is_start: bool = False) -> Kernel:
+    """Return the kernel of an engine, `new_kernel`; engines of one kind share it, unless a function from outside
+    is part of it, whose helpers may have changed since."""
+    if kind.contact_law is None:
+        return _own_kernel(kind, arrangement, is_start)
+    return new_kernel(kind, arrangement, is_start)

@@ -17,7 +17,7 @@ from numpy.typing import ArrayLike
 
 from hoof_env.constants import GRAVITY
 from hoof_env.dynamics import layout, memory
-from hoof_env.dynamics.advance import BY_LEGS, LANES, RESET_REQUESTED, advance_kernels, static_of
+from hoof_env.dynamics.advance import LANES, ONE_BY_ONE, RESET_REQUESTED, SIDE_BY_SIDE
 from hoof_env.dynamics.engine_motion import MOST_STEPS, EngineMotion
 from hoof_env.dynamics.parts import (
     Limb,
@@ -160,34 +160,24 @@ class TrunkEngine(EngineMotion):
 
     def _allocate(self) -> None:
         """Find the kernel, and make the memory of all environments."""
-        self.runs_scalar = len(self.limbs) in BY_LEGS and self.num_envs <= MAX_SCALAR_ENVS
+        self.runs_scalar = len(self.limbs) in ONE_BY_ONE and self.num_envs <= MAX_SCALAR_ENVS
         columns = self.num_envs if self.runs_scalar else memory.columns_for(self.num_envs)
         self.blocks = [range(columns)] if self.runs_scalar else blocks(columns, LANES, self.num_threads)
         self._memory = memory.new_memory(self, self.num_envs, columns, self.reacts)
         self._model = memory.new_model(self, self.filters, self.counts_strides)
-        self._choose_kernel()
+        self._arrangement = ONE_BY_ONE[len(self.limbs)] if self.runs_scalar else SIDE_BY_SIDE
+        self._kernels = {}
 
     def __repr__(self) -> str:
         legs = f"{len(self.limbs)} leg{'s' * (len(self.limbs) > 1)}"
         masses = f"{self.total_mass:.1f} kg"
         return f"<TrunkEngine {self.trunk.kind}, {legs}, {masses}, {self.num_envs} environments>"
 
-    def _choose_kernel(self) -> None:
-        which = BY_LEGS[len(self.limbs)] if self.runs_scalar else "batch"
-        does = "react" if self.reacts else "advance"
-        kernels = advance_kernels(self.contact_law, self.features)
-
-        def kernel(is_start: bool = False) -> Any:
-            # the model may have been replaced, by that of other conditions
-            return kernels.get(which, does, static_of(self._model[0]), is_start)
-
-        self._kernel = kernel
-
     def __getstate__(self) -> dict[str, Any]:
         """Return the attributes of a copy, which has memory of its own even if it is shallow."""
         m = self._memory
-        # the kernel is left out: the copy looks it up, perhaps in another process
-        parts = {name: part for name, part in vars(self).items() if name != "_kernel"}
+        # kernels are left out: the copy finds them, perhaps in another process
+        parts = {**vars(self), "_kernels": {}}
         return {
             **parts,
             "_memory": (m.data, self.num_envs, m.constants, m.reactions.copy(), m.features),
@@ -198,7 +188,6 @@ class TrunkEngine(EngineMotion):
         vars(self).update(state, _memory=memory.memory_of(memory.copy_of(data), *others))
         # a pickle may have come from a machine with more processors
         self.num_threads = limit_threads(self.num_threads)
-        self._choose_kernel()
 
     def __deepcopy__(self, memo: Any) -> TrunkEngine:
         """Return a copy that shares what never changes, such as the legs' tables."""

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from hoof_env.dynamics import engine_states, layout, memory
-from hoof_env.dynamics.advance import static_of
+from hoof_env.dynamics.advance import ARRAYS, EngineKind, static_of
 from hoof_env.dynamics.form import engine_layout
 from hoof_env.dynamics.names import NamedColumns
 from hoof_env.dynamics.parts import (
@@ -262,13 +262,10 @@ class EngineMemory(Mechanics):
         if self.trunk.kind == "rail":
             push[1] = 0.0
         if any(isinstance(limb.drive, Motor) for limb in self.limbs):
-            run = push_kernel(self.features, static_of(self._model[0]))
-            given: list[Any] = []
-            for array in (m.data, *self._model):
-                given += [array.ctypes.data, *array.shape[-2:]] if array.ndim > 1 else [array.ctypes.data]
+            named = dict(zip(ARRAYS, self.arrays, strict=True))
             which = np.ascontiguousarray(where, np.int64)
-            forward, upward = map(np.ascontiguousarray, push)
-            run(*given, forward.ctypes.data, upward.ctypes.data, which.ctypes.data, which.size)
+            run = push_kernel(EngineKind(self.features, None, static_of(self._model[0])))
+            run(run.parameters[0].hold({**named, "impulses": push, "which": which}))
         moving.momentum[:, where] += push
         if self.trunk.kind == "free":
             off = place - moving.centre[:, where]

@@ -9,13 +9,16 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from hoof_env.dynamics import engine_states, layout, memory
+from hoof_env.dynamics.advance import ARRAYS, Arrangement, EngineKind, engine_kernel, static_of
 from hoof_env.dynamics.engine_memory import EngineMemory
 from hoof_env.dynamics.limits import CHECK_EVERY
 from hoof_env.dynamics.names import NamedColumns
 from hoof_env.dynamics.parts import broken
 from hoof_env.errors import NotStartedError, count
+from hoof_env.simd.compile import Kernel
+from hoof_env.simd.memory import Held
 from hoof_env.simd.threads import run_together
-from hoof_env.simd.user_functions import NotCompiledError, compilation_error
+from hoof_env.simd.user_functions import UserFunctionError, user_error
 
 MOST_STEPS = 10**12
 """Largest number of substeps of a call: they are counted in 64 bits."""
@@ -34,7 +37,9 @@ class EngineMotion(EngineMemory):
     num_threads: int
     blocks: list[range]
     contact_law: Callable[..., Any] | None
-    _kernel: Any
+    reacts: bool
+    _arrangement: Arrangement
+    _kernels: dict[Any, Any]
 
     @property
     def substep(self) -> float:
@@ -151,15 +156,44 @@ class EngineMotion(EngineMemory):
         self._go_substeps(steps * self.substeps, account)
 
     def _go_substeps(self, substeps: int, account: bool) -> None:
+        """Advance by substeps; a negative number starts the environments that are to be started."""
+        kernel = self._find_kernel(is_start=substeps < 0)
         try:
-            run = self._kernel(is_start=substeps < 0)
-            given: list[Any] = []
-            for array in self.arrays:
-                given += [array.ctypes.data, *array.shape[-2:]] if array.ndim > 1 else [array.ctypes.data]
-            common = (*given, self.substep, max(substeps, 0), account)
-            calls = [(*common, block.start, block.stop) for block in self.blocks]
-            run_together(run, calls, self.num_threads)
-        except NotCompiledError as error:
-            if self.contact_law is None:
-                raise
-            raise compilation_error("contact_law", error) from error
+            calls = [(held, self.substep, max(substeps, 0), account) for held in self._held_blocks(kernel)]
+            run_together(kernel, calls, self.num_threads)
+        except UserFunctionError as error:
+            raise user_error("contact_law", error) from None
+
+    def compile(self) -> None:
+        """Compile or load the kernel that starts environments.
+
+        Raises:
+            ParameterError: the law of contact cannot be part of a kernel.
+        """
+        try:
+            self._find_kernel(is_start=True).compile()
+        except UserFunctionError as error:
+            raise user_error("contact_law", error) from None
+
+    def _find_kernel(self, is_start: bool = False) -> Kernel:
+        """Return the kernel for the present arrays; those of other conditions may have replaced them."""
+        if self._kernels.get("arrays") is not self._model:
+            known = static_of(self._model[0])
+            kind = EngineKind(self.features, self.contact_law, known, self.reacts)
+            self._kernels = {"arrays": self._model, "kind": kind}
+        if is_start not in self._kernels:
+            kernel = engine_kernel(self._kernels["kind"], self._arrangement, is_start)
+            self._kernels[is_start] = kernel
+        found: Kernel = self._kernels[is_start]
+        return found
+
+    def _held_blocks(self, kernel: Kernel) -> list[Held]:
+        """Return the present arrays as arguments of a kernel, a block of columns for each."""
+        arrays = self.arrays
+        before = self._kernels.get("held arrays", ())
+        if len(before) != len(arrays) or any(one is not other for one, other in zip(before, arrays, strict=True)):
+            named = dict(zip(ARRAYS, arrays, strict=True))
+            self._kernels["held"] = [kernel.parameters[0].hold(named, block) for block in self.blocks]
+            self._kernels["held arrays"] = arrays
+        blocks: list[Held] = self._kernels["held"]
+        return blocks

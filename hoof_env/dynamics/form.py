@@ -20,7 +20,6 @@ from hoof_env.dynamics.layout import (
 )
 from hoof_env.dynamics.leg_constants import constants_layout
 from hoof_env.dynamics.reactions import reactions_layout
-from hoof_env.simd.layout import Constants
 
 
 class _EngineLayout(NamedTuple):
@@ -49,7 +48,7 @@ class _EngineLayout(NamedTuple):
     reactions_size: int
 
 
-class EngineLayout(Constants, _EngineLayout):
+class EngineLayout(_EngineLayout):
     """Layouts of engines with the same `Features`, and the numbers that the compiler must know of them.
 
     Attributes:

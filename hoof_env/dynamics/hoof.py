@@ -22,7 +22,7 @@ from hoof_env.simd import (
 from hoof_env.simd.compile import inline_llvm
 from hoof_env.simd.math import clip, root_power
 from hoof_env.simd.values import rounded
-from hoof_env.simd.user_functions import function_name, inline_foreign, number_of
+from hoof_env.simd.user_functions import foreign, function_name, number_of
 
 
 @inline_llvm
@@ -273,7 +273,7 @@ def law_of(contact_law: Callable[..., Any] | None) -> Any:
     """
     if contact_law is None:
         return contact_force
-    force = inline_foreign(contact_law)
+    force = foreign(contact_law)
     number = number_of(f"the contact law {function_name(contact_law)}")
 
     @inline_llvm

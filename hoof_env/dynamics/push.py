@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-from typing import Any
+from functools import lru_cache
 
-from hoof_env.dynamics.advance import MODEL, leg_memory_of, read_leg, read_trunk, unpack_model
+from hoof_env.dynamics.advance import EngineKind, leg_memory_of, read_leg, read_trunk, unpack_model
 from hoof_env.dynamics.form import engine_layout
-from hoof_env.dynamics.layout import Features
 from hoof_env.dynamics.mechanics import (
     accelerate_crank,
     accelerate_trunk,
@@ -16,12 +15,9 @@ from hoof_env.dynamics.mechanics import (
     set_up_crank,
 )
 from hoof_env.dynamics.stepping import begin_step
-from hoof_env.simd import block_at, columns, full_like, loop, rows, vector
+from hoof_env.simd import block_at, columns, full_like, loop, new_rows, vector
 from hoof_env.simd.compile import Kernel, inline_source
-from hoof_env.simd.kept import Kept, Kernels
-from hoof_env.simd.memory import address, doubles
-
-_KEPT = Kept()
+from hoof_env.simd.memory import Arrays, Given
 
 
 @inline_source
@@ -46,40 +42,35 @@ def push_cranks(trunk, legs, leg_count, model, impulse):  # type: ignore[no-unty
         leg.state.crank_angle_rate = leg.state.crank_angle_rate + leg.theta_acceleration
 
 
-def push_kernel(features: Features, static: tuple[tuple[str, Any], ...]) -> Any:
-    """Return the kernel that adds to the crank speeds of some environments what impulses on their trunks
-    change at once.
+@lru_cache(maxsize=64)
+def push_kernel(kind: EngineKind) -> Kernel:
+    """Return the kernel that adds to the crank speeds of some environments what impulses on their trunks change
+    at once.
 
-    Its arguments are the engine's memory, model, tables and ground, the impulses [N s] forward and upward,
-    and the columns of the environments that are pushed; the last three have the same shape (n,).
+    Its argument are the arrays of the engine, and of the n environments that are pushed: `impulses` [N s], forward
+    and upward, shape (2, n), and `which`, their columns, shape (n,).
     """
-    return _KEPT.get(
-        (features, static), lambda: Kernels(push=_new_kernel(features, dict(static))), from_outside=False
-    ).push
+    form = engine_layout(kind.features)
+    count = kind.legs
 
-
-def _new_kernel(features: Features, static: dict[str, Any]) -> Any:
-    form = engine_layout(features)
-
-    def push(data, model, tables, ground, forward, upward, which, size):  # type: ignore[no-untyped-def]
-        count = model.legs
-        trunk = rows(doubles(form.trunk_size), 1, form.trunk)
-        legs = rows(doubles(count * form.leg_size), 1, form.leg)
+    def push(given: Given) -> None:
+        trunk = new_rows(form.trunk, 1)
+        legs = new_rows(form.leg, 1, count)
         # pushes are rare: one environment after the other; no law of contact, for none meets the ground here
-        unpacked = unpack_model(model, tables, ground, False, None, form)
-        at = address(data)
-        row = data.shape[1]
+        model = unpack_model(given.model, given.tables, given.ground, False, None, form)
+        data, impulses, which = given.data, given.impulses, given.which
+        size = which.shape[0]
         for j in loop(size):
-            n = which[j]
-            read_trunk(trunk, columns(at, 1, form.trunk_memory, n, row, 1))
+            n = which.first[j]
+            read_trunk(trunk, columns(data, 1, form.trunk_memory, n))
             for i in loop(count):
-                read_leg(block_at(legs, i), leg_memory_of(at, i, n, row, 1, 1, form), form)
-            begin_step(trunk, legs, count, unpacked)
-            impulse = vector(full_like(trunk, forward[j]), full_like(trunk, upward[j]))
-            push_cranks(trunk, legs, count, unpacked, impulse)
+                read_leg(block_at(legs, i), leg_memory_of(data, form, i, n, 1), form)
+            begin_step(trunk, legs, count, model)
+            forward, upward = impulses.first[j], impulses.first[size + j]
+            impulse = vector(full_like(trunk, forward), full_like(trunk, upward))
+            push_cranks(trunk, legs, count, model, impulse)
             for i in loop(count):
-                memory = leg_memory_of(at, i, n, row, 1, 1, form)
+                memory = leg_memory_of(data, form, i, n, 1)
                 memory.state.crank_angle_rate = block_at(legs, i).state.crank_angle_rate
 
-    kinds = ["matrix", (MODEL, static), "matrix", "matrix", "pointer", "pointer", "addresses", "index"]
-    return Kernel(push, kinds)
+    return Kernel(push, [Arrays({**kind.arrays, "impulses": "f8", "which": "i8"})])

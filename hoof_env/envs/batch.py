@@ -39,7 +39,7 @@ from hoof_env.envs.outcome import MOVED
 from hoof_env.envs.step import NOT_A_NUMBER, SOME_ENDED, SOME_PUSHED, SOME_SWITCHED
 from hoof_env.errors import ParameterError, check_number
 from hoof_env.simd.threads import run_together
-from hoof_env.simd.user_functions import NotCompiledError, compilation_error
+from hoof_env.simd.user_functions import UserFunctionError, user_error
 from hoof_env.tasks.delays import Delay
 from hoof_env.tasks.disturbances import Push
 from hoof_env.tasks.episode import episode_layout
@@ -79,7 +79,7 @@ COPIED = (
 """Attributes of an `EpisodeBatch` that change in place, which a copy must have for itself."""
 
 FOUND_AGAIN = (
-    "addresses",
+    "held",
     "_blocks",
     "entries",
     "true_entries",
@@ -87,7 +87,6 @@ FOUND_AGAIN = (
     "measurements",
     "episode_rows",
     "kernels",
-    "observe_kernel",
 )
 """Attributes of an `EpisodeBatch` that belong to one process: addresses, kernels and views."""
 
@@ -153,8 +152,8 @@ class EpisodeBatch(BatchKernels, BatchChanges):
             return
         try:
             self._compile()
-        except NotCompiledError as error:
-            raise compilation_error(task.id, error, MOVED) from error
+        except UserFunctionError as error:
+            raise user_error(task.id, error, MOVED) from None
 
     def _check_settings(self) -> None:
         """Check the settings, and set the attributes that follow from them."""

@@ -15,7 +15,7 @@ from hoof_env.dynamics.engine import TrunkEngine
 from hoof_env.dynamics.parts import LARGEST
 from hoof_env.dynamics.step_length import StepLength
 from hoof_env.dynamics.stepping import SCHEMES
-from hoof_env.envs.observation_kernel import slots_of
+from hoof_env.envs.scene import Slots
 from hoof_env.eq8.episodes import PaperSolver, Scheme
 from hoof_env.eq8.integrators import INTEGRATORS
 from hoof_env.errors import ParameterError, check_choice, check_number
@@ -157,10 +157,10 @@ def substeps_under(batch: Any, changes: Mapping[str, float], asked: int | None) 
 def task_record(batch: Any) -> NDArray[Any]:
     """Return the record of the constants that the kernels of an `EpisodeBatch` read, shape (1,)."""
     entries = batch.task.entries
-    slots, _, count = slots_of(entries)
+    slots = Slots.of(entries)
     own = own_of(batch.task.terms, entries)
     fields = (*batch.body.kernels.task_fields, *own.fields)
-    kind = task_type(len(batch.task.terms), count, batch.engine.features.gait_size, fields)
+    kind = task_type(len(batch.task.terms), slots.count, batch.engine.features.gait_size, fields)
     constants = np.zeros(1, kind)
     task = constants[0]
     for name, value in batch.body.constants(batch.engine, batch.dt).items():
@@ -182,7 +182,7 @@ def task_record(batch: Any) -> NDArray[Any]:
     frame = [entry.name for entry in batch.entries]
     behind = len(batch.names) - len(batch.true_entries)
     privileged = [entry.name for entry in batch.true_entries]
-    for entry, slot in zip(entries, slots, strict=True):
+    for entry, slot in zip(entries, slots.places, strict=True):
         if entry.name in frame:
             task["observation_columns"][slot] = frame.index(entry.name)
             task["noise"][slot] = batch.noise.get(entry.group, 0.0)

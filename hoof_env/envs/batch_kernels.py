@@ -7,58 +7,29 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from hoof_env.dynamics.advance import static_of
+from hoof_env.dynamics.advance import EngineKind, static_of
 from hoof_env.dynamics.engine import TrunkEngine
 from hoof_env.dynamics.form import engine_layout
-from hoof_env.envs.addresses import ADDRESSES, END
 from hoof_env.envs.batch_build import find_entries
-from hoof_env.envs.conditions import (
-    under_each,
-)
+from hoof_env.envs.conditions import under_each
 from hoof_env.envs.infos import InfoLayout
-from hoof_env.envs.observation_kernel import from_outside, functions_of
-from hoof_env.envs.step import NOT_A_NUMBER, step_kernels
+from hoof_env.envs.scene import ALL_ARRAYS, TaskKind, functions_of, is_from_outside, known_of
+from hoof_env.envs.step import NOT_A_NUMBER, StepKernels, step_kernels
 from hoof_env.errors import ParameterError
 from hoof_env.gait import GaitParameters
+from hoof_env.simd.compile import Kernel
 from hoof_env.simd.layout import views
+from hoof_env.simd.memory import Held
 from hoof_env.tasks.observation import MIDDLE
 
 Floats = NDArray[np.float64]
-
-
-CHANGING = ("episode_steps", "substeps", "part_substeps")
-"""Whole numbers of a task's record that kernels read when they run."""
-
-
-def known_of(record: Any) -> tuple[tuple[str, Any], ...]:
-    """Return the fields of a task's record that kernels are made for: truths and whole numbers."""
-    kinds = record.dtype.fields
-    names = [name for name in kinds if kinds[name][0].base.kind in "ib" and name not in CHANGING]
-    values = [record[0][name] for name in names]
-    return tuple(
-        (name, tuple(value.tolist()) if value.shape else value.item())
-        for name, value in zip(names, values, strict=True)
-    )
-
-
-class Held(int):
-    """Address of an array, which it keeps alive."""
-
-    array: NDArray[Any]
-
-    @classmethod
-    def of(cls, array: NDArray[Any]) -> Held:
-        made = cls(array.ctypes.data)
-        made.array = array
-        return made
 
 
 class BatchKernels:
     """Kernels of an `EpisodeBatch`, and the arrays that they work on.
 
     Attributes:
-        kernel, addresses: `kernel(addresses)` is one control step of all episodes; `finish_step` follows.
-        observe_kernel: kernel that observes without a step; `observe_kernel(addresses)`.
+        kernel, held: `kernel(held)` is one control step of all episodes; `finish_step` follows.
         kernels: all kernels of the task, `step.StepKernels`.
         episode_rows: views of the episodes' memory by name.
         entries: entries that are observed.
@@ -109,35 +80,36 @@ class BatchKernels:
         """Find the kernels, and the addresses of the arrays in this process."""
         find_entries(self)
         functions = [part for entry in (*self.entries, *self.true_entries) for part in functions_of(entry)]
-        self.has_own_entries = bool(from_outside(functions))
+        self.has_own_entries = any(map(is_from_outside, functions))
         self.measurements = InfoLayout(self.engine.features, tuple(self.body.hips))
         self.find()
 
     def _choose(self) -> None:
         """Find the kernels for what is known of the present records of engine and task."""
-        self.kernels = k = step_kernels(
+        # few environments, or the paper's solver, which works on the engine's memory between two kernels
+        is_scalar = bool(self.engine.runs_scalar or self.paper)
+        kind = TaskKind(
             self.task.terms,
             self.task.entries,
-            self.task.contact_law,
-            self.engine.features,
             self.body.kernels,
             self.task.action_map,
+            EngineKind(self.engine.features, self.task.contact_law, static_of(self.engine.arrays[1])),
             known_of(self.task_record),
-            static_of(self.engine.arrays[1]),
         )
-        # Few environments, or the paper's solver, which works on the engine's memory between two kernels.
-        runs_scalar = self.engine.runs_scalar or self.paper
-        self.kernel, self.observe_kernel = (
-            (k.step_one, k.observers.observe_one)
-            if runs_scalar
-            else (k.step_batch, k.observers.observe_batch)
-        )
-        if self.paper:
-            self.kernel = self._step_paper
+        self.kernels = step_kernels(kind, is_scalar)
+        self.kernel = self._step_paper if self.paper else self.kernels.step
 
     def find(self) -> None:
-        """Find the addresses of the arrays, after any of them was replaced."""
+        """Find kernels and arrays for calls, after any of them was replaced."""
         self.episode_rows = views(self.layout, self.episode)
+        self._choose()
+        # a block of columns for each thread; the paper's solver runs on one, with all of them
+        blocks = [range(self.engine.columns)] if self.paper else self.engine.blocks
+        self.held = self._hold(range(self.engine.columns))
+        self._blocks = [(self._hold(block),) for block in blocks]
+
+    def _hold(self, columns: range, kernel: Kernel | None = None, **more: NDArray[Any]) -> Held:
+        """Return the arrays as the argument of a kernel that works on some columns."""
         arrays = (
             *self.engine.arrays,
             self.episode,
@@ -150,11 +122,13 @@ class BatchKernels:
             self.frames,
             self.mapped,
         )
-        self.addresses = ADDRESSES.of(*arrays, columns=range(self.engine.columns))
-        # A block of columns for each thread; the paper's solver runs on one, with all of them.
-        blocks = [range(self.engine.columns)] if self.paper else self.engine.blocks
-        self._blocks = [(Held.of(ADDRESSES.of(*arrays, columns=block)),) for block in blocks]
-        self._choose()
+        named = dict(zip(ALL_ARRAYS, arrays, strict=True)) | more
+        held: Held = (kernel or self.kernels.observe).parameters[0].hold(named, columns)
+        return held
+
+    def observe(self, columns: range | None = None) -> None:
+        """Observe all rows, or those of some columns, without a step."""
+        self.kernels.observe(self.held if columns is None else self._hold(columns))
 
     def check_mapped(self) -> None:
         """Check that a map of actions from outside gave numbers.
@@ -185,46 +159,35 @@ class BatchKernels:
         )
 
     def _compile(self) -> None:
-        """Compile or load every kernel of a step, by running it on no environment."""
+        """Compile or load every kernel of a step."""
         if self.paper:
-            self._run_idle(self.kernels.apply_one, self.kernels.finish_one)
+            self.kernels.apply.compile()
+            self.kernels.finish.compile()
             self.paper.compile(GaitParameters(*MIDDLE))
         else:
-            self._run_idle(self.kernel)
-        self._run_idle(self.observe_kernel)
-        self.engine.reset(np.empty((self.legs, self.engine.features.gait_size, 0)), envs=[])
-
-    def compile_measured(self) -> None:
-        """Compile or load the kernel of `measured`, which few use: making a batch leaves it out."""
-        self._measure(np.zeros((len(self.names), 0)))
+            self.kernels.step.compile()
+        self.kernels.observe.compile()
+        self.engine.compile()
 
     def _measure(self, out: Floats) -> None:
-        self.kernels.observers.measure_one(self.addresses.ctypes.data, out.ctypes.data, out.shape[1])
-
-    def _run_idle(self, *kernels: Any) -> None:
-        """Run kernels on no environment."""
-        idle = self.addresses.copy()
-        idle[END] = 0
-        for run in kernels:
-            run(idle.ctypes.data)
+        self.kernels.measure(self._hold(range(out.shape[1]), self.kernels.measure, measured=out))
 
     def direct_kernel(self) -> Any:
-        """Return `kernel` without numba's dispatch by types, which takes a hundredth of a single step. It
-        must be called with `addresses` only, as it checks no types."""
+        """Return `kernel` as machine code, without what a call of it costs in Python. It must be called with
+        `held` only, as it checks no types."""
         if self.paper:
             return self.kernel
-        # Not compiled yet in a process that unpickled the batch.
-        if self.kernel.call is None:
-            self._run_idle(self.kernel)
-        return self.kernel.call
+        if self.kernels.step.call is None:  # in a process that unpickled the batch
+            self.kernels.step.compile()
+        return self.kernels.step.call
 
-    def _step_paper(self, addresses: NDArray[np.int64]) -> int:
+    def _step_paper(self, held: Held) -> int:
         """Take a control step with the paper's solver between the kernels; return the code of a step."""
         assert self.paper
-        if not self.kernels.apply_one(addresses):
+        if not self.kernels.apply(held):
             return NOT_A_NUMBER
         self.paper.advance()
-        happened: int = self.kernels.finish_one(addresses)
+        happened: int = self.kernels.finish(held)
         return happened
 
     def measured(self) -> dict[str, Floats]:
@@ -269,4 +232,4 @@ class BatchKernels:
         data[:] = kept
         # NaN at the point of failure, with which a state would be refused
         self.episode_rows.x_before[envs] = self.engine.report["x"][envs]
-        self.observe_kernel(self.addresses.ctypes.data)
+        self.observe()

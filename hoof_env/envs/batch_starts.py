@@ -11,7 +11,6 @@ from numpy.typing import NDArray
 
 from hoof_env.constants import GRAVITY
 from hoof_env.dynamics.advance import LANES
-from hoof_env.envs.addresses import BEGIN, END
 from hoof_env.envs.batch_build import name_source, substeps_under
 from hoof_env.envs.batch_pushes import begin_disturbances, check_can_be_pushed
 from hoof_env.envs.conditions import enter
@@ -134,14 +133,13 @@ def start(
     if batch.paper:
         batch.paper.start(which.tolist(), start.gaits, *(start.values[name] for name in ("crank_angle", "x")))
     # Whole groups of lanes, from that of the first environment to that of the last: kernels take no parts.
-    groups = batch.addresses.copy()
-    groups[BEGIN] = which.min() // LANES * LANES
-    groups[END] = min(batch.engine.columns, (which.max() // LANES + 1) * LANES)
-    batch.observe_kernel(groups.ctypes.data)
+    begin, end = (int(row) // LANES * LANES for row in (which.min(), which.max() + LANES))
+    groups = range(begin, min(batch.engine.columns, end))
+    batch.observe(groups)
     if batch.frames.size or batch.past_actions.size:
         fill_past(batch, which)
         # Again, with what the first one saw as all that was ever seen.
-        batch.observe_kernel(groups.ctypes.data)
+        batch.observe(groups)
     return drawn
 
 

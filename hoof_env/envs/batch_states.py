@@ -150,7 +150,7 @@ def _set_state(batch: Any, state: Mapping[str, Any]) -> None:
     if batch.conditions.differ:
         under_each(batch, np.arange(batch.num_envs), lambda rows: _observe(batch), for_kernels=True)
     else:
-        batch.observe_kernel(batch.addresses.ctypes.data)
+        batch.observe()
     for name, values in seen.items():
         if values is not None:
             getattr(batch, name)[: batch.num_envs] = values
@@ -164,7 +164,7 @@ def kept_arrays(batch: Any) -> list[str]:
 def _observe(batch: Any) -> None:
     """Observe the present, forces on the present ground included."""
     batch.engine.observe()
-    batch.observe_kernel(batch.addresses.ctypes.data)
+    batch.observe()
 
 
 def _read_steps(batch: Any, given: Any) -> Floats:

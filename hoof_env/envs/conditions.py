@@ -69,7 +69,7 @@ OF_ENGINE = ("trunk", "ground", "limbs", "terrain", "substeps", "step_limits", "
 KERNEL = "kernel mark"
 """Name of the part of conditions that is one object where kernels give the same results."""
 
-PLACES = ("addresses", "_blocks", "kernels", "kernel", "observe_kernel")
+PLACES = ("held", "_blocks", "kernels", "kernel")
 """Attributes that hold addresses of arrays, which a copy has to find again."""
 
 

@@ -7,91 +7,64 @@ moves them one place on. Both are numbers of one row after the other, so these l
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from typing import Any
-
-from hoof_env.envs.addresses import AT, memories
-from hoof_env.simd import loop, whole
-from hoof_env.simd.compile import inline_llvm, inline_source
+from hoof_env.envs.scene import Scene
+from hoof_env.simd import Pointer, Whole, whole
 from hoof_env.simd.math import clip
-from hoof_env.simd.memory import singles_at
-from hoof_env.tasks.episode import Memories
 
 
-@inline_llvm
-def move_on(kept, first, last, size):  # type: ignore[no-untyped-def]
+def move_on(kept: Pointer, first: int, last: int, size: int) -> None:
     """Move blocks of `size` numbers from `first` on one place on; the block at `last` is lost."""
-    for k in range(last * size - 1, first * size - 1, -1):  # known when the kernel is traced
+    for k in range(last * size - 1, first * size - 1, -1):
         kept[k + size] = kept[k]
 
 
-@inline_llvm
-def copied(to, start, of, begin, size):  # type: ignore[no-untyped-def]
-    """Copy `size` numbers from of[begin] on to to[start] on; return the place behind them."""
+def copy(to: Pointer, start: Pointer, size: int) -> None:
+    """Copy `size` numbers."""
     for k in range(size):
-        to[start + k] = of[begin + k]
-    return start + size
+        to[k] = start[k]
 
 
-@inline_source
-def remember(addresses, lanes, task, n):  # type: ignore[no-untyped-def]
+def remember(scene: Scene, n: Whole) -> None:
     """Make room for the frame of this step and keep its action, in row n and its neighbours."""
+    task = scene.task
     if task.frames > 0:
         row_size = task.frames * task.frame_size
-        for lane in range(lanes):
-            row = n + lane
-            frames = singles_at(addresses[AT.frames] + 4 * row * row_size)
-            move_on(frames, task.first_frame, task.frames - 1, task.frame_size)
+        for lane in range(scene.lanes):
+            move_on(scene.frames + (n + lane) * row_size, task.first_frame, task.frames - 1, task.frame_size)
     if task.keeps_actions:
         row_size = task.kept_actions * task.action_size
-        asked = singles_at(addresses[AT.actions])
-        for lane in range(lanes):
+        for lane in range(scene.lanes):
             row = n + lane
-            kept = singles_at(addresses[AT.past_actions] + 4 * row * row_size)
+            kept = scene.past_actions + row * row_size
             move_on(kept, 0, task.kept_actions - 1, task.action_size)
             for k in range(task.action_size):
-                kept[k] = clip(asked[row * task.action_size + k], 1.0)
+                kept[k] = clip(scene.actions[row * task.action_size + k], 1.0)
 
 
-def delayed_actions(layouts: Memories) -> Callable[..., Any]:
-    """Return a part of kernels that puts the action that acts now in its place, in row n and its
-    neighbours."""
-
-    @inline_source
-    def put_action(addresses, lanes, task, n):  # type: ignore[no-untyped-def]
-        if task.keeps_actions:
-            size = task.action_size
-            kept = singles_at(addresses[AT.past_actions])
-            acted = singles_at(addresses[AT.acted])
-            for lane in range(lanes):
-                row = n + lane
-                _, _, episode = memories(addresses, 0, layouts, row)
-                place = row * task.kept_actions + whole(episode.action_delay)
-                copied(acted, row * size, kept, place * size, size)
-
-    return put_action
+def put_action(scene: Scene, n: Whole) -> None:
+    """Put the action that acts now in its place, in row n and its neighbours."""
+    task = scene.task
+    if task.keeps_actions:
+        size = task.action_size
+        for lane in range(scene.lanes):
+            row = n + lane
+            place = row * task.kept_actions + whole(scene.episode_of(row).action_delay)
+            copy(scene.acted + row * size, scene.past_actions + place * size, size)
 
 
-def publisher(layouts: Memories) -> Callable[..., Any]:
-    """Return a part of kernels that observes kept frames and actions, in row n and its neighbours."""
-
-    @inline_source
-    def publish(addresses, lanes, task, n):  # type: ignore[no-untyped-def]
-        observations = singles_at(addresses[AT.observations])
-        if task.frames > 0:
-            frames = singles_at(addresses[AT.frames])
-            size = task.frame_size
-            for lane in range(lanes):
-                row = n + lane
-                _, _, episode = memories(addresses, 0, layouts, row)
-                place = row * task.frames + task.first_frame + whole(episode.observation_delay)
-                copied(observations, row * task.observation_size, frames, place * size, task.history * size)
-        if task.last_actions > 0:
-            kept = singles_at(addresses[AT.past_actions])
-            size = task.action_size
-            for lane in range(lanes):
-                row = n + lane
-                to = row * task.observation_size + task.history * task.frame_size
-                copied(observations, to, kept, row * task.kept_actions * size, task.last_actions * size)
-
-    return publish
+def publish(scene: Scene, n: Whole) -> None:
+    """Observe kept frames and actions, in row n and its neighbours."""
+    task = scene.task
+    if task.frames > 0:
+        size = task.frame_size
+        for lane in range(scene.lanes):
+            row = n + lane
+            place = row * task.frames + task.first_frame + whole(scene.episode_of(row).observation_delay)
+            observed = scene.observations + row * task.observation_size
+            copy(observed, scene.frames + place * size, task.history * size)
+    if task.last_actions > 0:
+        size = task.action_size
+        for lane in range(scene.lanes):
+            row = n + lane
+            observed = scene.observations + (row * task.observation_size + task.history * task.frame_size)
+            copy(observed, scene.past_actions + row * task.kept_actions * size, task.last_actions * size)

@@ -15,7 +15,6 @@ from numpy.typing import NDArray
 
 from hoof_env.dynamics.parts import broken
 from hoof_env.envs.arguments import EnvArguments, takes
-from hoof_env.envs.batch_kernels import Held
 from hoof_env.envs.base import LegBase, array_of, generator_of
 from hoof_env.envs.batch_reports import ending_of
 from hoof_env.envs.batch_starts import check_options
@@ -76,7 +75,7 @@ class HorseLegEnv(LegBase, gym.Env[NDArray[np.float32], NDArray[np.float32]]):
         self._views: tuple[Any, ...] = (
             batch.actions[0].data,
             batch.direct_kernel(),
-            Held.of(batch.addresses),
+            batch.held,
             bool(batch.drawn_names),
             paid,
             batch.episode_rows.terms[:, 0],
@@ -123,9 +122,9 @@ class HorseLegEnv(LegBase, gym.Env[NDArray[np.float32], NDArray[np.float32]]):
         checked = check_options(self.batch, options)  # first, so that a refused reset changes nothing
         super().reset(seed=None if seed is None else count("seed", seed, low=0))
         self.batch.restart_schedules([] if seed is None else [0])
-        before = self.batch.addresses
+        before = self.batch.held
         parameters = self.batch.reset([0], [self.np_random], checked)
-        if self.batch.addresses is not before:  # `change_settings` took effect: other arrays
+        if self.batch.held is not before:  # `change_settings` took effect: other arrays
             self._attach()
         self._phase = "running"
         if self._watched:
@@ -156,13 +155,13 @@ class HorseLegEnv(LegBase, gym.Env[NDArray[np.float32], NDArray[np.float32]]):
         if self._phase != "running":
             self._check_started("step")
             self._warn_ended()
-        buffer, kernel, addresses, draws, paid, terms, rewards, observe, measure = self._views
+        buffer, kernel, held, draws, paid, terms, rewards, observe, measure = self._views
         # A copy from buffer to buffer is the fastest way; it takes float32 arrays of the right shape only.
         try:
             buffer[:] = action
         except (TypeError, ValueError, BufferError):
             self._read_action(action)
-        happened = kernel(addresses)  # not through the batch: a call costs as much as a substep
+        happened = kernel(held)  # not through the batch: a call costs as much as a substep
         measured = measure()  # before a push that is due, which changes speeds at once
         ended = happened != 0 and self._follow(happened)
         info = self._begun[0]()  # has all keys already, in the order of the reset's info

@@ -14,7 +14,6 @@ from numpy.typing import NDArray
 from hoof_env.errors import ParameterError, check_choice, check_number
 from hoof_env.ground.laws import FRICTION_LAWS, NORMAL_LAWS, damping, friction_part, normal_force
 from hoof_env.leg.presets import DEFAULT_PRESET, Preset, preset_error_type, preset_label, read_preset
-from hoof_env.simd.compile import kernel
 from hoof_env.simd.math import EXPONENT_UNIT
 
 CONTACT = np.dtype(
@@ -121,7 +120,6 @@ def new_contacts() -> NDArray[np.void]:
     return np.zeros(2, dtype=CONTACT)
 
 
-@kernel
 def latch(contact, penetration, rate, ground):  # type: ignore[no-untyped-def]
     """Update penetration and rate of a point; on entering the ground, latch its approach speed (floored)."""
     if penetration > 0.0 and not contact.inside:
@@ -138,7 +136,6 @@ def latch(contact, penetration, rate, ground):  # type: ignore[no-untyped-def]
     contact.rate = rate
 
 
-@kernel
 def touch(contact, position, velocity, ground):  # type: ignore[no-untyped-def]
     """Return the force of the ground, y = 0, on one hoof point, as the complex number friction + i normal
     [N]; update `contact`. Position and velocity of the point are complex [m, m/s]."""

@@ -19,7 +19,6 @@ from numpy.typing import ArrayLike, NDArray
 from hoof_env.errors import ParameterError, check_number
 from hoof_env.simd import floor, gather_eight, maximum, minimum
 from hoof_env.simd.compile import inline_llvm
-from hoof_env.simd.memory import address
 
 MOST_KNOTS = 1_000_000
 """Largest number of knots."""
@@ -286,6 +285,6 @@ def surface(x, cells, origin, per_metre):  # type: ignore[no-untyped-def]
     # far beyond the ends `part` is large, but the level cells there have no rises
     part = place - cell
     height, rise, normal_x, normal_y, stiffness, firmer, friction, rougher = gather_eight(
-        address(cells), 8.0 * cell
+        cells.first, 8.0 * cell
     )
     return height + part * rise, normal_x, normal_y, stiffness + part * firmer, friction + part * rougher

@@ -18,16 +18,13 @@ from hoof_env.leg.assembly import centres, solve
 from hoof_env.leg.checks import count_of
 from hoof_env.leg.geometry import Geometry
 from hoof_env.leg.mechanism import Mechanism
-from hoof_env.simd.compile import kernel
 
 
-@kernel
 def mirror(z: complex, travel: float) -> complex:
     """Turn a vector of the leg's frame into the world, whose x axis points forward: x -> travel * x."""
     return complex(travel * z.real, z.imag)
 
 
-@kernel
 def place(z, dz, ddz, theta_rate, theta_acc, phi, phi_rate, phi_acc, travel):  # type: ignore[no-untyped-def]
     """Motion relative to O, in world axes, of a point given in the frame of the leg.
 

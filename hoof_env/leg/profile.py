@@ -27,7 +27,7 @@ from hoof_env.simd.compile import inline_llvm
 from hoof_env.simd.layout import Layout, Row, Vector
 from hoof_env.simd.machines import CURRENT
 from hoof_env.simd.math import ROUNDER
-from hoof_env.simd.memory import Columns, offset, read
+from hoof_env.simd.memory import Pointer, read
 from hoof_env.simd.values import Index, Lanes, full, transposed
 
 
@@ -273,7 +273,7 @@ def _polynomials(rows: list[Any], angles: list[Any], first: int, last: int) -> t
 
     def coefficients(power: int) -> list[Any]:
         at = first * (DEGREE + 1) + power * count
-        return [read(Columns("", count, None, 1, 1), row, at, 1) for row in rows]
+        return [read(row, at, 1, count) for row in rows]
 
     def next_power(sums: list[Any], added: list[Any]) -> list[Any]:
         return [s * x + y for s, x, y in zip(sums, xs, added, strict=True)]
@@ -311,11 +311,11 @@ def look_up(leg, table):  # type: ignore[no-untyped-def]
 
     def loaded(name: str, kind: str, per_lane: int) -> list[str]:  # one by one: each is needed in all lanes
         first = leg._at(fields[name].start)
-        return [machine.load(machine.at(first, per_lane * lane, kind), kind, 4) for lane in range(lanes)]
+        return [machine.load(machine.at(first, per_lane * lane, kind), kind) for lane in range(lanes)]
 
     # What was added to the number of a row's first element is in the upper half of its bits.
     begins = [machine.new(f"zext i32 {begin} to i64") for begin in loaded("row_begin", "i32", 2)]
-    places = [offset(table, Index(begin)) for begin in begins]
+    places = [table + Index(begin) for begin in begins]
     angles = [Lanes(x, 0) for x in loaded("cell_angle", "double", 1)]
     sloped, derivatives = _polynomials(places, angles, 0, SLOPED)
     others, _ = _polynomials(places, angles, SLOPED, FUNCTIONS)
@@ -328,7 +328,7 @@ def _look_up_now(leg: Any, table: Any, values: int, slopes: int) -> None:
     """`look_up` on a machine that computes at once: all lanes together, function by function."""
     machine = CURRENT.machine
     begin = machine.whole_of((leg.row_begin - WHOLE).x)
-    numbers = [Lanes(x, leg._n) for x in machine.table_rows(table, begin, FUNCTIONS * (DEGREE + 1))]
+    numbers = [Lanes(x, leg._n) for x in machine.table_rows(table.x, begin, FUNCTIONS * (DEGREE + 1))]
     x = leg.cell_angle
     for first, last in ((0, SLOPED), (SLOPED, FUNCTIONS)):
         count = last - first

@@ -1,203 +1,292 @@
-"""Kernels: traced once, optimised by LLVM, kept as objects in files. No pickles; the name of a file is the digest
-of all that the machine code follows from: the instructions as traced, the processor, and LLVM's version."""
+"""Kernels: plain functions that are traced once, and compiled by LLVM to machine code.
+
+A trace runs the function with values that write its instructions (`machines.Writer`). The text that results is all
+that the machine code depends on, besides the processor and LLVM: its digest is the name under which the code is
+found, in this process and in files (`objects`). Without fast-math, so that a result does not depend on how the
+compiler arranged a loop.
+"""
 
 from __future__ import annotations
 
 import ctypes
 import hashlib
 import os
-import sys
-import tempfile
-import time
+import threading
+from collections import deque
 from collections.abc import Callable, Sequence
-from functools import cache, wraps
-from pathlib import Path
-from typing import Any, TypeVar
+from functools import cache
+from typing import Any, get_type_hints
+from weakref import WeakValueDictionary
 
-import llvmlite
 import llvmlite.binding as llvm
+import numpy as np
 
-from hoof_env.simd.machines import Writer, running_on
-from hoof_env.simd.memory import Matrix, Pointer, Record
-from hoof_env.simd.values import Index, Lanes, Mask, rounded
+from hoof_env.errors import HoofEnvError
+from hoof_env.simd import objects
+from hoof_env.simd.machines import CURRENT, Eager, Place, Writer, running_on
+from hoof_env.simd.memory import AXES, Arrays, Given, Held, Matrix, Pointer
+from hoof_env.simd.values import Index, Lanes, Mask, Number, Whole
 
-F = TypeVar("F", bound=Callable[..., Any])
+LEVEL = 2
+"""LLVM's level of optimisation: without its vectorisers, for the code is vectors already."""
 
-QUIET = "HOOF_ENV_QUIET"
-LEVEL = 3
-VECTORISE = False  # the code is vectors already
+PROCESSOR = "HOOF_ENV_CPU"
+"""Environment variable: the processor to compile for, in LLVM's words, such as x86-64 or haswell."""
+
+RECENT = 64
+"""Number of kernels whose machine code stays loaded although nothing uses it, for what is made again."""
+
 COMPILED: list[str] = []
-"""Names of the kernels that this process has compiled."""
-
-TIMES: list[dict[str, Any]] = []
-"""What each kernel took: seconds of the processor of each part."""
+"""Names of the kernels that this process has compiled, not read from files."""
 
 
-def inline_llvm(function: F) -> F:
-    """Mark a part of kernels. What it takes and what it returns enters sums rounded, as what numba passes to a
-    function does; that is all this does."""
-
-    @wraps(function)
-    def part(*arguments: Any) -> Any:
-        return rounded(function(*map(rounded, arguments)))
-
-    return part  # type: ignore[return-value]
+class CompilerError(HoofEnvError):
+    """LLVM refused a kernel, which is an error of this package."""
 
 
-inline_source = inline_llvm
+def _host() -> tuple[str, str]:
+    """Return LLVM's names of the processor and its features."""
+    given = os.environ.get(PROCESSOR)
+    return (given, "") if given else (llvm.get_host_cpu_name(), llvm.get_host_cpu_features().flatten())
+
+
+def _new_target() -> Any:
+    cpu, features = _host()
+    target = llvm.Target.from_triple(llvm.get_process_triple())
+    return target.create_target_machine(
+        cpu=cpu, features=features, opt=LEVEL, reloc="pic", codemodel="small", jit=True
+    )
 
 
 @cache
-def _machine() -> tuple[Any, Any, str]:
-    """Return LLVM's target machine and linker, and what identifies them."""
+def _target() -> Any:
+    """Return LLVM's machine for this processor, started at the first call."""
     llvm.initialize_native_target()
     llvm.initialize_native_asmprinter()
-    cpu = llvm.get_host_cpu_name()
-    features = llvm.get_host_cpu_features().flatten()
-    target = llvm.Target.from_default_triple().create_target_machine(
-        cpu=cpu, features=features, opt=LEVEL, reloc="pic", codemodel="small"
-    )
-    linker = llvm.create_lljit_compiler(
-        llvm.Target.from_default_triple().create_target_machine(cpu=cpu, features=features, jit=True)
-    )
-    return target, linker, f"{target.triple} {cpu} {features} {llvmlite.__version__} {LEVEL} {VECTORISE}"
+    return _new_target()
 
 
-def folder() -> Path:
-    """Return the folder of stored objects."""
-    given = os.environ.get("TRACED_CACHE") or Path(__file__).parents[2] / "objects"
-    return Path(given)
+@cache
+def _identity() -> str:
+    """Return all that machine code depends on besides its text."""
+    version = ".".join(map(str, llvm.llvm_version_info))
+    return " ".join((llvm.get_process_triple(), *_host(), version, str(LEVEL)))
 
 
-def object_code(text: str) -> bytes:
-    """Compile a module to an object."""
-    target, _, _ = _machine()
-    module = llvm.parse_assembly(text)
-    module.verify()  # of a value that left its branch, above all
-    module.triple, module.data_layout = target.triple, str(target.target_data)
-    tuning = llvm.create_pipeline_tuning_options(speed_level=LEVEL)
-    tuning.loop_vectorization = tuning.slp_vectorization = VECTORISE
-    passes = llvm.create_pass_builder(target, tuning)
-    manager = passes.getModulePassManager()
-    manager.run(module, passes)
-    return bytes(target.emit_object(module))
+def compiled(text: str) -> bytes:
+    """Return the object of a module.
 
-
-_NUMBER = [0]
-
-
-def linked(content: bytes, name: str) -> tuple[Any, int]:
-    """Return what keeps an object loaded, and the address of its function."""
-    _NUMBER[0] += 1
-    library = llvm.JITLibraryBuilder().add_object_img(content).add_current_process().export_symbol(name)
-    tracker = library.link(_machine()[1], f"{name}{_NUMBER[0]}")
-    return tracker, tracker[name]
-
-
-KINDS: dict[str, tuple[str, Any]] = {
-    "pointer": ("ptr", ctypes.c_void_p),
-    "double": ("double", ctypes.c_double),
-    "index": ("i64", ctypes.c_int64),
-}
-
-
-def traced(function: Callable[..., Any], arguments: Sequence[Any], name: str) -> str:
-    """Return the instructions of a kernel.
-
-    Args:
-        function: the kernel.
-        arguments: for each argument what it is: "pointer", "addresses", "double", "index" or "truth"; or a
-            record type with the fields of it that are known, as a tuple.
-        name: of the function.
+    Raises:
+        CompilerError: LLVM refuses the text.
     """
-    machine = Writer()
-    declared, given = [], []
-    for k, kind in enumerate(arguments):
-        x = f"%a{k}"
-        if isinstance(kind, tuple):
-            declared.append(f"ptr noalias {x}")
-            given.append(Record(x, *kind))
-            continue
-        declared.append(f"{KINDS.get(kind, ('i64',))[0] if kind != 'addresses' else 'ptr'} {x}")
-        if kind == "matrix":
-            declared[-1] = f"ptr noalias {x}, i64 {x}r, i64 {x}c"
-            given.append(Matrix(Pointer(x), Index(f"{x}r"), Index(f"{x}c")))
-        elif kind == "pointer":
-            given.append(Pointer(x))
-        elif kind == "addresses":
-            given.append(Pointer(x, "i64"))
-        elif kind == "double":
-            given.append(Lanes(x, 0))
-        else:
-            given.append(Index(x))
-    with running_on(machine):
-        result = function(*given)
-        if result is None:
-            machine.do("ret void")
-            kind = "void"
-        else:
-            x = result.x if isinstance(result, (Index, Mask)) else int(result)
-            kind = "i1" if isinstance(result, Mask) else "i64"
-            machine.do(f"ret {kind} {x}")
-    return machine.text(name, declared, kind)
+    target = _target()
+    try:
+        module = llvm.parse_assembly(text)
+        module.verify()
+        module.triple, module.data_layout = target.triple, str(target.target_data)
+        tuning = llvm.create_pipeline_tuning_options(speed_level=LEVEL)
+        tuning.loop_vectorization = tuning.slp_vectorization = False
+        passes = llvm.create_pass_builder(target, tuning)
+        passes.getModulePassManager().run(module, passes)
+        return bytes(target.emit_object(module))
+    except RuntimeError as error:
+        words = str(error).strip().splitlines()
+        hint = ""
+        if "dominate" in str(error):
+            hint = "; a value that was made inside `when`, `cond` or `loop` is used outside: keep it in a `Cell`"
+        raise CompilerError(f"LLVM refuses a kernel{hint}: {words[0] if words else error!r}") from error
 
 
-def kernel(function: F) -> F:
-    """Leave a function of the paper's solver as it is: the sketch does not trace these."""
-    return function
+class Code:
+    """Machine code in memory, of one kernel; it stays as long as this object.
+
+    Attributes:
+        address: of its function.
+    """
+
+    def __init__(self, content: bytes) -> None:
+        self._engine = llvm.create_mcjit_compiler(llvm.parse_assembly(""), _new_target())
+        self._engine.add_object_file(llvm.ObjectFileRef.from_data(content))
+        self._engine.finalize_object()
+        self.address = self._engine.get_function_address("kernel")
+
+
+_LOADED: WeakValueDictionary[str, Code] = WeakValueDictionary()
+_RECENT: deque[Code] = deque(maxlen=RECENT)
+_LOCK = threading.RLock()
+
+
+def _renew_lock() -> None:
+    global _LOCK
+    _LOCK = threading.RLock()
+
+
+if hasattr(os, "register_at_fork"):  # another thread may have it when a process forks
+    os.register_at_fork(after_in_child=_renew_lock)
+
+
+def code_of(text: str, name: str) -> Code:
+    """Return the machine code of a module: loaded before, read from a file, or compiled."""
+    with _LOCK:
+        _target()
+        digest = hashlib.sha256(f"{_identity()}\n{text}".encode()).hexdigest()
+        code = _LOADED.get(digest)
+        if code is None:
+            file = f"{name}-{digest[:40]}.o"
+            content = objects.read(file)
+            if content is None:
+                content = compiled(text)
+                COMPILED.append(name)
+                objects.write(file, content)
+            code = _LOADED[digest] = Code(content)
+        _RECENT.append(code)
+        return code
+
+
+Parameter = Any
+"""What a kernel takes: `Arrays` for what `Arrays.hold` returns, `Matrix` for an array of doubles, `float`, `int`."""
 
 
 class Kernel:
-    """Kernel that is traced and compiled, or loaded, at its first call."""
+    """Function that runs as machine code, traced at its first call.
 
-    def __init__(self, function: Callable[..., Any], arguments: Sequence[Any], returns: bool = False) -> None:
-        self.__name__ = function.__name__
+    Args:
+        function: the function, of values.
+        parameters: what each of its arguments is, see `Parameter`.
+        name: name for messages and files.
+        threads: True if several threads may run it at once, without Python's lock; a call takes a little longer.
+
+    Attributes:
+        call: the machine code as a function of ctypes, which checks no types; None before the first call.
+    """
+
+    def __init__(
+        self,
+        function: Callable[..., Any],
+        parameters: Sequence[Parameter],
+        name: str | None = None,
+        threads: bool = False,
+    ) -> None:
         self.function = function
-        self.arguments = arguments
-        self.returns = returns
+        self.parameters = tuple(parameters)
+        self.name = name or function.__name__
+        self.threads = threads
         self.call: Any = None
 
     def __call__(self, *arguments: Any) -> Any:
         if self.call is None:
             self.compile()
-        return self.call(*arguments)
+        given: list[Any] = []
+        for kind, argument in zip(self.parameters, arguments, strict=True):
+            given += _array(argument) if kind is Matrix else [argument]
+        return self.call(*given)
 
     def compile(self) -> None:
-        times: dict[str, Any] = {"name": self.__name__}
-        now = time.process_time()
-        text = traced(self.function, self.arguments, "kernel")
-        times["trace"] = time.process_time() - now
-        now = time.process_time()
-        identity = _machine()[2]
-        times["target"] = time.process_time() - now
-        key = hashlib.sha256(f"{identity}\n{text}".encode()).hexdigest()
-        file = folder() / f"{self.__name__}-{key[:32]}.o"
-        now = time.process_time()
-        try:
-            content = file.read_bytes()
-        except FileNotFoundError:
-            content = object_code(text)
-            times["llvm"] = time.process_time() - now
-            COMPILED.append(self.__name__)
-            file.parent.mkdir(parents=True, exist_ok=True)
-            with tempfile.NamedTemporaryFile(dir=file.parent, delete=False) as new:
-                new.write(content)
-            os.replace(new.name, file)
-        now = time.process_time()
-        self.tracker, self.address = linked(content, "kernel")
-        times["load"] = time.process_time() - now
+        """Trace the kernel, and find its machine code."""
+        text, result = traced(self.function, self.parameters)
         kinds: list[Any] = []
-        for kind in self.arguments:
-            if kind == "matrix":
-                kinds += [ctypes.c_void_p, ctypes.c_int64, ctypes.c_int64]
+        for kind in self.parameters:
+            kinds += _CTYPES[kind] if isinstance(kind, type) else [ctypes.c_void_p]
+        code = code_of(text, self.name)
+        make: Any = ctypes.CFUNCTYPE if self.threads else ctypes.PYFUNCTYPE
+        call = make(result, *kinds)(code.address)
+        call.code = code  # the function lives as long as the machine code
+        self.call = call
+
+    def run_now(self, *arguments: Any, exact: bool = True) -> Any:
+        """Run the kernel on NumPy, step by step, as a debugger can follow; see `machines.Eager`."""
+        return run_now(self, *arguments, exact=exact)
+
+
+_CTYPES: dict[Any, list[Any]] = {
+    Matrix: [ctypes.c_void_p, *[ctypes.c_int64] * AXES],
+    float: [ctypes.c_double],
+    int: [ctypes.c_int64],
+}
+
+
+def _array(array: Any) -> list[Any]:
+    """Return an array of the caller as arguments of machine code."""
+    if array.dtype != np.float64 or not array.flags.c_contiguous or array.ndim > AXES:
+        raise TypeError(f"expected a contiguous array of doubles, got {array.dtype} of shape {array.shape}")
+    return [array.ctypes.data, *array.shape, *[0] * (AXES - array.ndim)]
+
+
+def traced(function: Callable[..., Any], parameters: Sequence[Parameter]) -> tuple[str, Any]:
+    """Return the instructions of a kernel, and the type of ctypes of its result."""
+    declared: list[str] = []
+    with running_on(Writer()) as machine:
+        given: list[Any] = []
+        for k, kind in enumerate(parameters):
+            x = f"%a{k}"
+            if isinstance(kind, Arrays):
+                declared.append(f"ptr noalias readonly {x}")
+                given.append(Given(kind, x))
+            elif kind is Matrix:
+                declared += [f"ptr noalias {x}", *(f"i64 {x}_{axis}" for axis in range(AXES))]
+                given.append(Matrix(Pointer(x), tuple(Index(f"{x}_{axis}") for axis in range(AXES))))
+            elif kind is float:
+                declared.append(f"double {x}")
+                given.append(Lanes(x, 0))
             else:
-                kinds.append(KINDS.get(kind, (0, ctypes.c_int64))[1] if isinstance(kind, str) else ctypes.c_void_p)
-                if kind == "addresses":
-                    kinds[-1] = ctypes.c_void_p
-        result = ctypes.c_int64 if self.returns else None
-        self.call = ctypes.CFUNCTYPE(result, *kinds)(self.address)
-        times |= {"ir": len(text), "lines": text.count("\n"), "object": len(content)}
-        self.text, self.content = text, content
-        TIMES.append(times)
-        if os.environ.get("TRACED_SAY"):
-            print(times, file=sys.stderr)
+                declared.append(f"i64 {x}")
+                given.append(Index(x))
+        result = function(*given)
+        kind, x, ctype = "void", "", None
+        if isinstance(result, Mask):
+            result = result.to_whole()
+        if isinstance(result, Lanes):
+            kind, x, ctype = "double", result.x, ctypes.c_double
+        elif result is not None:
+            kind, x, ctype = "i64", result.x if isinstance(result, Index) else int(result), ctypes.c_int64
+        machine.do(f"ret {kind} {x}")
+        return machine.text("kernel", declared, kind), ctype
+
+
+def run_now(kernel: Kernel, *arguments: Any, exact: bool = True) -> Any:
+    """Run a kernel on NumPy: the same source, one operation after the other, on arrays.
+
+    Args:
+        kernel: the kernel.
+        arguments: as for a call of it.
+        exact: see `machines.Eager`.
+    """
+    with running_on(Eager(exact)), np.errstate(all="ignore"):
+        given: list[Any] = []
+        for kind, argument in zip(kernel.parameters, arguments, strict=True):
+            if isinstance(kind, Arrays):
+                assert isinstance(argument, Held)
+                given.append(Given(kind, argument))
+            elif kind is Matrix:
+                given.append(Matrix(Pointer(Place(argument.reshape(-1))), argument.shape))
+            else:
+                given.append(kind(argument))
+        return kernel.function(*given)
+
+
+def kernel(function: Callable[..., Any]) -> Kernel:
+    """Make a kernel of a function, whose annotations say what its arguments are: `Matrix`, `Number` or `Whole`."""
+    kinds = {Matrix: Matrix, Number: float, Lanes: float, Whole: int, Index: int}
+    hints = get_type_hints(function)
+    names = function.__code__.co_varnames[: function.__code__.co_argcount]
+    return Kernel(function, [kinds[hints[name]] for name in names])
+
+
+def is_traced() -> bool:
+    """Return True while a kernel is traced, and not run on NumPy."""
+    return not CURRENT.machine.runs_now
+
+
+def inline_llvm(function: Any) -> Any:
+    from functools import wraps
+
+    from hoof_env.simd.values import rounded
+
+    @wraps(function)
+    def part(*arguments: Any) -> Any:
+        return rounded(function(*map(rounded, arguments)))
+
+    return part
+
+
+inline_source = inline_llvm

@@ -14,8 +14,18 @@ from __future__ import annotations
 
 import math
 
-from hoof_env.simd import absolute, maximum, minimum, quarter_turns, sqrt, steady, where
-from hoof_env.simd.compile import inline_llvm
+from hoof_env.simd.values import (
+    Lanes,
+    Number,
+    absolute,
+    maximum,
+    minimum,
+    quarter_turns,
+    rounded,
+    sqrt,
+    steady,
+    where,
+)
 
 EXPONENT_UNIT = 8
 """Denominator of the exponents that `root_power` takes: whole multiples of 1 / EXPONENT_UNIT."""
@@ -29,8 +39,7 @@ HALF_PI_LOW = float.fromhex("0x1.0b4611a626331p-34")  # the rest
 ROUNDER = 1.5 * 2.0**52  # adding and subtracting it rounds to the nearest whole number
 
 
-@inline_llvm
-def root_power(d, eighths):  # type: ignore[no-untyped-def]
+def root_power(d: Number, eighths: int) -> Lanes:
     """Return d^(eighths / 8) by square roots; 0 for negative d, relative error below 1e-15. `eighths` is a
     whole number from 8 to 24, the same in all lanes."""
     base = maximum(d, 0.0)
@@ -54,8 +63,7 @@ def root_power(d, eighths):  # type: ignore[no-untyped-def]
     return power
 
 
-@inline_llvm
-def exp_of_negative(x):  # type: ignore[no-untyped-def]
+def exp_of_negative(x: Number) -> Lanes:
     """Return exp(x) for x <= 0, relative error below 1e-13; exp(-40) below -40. The series of exp(x / 256),
     squared eight times."""
     # Taylor's series to the tenth power, by Horner's rule
@@ -81,16 +89,14 @@ def exp_of_negative(x):  # type: ignore[no-untyped-def]
     return e * e
 
 
-@inline_llvm
-def tanh(x):  # type: ignore[no-untyped-def]
+def tanh(x: Number) -> Lanes:
     """Return the hyperbolic tangent, error below 1e-13."""
     e = exp_of_negative(-2.0 * absolute(x))
     part = (1.0 - e) / (1.0 + e)
     return where(x < 0.0, -part, part)
 
 
-@inline_llvm
-def cos_sin(angle):  # type: ignore[no-untyped-def]
+def cos_sin(angle: Number) -> tuple[Lanes, Lanes]:
     """Return cosine and sine of `angle` [rad], error below 2e-16 for |angle| < 1e4."""
     shifted = steady(angle * TWO_OVER_PI + ROUNDER)
     turns = shifted - ROUNDER  # quarter turns to the nearest multiple of pi / 2
@@ -112,7 +118,6 @@ def cos_sin(angle):  # type: ignore[no-untyped-def]
     return quarter_turns(cosine, sine, shifted)
 
 
-@inline_llvm
-def clip(x, bound):  # type: ignore[no-untyped-def]
+def clip(x: Number, bound: Number) -> Lanes:
     """Return `x` limited to [-bound, bound]."""
     return minimum(maximum(x, -bound), bound)

@@ -1,21 +1,21 @@
-"""Memory of kernels: the stack, arrays of the caller by their addresses, and rows of lanes in both.
+"""Memory of kernels: rows of lanes on the stack, columns of arrays, and the arrays and records of a caller.
 
-On a machine that computes at once rows are a list, of which a store replaces an entry: arrays themselves do
-not change, so that JAX can follow.
+`Arrays` declares the arrays that a kernel takes; `Arrays.hold` makes a `Held` of them, one owner of arrays and
+addresses, which is all that Python hands to machine code.
 """
 
 from __future__ import annotations
 
 import math
-from collections import namedtuple
-from typing import Any
+from collections.abc import Mapping
+from typing import Any, NoReturn
 
 import numpy as np
 from numpy.typing import NDArray
 
-from hoof_env.simd.layout import Row, Vector, _Named
-from hoof_env.simd.machines import CURRENT, wide
-from hoof_env.simd.values import Index, Lanes, Plane, Value, full, vector, word
+from hoof_env.simd.layout import Named, Row, Vector
+from hoof_env.simd.machines import CURRENT, Place
+from hoof_env.simd.values import Index, Lanes, Mask, Number, Plane, Value, Whole, full, index, transposed, vector, word
 
 LINE = 64
 """Size of a cache line, and of the widest vector [bytes]."""
@@ -45,133 +45,56 @@ def aligned(*shape: int) -> NDArray[np.float64]:
     return room[first : first + size].reshape(shape)
 
 
-# Pointers
+# Arrays of the caller
+
+ITEMS = {"f8": "double", "f4": "float", "i8": "i64"}
+"""LLVM's types of NumPy's."""
 
 
 class Pointer(Value):
-    """Place of numbers, read and written as ordinary ones."""
+    """Place of numbers, read and written as ordinary ones: `pointer[k]`."""
 
     __slots__ = ("item", "x")
     kind = "a pointer"
 
-    def __init__(self, x: str, item: str = "double") -> None:
+    def __init__(self, x: Any, item: str = "double") -> None:
         self.x = x
         self.item = item
 
-    def __getitem__(self, k: Any) -> Any:
+    def __getitem__(self, k: Whole) -> Any:
         machine = CURRENT.machine
-        size = {"double": 8, "float": 4, "i64": 8, "i8": 1}[self.item]
-        value = machine.load(machine.at(self.x, word(k), self.item), self.item, size)
+        place = machine.at(self.x, word(k), self.item)
         if self.item == "i64":
-            return Index(value)
-        return Lanes(machine.new(f"fpext float {value} to double") if self.item == "float" else value, 0)
+            return index(machine.load(place, "i64"))
+        x = machine.load_real(place, self.item)
+        return x if machine.runs_now else Lanes(x, 0)
 
-    def __setitem__(self, k: Any, value: Any) -> None:
+    def __setitem__(self, k: Whole, value: Number) -> None:
         machine = CURRENT.machine
-        x = full(value, 0).x
-        if self.item == "float":
-            x = machine.new(f"fptrunc double {x} to float")
-        machine.store(machine.at(self.x, word(k), self.item), x, self.item, 8 if self.item == "double" else 4)
+        machine.store_real(machine.at(self.x, word(k), self.item), full(value, 0).x, self.item)
 
-
-def doubles(count: int) -> Pointer:
-    """Return a pointer to `count` doubles on the stack of the kernel."""
-    return Pointer(CURRENT.machine.slot("double", max(count, 1)))
-
-
-def offset(pointer: Pointer, count: Any) -> Pointer:
-    """Return the pointer `count` elements further on."""
-    return Pointer(CURRENT.machine.at(pointer.x, word(count), pointer.item, False), pointer.item)
-
-
-def doubles_at(number: Index) -> Pointer:
-    """Return a pointer to the doubles at an address."""
-    return Pointer(CURRENT.machine.new(f"inttoptr i64 {number.x} to ptr"))
-
-
-def singles_at(number: Index) -> Pointer:
-    """Return a pointer to the singles at an address."""
-    return Pointer(CURRENT.machine.new(f"inttoptr i64 {number.x} to ptr"), "float")
-
-
-COLUMNS = 2
-"""Offset from the slot of a matrix in an array of `Addresses` to its number of columns."""
-
-
-class Addresses:
-    """Addresses of some arrays, in one array of whole numbers.
-
-    The caller must keep the arrays alive, and make new addresses for a copy.
-
-    Attributes:
-        slots: for each array, by its name, the position of its address; its shape follows there.
-        begin, end: positions of the range of columns that a call works on.
-    """
-
-    def __init__(self, *names: str) -> None:
-        self.slots: Any = namedtuple("Slots", names)(*range(0, 4 * len(names), 4))
-        self.begin = 4 * len(names)
-        self.end = 4 * len(names) + 1
-
-    def of(self, *arrays: NDArray[Any], columns: range) -> NDArray[np.int64]:
-        """Return the array of addresses. The arrays are in the order of the names, each of at most three
-        axes."""
-        rows = [[a.ctypes.data, *a.shape, *[0] * (3 - a.ndim)] for a in arrays]
-        assert len(rows) == len(self.slots)
-        return np.array([*np.ravel(rows), columns.start, columns.stop], np.int64)
+    def __add__(self, count: Whole) -> Pointer:
+        """Return the pointer `count` elements further on."""
+        return Pointer(CURRENT.machine.at(self.x, word(count), self.item, False), self.item)
 
 
 class Matrix:
-    """Array of the caller of two or three axes."""
+    """Array of the caller of up to three axes.
 
-    def __init__(self, first: Pointer, *shape: Any) -> None:
+    Attributes:
+        first: pointer to its first element.
+        shape: lengths of its axes.
+    """
+
+    def __init__(self, first: Pointer, shape: tuple[Any, ...]) -> None:
         self.first = first
         self.shape = shape
 
 
-def matrix_at(addresses: Pointer, slot: int) -> Matrix:
-    """Return the array of doubles, of two axes, at a slot of an array of `Addresses`."""
-    return Matrix(doubles_at(addresses[slot]), addresses[slot + 1], addresses[slot + 2])
-
-
-def cube_at(addresses: Pointer, slot: int) -> Matrix:
-    """Return the array of doubles, of three axes, at a slot of an array of `Addresses`."""
-    return Matrix(doubles_at(addresses[slot]), *(addresses[slot + k] for k in (1, 2, 3)))
-
-
-def address(matrix: Matrix) -> Pointer:
-    """Return a pointer to the first element of an array."""
-    return matrix.first
-
-
-def record_at(kind: np.dtype[Any], known: tuple[tuple[str, Any], ...]) -> Any:
-    """Return a function for kernels that makes a `Record` from an address."""
-    return lambda number: Record(doubles_at(number).x, kind, dict(known))
-
-
-class Record:
-    """Record of the caller: fields that are known when the kernel is traced, others are read when it runs."""
-
-    def __init__(self, place: str, kind: np.dtype[Any], known: dict[str, Any]) -> None:
-        self._place = place
-        self._fields = kind.fields
-        self._known = known
-
-    def __getattr__(self, name: str) -> Any:
-        if name in self._known:
-            return self._known[name]
-        if name not in self._fields:
-            raise AttributeError(f"{name!r}, which the record has not")
-        kind, start = self._fields[name][:2]
-        item = {"f": "double", "i": "i64"}[kind.base.kind]
-        pointer = Pointer(CURRENT.machine.at(self._place, start, "i8"), item)
-        return Field(pointer, kind.shape) if kind.shape else pointer[0]
-
-
 class Field:
-    """Array in a record."""
+    """Array in a record: `field[k]`, or `field[k, j]` of two axes."""
 
-    def __init__(self, first: Pointer, shape: tuple[int, ...]) -> None:
+    def __init__(self, first: Any, shape: tuple[int, ...]) -> None:
         self._first = first
         self.shape = shape
 
@@ -182,12 +105,140 @@ class Field:
         return self._first[k[0] * self.shape[1] + k[1] if isinstance(k, tuple) else k]
 
 
+class Record:
+    """Record of the caller: fields that are known when the kernel is traced, and others, read when it runs."""
+
+    def __init__(self, place: Any, kind: np.dtype[Any], known: Mapping[str, Any]) -> None:
+        self._place = place
+        self._kind = kind
+        self._known = known
+
+    def __getattr__(self, name: str) -> Any:
+        if name in self._known:
+            return self._known[name]
+        fields = self._kind.fields or {}
+        if name not in fields:
+            raise AttributeError(f"no field {name!r}; there are {', '.join(fields)}")
+        kind, start = fields[name][:2]
+        machine = CURRENT.machine
+        if machine.runs_now:
+            value = self._place.array[name][0]
+            return Field(value.ravel().tolist(), kind.shape) if kind.shape else value.item()
+        item = {"f": "double", "i": "i64", "b": "i8"}[kind.base.kind]
+        pointer = Pointer(machine.at(self._place, start, "i8"), item)
+        if item == "i8":
+            return Mask(machine.load_truth(pointer.x), 0)
+        return Field(pointer, kind.shape) if kind.shape else pointer[0]
+
+
+class RecordType:
+    """Type of a record that a kernel takes.
+
+    Args:
+        kind: NumPy's type.
+        known: values of the fields that are known when the kernel is traced.
+    """
+
+    def __init__(self, kind: np.dtype[Any], known: Mapping[str, Any]) -> None:
+        self.kind = kind
+        self.known = known
+
+
+class Held(int):
+    """Address of the addresses of some arrays, which all live as long as it does."""
+
+    arrays: dict[str, NDArray[Any]]
+    numbers: NDArray[np.int64]
+    columns: range
+
+    def __reduce__(self) -> NoReturn:
+        raise TypeError("addresses hold in one process only: expected the arrays to be copied, and held again")
+
+    def __deepcopy__(self, memo: Any) -> NoReturn:
+        self.__reduce__()
+
+
+AXES = 3
+"""Largest number of axes of an array."""
+
+
+class Arrays:
+    """Arrays that a kernel takes, by name: one argument for all, since each takes a tenth of a microsecond.
+
+    Args:
+        types: type of each array by its name: "f8", "f4", "i8", or a `RecordType`.
+    """
+
+    def __init__(self, types: Mapping[str, str | RecordType]) -> None:
+        self.types = dict(types)
+        self.slots = {name: k * (1 + AXES) for k, name in enumerate(self.types)}
+        self.begin = len(self.types) * (1 + AXES)
+
+    def hold(self, arrays: Mapping[str, NDArray[Any]], columns: range = range(0)) -> Held:
+        """Return the arrays as an argument of a kernel, with the columns that it works on.
+
+        Raises:
+            TypeError: an array is missing, is of another type, or is not contiguous.
+        """
+        numbers = np.zeros(self.begin + 2, np.int64)
+        kept = {}
+        for name, kind in self.types.items():
+            array = kept[name] = arrays[name]
+            dtype = kind.kind if isinstance(kind, RecordType) else np.dtype(kind)
+            if array.dtype != dtype or not array.flags.c_contiguous or array.ndim > AXES:
+                raise TypeError(f"{name}: expected a contiguous array of {dtype}, got {array.dtype}, {array.flags}")
+            first = self.slots[name]
+            numbers[first] = array.ctypes.data
+            numbers[first + 1 : first + 1 + array.ndim] = array.shape
+        numbers[self.begin :] = columns.start, columns.stop
+        held = Held(numbers.ctypes.data)
+        held.arrays, held.numbers, held.columns = kept, numbers, columns
+        return held
+
+    def idle(self, held: Held) -> Held:
+        """Return the same arrays with no columns to work on."""
+        return self.hold(held.arrays)
+
+
+class Given:
+    """Arrays inside a kernel: `given.name` is a `Matrix` or a `Record`.
+
+    Attributes:
+        begin, end: range of columns that the call works on.
+    """
+
+    def __init__(self, arrays: Arrays, x: Any) -> None:
+        self._arrays = arrays
+        self._x = x
+        if CURRENT.machine.runs_now:
+            self.begin, self.end = x.columns.start, x.columns.stop
+        else:
+            numbers = Pointer(x, "i64")
+            self.begin, self.end = numbers[arrays.begin], numbers[arrays.begin + 1]
+
+    def __getattr__(self, name: str) -> Any:
+        kind = self._arrays.types.get(name)
+        if kind is None:
+            raise AttributeError(f"no array {name!r}; there are {', '.join(self._arrays.types)}")
+        machine = CURRENT.machine
+        if machine.runs_now:
+            array = self._x.arrays[name]
+            place, shape = Place(array.reshape(-1)), array.shape
+        else:
+            numbers, first = Pointer(self._x, "i64"), self._arrays.slots[name]
+            place = machine.pointer(word(numbers[first]))
+            shape = tuple(numbers[first + 1 + k] for k in range(AXES))
+        if isinstance(kind, RecordType):
+            return Record(place, kind.kind, kind.known)
+        return Matrix(Pointer(place, ITEMS[kind]), shape)
+
+
 # Rows of lanes
 
 
 class Rows:
-    """Memory on the stack with n doubles a row, named by a layout; or, of a machine that computes at once, a
-    list of arrays."""
+    """Memory on the stack with n doubles a row, named by a layout. Of a machine that computes at once it is a list
+    of arrays, of which a store replaces an entry: arrays themselves do not change."""
 
     __slots__ = ("_empty", "_first", "_layout", "_n", "_place")
 
@@ -199,29 +250,32 @@ class Rows:
         put(self, "_first", first)
         put(self, "_empty", is_empty)
 
+    @property
+    def lanes(self) -> int:
+        """Number of lanes."""
+        return self._n  # type: ignore[no-any-return]
+
     # where a row is
 
     def _part(self, start: Any, layout: Any, is_empty: bool = False) -> Any:
         if isinstance(start, Index):
-            place = CURRENT.machine.at(self._place, word(start * self._n))
-            return type(self)(place, self._n, layout, self._first, is_empty)
-        return type(self)(self._place, self._n, layout, self._first + start, is_empty)
+            place = CURRENT.machine.at(self._place, word(start * max(self._n, 1)))
+            return Rows(place, self._n, layout, self._first, is_empty)
+        return Rows(self._place, self._n, layout, self._first + start, is_empty)
 
     def _read(self, k: Any) -> Lanes:
         if isinstance(self._place, list):
             return Lanes(self._place[self._first + k], self._n)
-        return Lanes(
-            CURRENT.machine.load(self._at(k), wide("double", self._n), 8 * max(self._n, 1)), self._n
-        )
+        return Lanes(CURRENT.machine.load(self._at(k), "double", self._n, 8 * max(self._n, 1)), self._n)
 
     def _write(self, k: Any, value: Any) -> None:
         x = full(value, self._n).x
         if isinstance(self._place, list):
             self._place[self._first + k] = x
             return
-        CURRENT.machine.store(self._at(k), x, wide("double", self._n), 8 * max(self._n, 1))
+        CURRENT.machine.store(self._at(k), x, "double", self._n, 8 * max(self._n, 1))
 
-    def _at(self, k: Any) -> str:
+    def _at(self, k: Any) -> Any:
         return CURRENT.machine.at(self._place, word((k + self._first) * max(self._n, 1)))
 
     # by number and by name
@@ -235,17 +289,19 @@ class Rows:
 
     def __getattr__(self, name: str) -> Any:
         if self._layout is None or name not in self._layout.fields:
-            raise AttributeError(f"{name!r}, which {self._layout and self._layout.__name__} has not")
+            raise AttributeError(_no_field(self._layout, name))
         start, size, kind = self._layout.fields[name]
         if kind is Row:
             return self._read(start) if size else full(math.nan, self._n)
         if kind is Vector:
             return vector(self._read(start), self._read(start + 1))
-        if isinstance(kind, _Named):
+        if isinstance(kind, Named):
             return self._part(start, kind)
         return self._part(start, None, size == 0)
 
     def __setattr__(self, name: str, value: Any) -> None:
+        if self._layout is None or name not in self._layout.fields:
+            raise AttributeError(_no_field(self._layout, name))
         start, size, kind = self._layout.fields[name]
         if kind is Vector:
             self._write(start, value.a)
@@ -255,6 +311,12 @@ class Rows:
                 self._write(start, value)
         else:
             raise TypeError(f"{name}: the rows of a block or a layout are set one by one")
+
+
+def _no_field(layout: Any, name: str) -> str:
+    if layout is None:
+        return f"no field {name!r}: these rows have numbers only"
+    return f"no field {name!r}; {layout.__name__} has {', '.join(layout.fields)}"
 
 
 class Columns(Rows):
@@ -275,116 +337,113 @@ class Columns(Rows):
         return Columns(place, self._n, layout, self._row, self._stride, is_empty)
 
     def _read(self, k: Any) -> Lanes:
-        return _read(Pointer(self._place), k * self._row, self._stride, self._n)
+        return read(Pointer(self._place), k * self._row, self._stride, self._n)
 
     def _write(self, k: Any, value: Any) -> None:
-        _write(full(value, self._n), Pointer(self._place), k * self._row, self._stride)
+        write(full(value, self._n), Pointer(self._place), k * self._row, self._stride)
 
 
-def _read(pointer: Pointer, at: Any, stride: Any, n: int) -> Lanes:
-    machine = CURRENT.machine
-    first = machine.at(pointer.x, word(at), pointer.item, False)
-    size = 8 if pointer.item == "double" else 4
+def read(pointer: Pointer, start: Whole, stride: Whole, n: int) -> Lanes:
+    """Return pointer[start], pointer[start + stride], ... as n lanes."""
+    machine, item = CURRENT.machine, pointer.item
+    first = machine.at(pointer.x, word(start), item, False)
     if n <= 1 or (isinstance(stride, int) and stride == 0):
-        x = machine.spread(machine.load(first, pointer.item, size), n, pointer.item)
-    elif isinstance(stride, int) and stride == 1:
-        x = machine.load(first, wide(pointer.item, n), size)
-    else:
-        places = [machine.at(first, word(stride * lane), pointer.item, False) for lane in range(n)]
-        x = machine.gathered([machine.load(place, pointer.item, size) for place in places], pointer.item)
-    if pointer.item == "float":
-        x = machine.new(f"fpext {wide('float', n)} {x} to {wide('double', n)}")
-    return Lanes(x, n)
+        x = machine.load_real(first, item)
+        return Lanes(machine.spread(x, n) if n else x, n)
+    if isinstance(stride, int) and stride == 1:
+        return Lanes(machine.load_real(first, item, n), n)
+    places = [machine.at(first, word(stride * lane), item, False) for lane in range(n)]
+    return Lanes(machine.gathered([machine.load_real(place, item) for place in places]), n)
 
 
-def _write(value: Lanes, pointer: Pointer, at: Any, stride: Any) -> None:
-    machine, n = CURRENT.machine, value.n
-    first = machine.at(pointer.x, word(at), pointer.item, False)
-    size = 8 if pointer.item == "double" else 4
-    x = value.x
-    if pointer.item == "float":
-        x = machine.new(f"fptrunc {wide('double', n)} {x} to {wide('float', n)}")
+def write(x: Lanes, pointer: Pointer, start: Whole, stride: Whole) -> None:
+    """Store lanes at pointer[start], pointer[start + stride], ...; they are rounded if singles are there."""
+    machine, item, n = CURRENT.machine, pointer.item, x.n
+    first = machine.at(pointer.x, word(start), item, False)
     if n <= 1:
-        machine.store(first, x, pointer.item, size)
+        machine.store_real(first, machine.single(x.x) if n else x.x, item)
     elif isinstance(stride, int) and stride == 1:
-        machine.store(first, x, wide(pointer.item, n), size)
+        machine.store_real(first, x.x, item, n)
     else:
         for lane in range(n):
-            place = machine.at(first, word(stride * lane), pointer.item, False)
-            machine.store(place, machine.pick(x, lane, n, pointer.item), pointer.item, size)
+            place = machine.at(first, word(stride * lane), item, False)
+            machine.store_real(place, machine.pick(x.x, lane, n), item)
 
 
-def rows(pointer: Pointer, count: int, layout: Any) -> Rows:
-    """Return the memory at a pointer to doubles, aligned to 64 bytes, as rows of `count` lanes with the names
-    of a layout, or None."""
-    return Rows(pointer.x, count, layout)
+def new_rows(layout: Any, lanes: int, count: int = 1) -> Any:
+    """Return memory on the stack of the kernel, `count` times the rows of a layout, or `count` rows without
+    names if that is None."""
+    size = count * (1 if layout is None else layout.size)
+    if CURRENT.machine.runs_now:
+        return Rows([None] * size, lanes, layout)
+    return Rows(CURRENT.machine.slot("double", size * max(lanes, 1)), lanes, layout)
 
 
-def rows_of(values: list[Any], count: int, layout: Any) -> Rows:
+def rows_of(values: list[Any], count: int, layout: Any) -> Any:
     """Return a list of arrays, one for each row, as rows of a machine that computes at once."""
     return Rows(values, count, layout)
 
 
-def columns(pointer: Pointer, count: int, layout: Any, start: Any, row: Any, stride: Any) -> Columns:
-    """Return columns of an array of doubles, `stride` apart; its rows are `row` apart, and the first number of
-    the first column is pointer[start]."""
-    place = CURRENT.machine.at(pointer.x, word(start), inbounds=False)
-    return Columns(place, count, layout, row, stride)
+def columns(
+    matrix: Matrix, lanes: int, layout: Any, column: Whole, row: Whole = 0, stride: Whole = 1
+) -> Any:
+    """Return columns of a matrix of two axes by the names of a layout.
+
+    Args:
+        matrix: array.
+        lanes: number of columns side by side; 0 for one with ordinary numbers.
+        layout: names of the rows from `row` on; None for numbers only.
+        column: first of the columns.
+        row: first of the rows.
+        stride: distance from one lane to the next [elements].
+    """
+    width = matrix.shape[1]
+    place = CURRENT.machine.at(matrix.first.x, word(row * width + column), inbounds=False)
+    return Columns(place, lanes, layout, width, stride)
 
 
-def block_at(rows: Rows, number: Any) -> Any:
+def block_at(rows: Any, number: Whole) -> Any:
     """Return the rows of the `number`-th of several equal layouts, the first of which is `rows`."""
     if isinstance(number, int) and number == 0:
         return rows
     return rows._part(number * rows._layout.size, rows._layout)
 
 
-def load_rows(to: Rows, start: Rows) -> None:
+def load_rows(to: Any, start: Any) -> None:
     """Read columns into rows of the same layout."""
     for k in range(to._layout.size):
         to._write(k, start._read(k))
 
 
-def read(like: Rows, pointer: Pointer, start: Any, stride: Any) -> Lanes:
-    """Return pointer[start], pointer[start + stride], ... as the lanes of `like`."""
-    return _read(pointer, start, stride, like._n)
-
-
-def write(x: Lanes, pointer: Pointer, start: Any, stride: Any) -> None:
-    """Store lanes at pointer[start], pointer[start + stride], ...; they are rounded if singles are there."""
-    _write(x, pointer, start, stride)
-
-
-def full_like(like: Rows, value: Any) -> Lanes:
-    """Return the same value in every lane of `like`."""
+def full_like(like: Any, value: Number) -> Lanes:
+    """Return the same value in every lane of rows."""
     return full(value, like._n)
 
 
-def set_lane(rows: Rows, row: Any, lane: Any, x: Any) -> None:
-    """Store an ordinary number in one lane of a row."""
-    machine = CURRENT.machine
-    machine.store(machine.at(rows._at(row), word(lane)), full(x, 0).x, "double", 8)
+def apply_to_rows(rows: Any, count: int, function: Any, width: int) -> None:
+    """Set each of the first rows, which have no names, to a function of it. Rows of one lane are taken `width` at
+    a time: `count` is a multiple of it, and there is memory for as many."""
+    if rows._n == 1 and not CURRENT.machine.runs_now:
+        rows = Rows(rows._place, width, None)
+        count //= width
+    for k in range(count):
+        rows[k] = function(rows[k])
 
 
-def store_vectors(rows: Rows, vectors: tuple[Plane, ...]) -> None:
+def store_vectors(rows: Any, vectors: tuple[Plane, ...]) -> None:
     """Store planar vectors in rows, two rows each."""
     for k, value in enumerate(vectors):
         rows[2 * k] = value.a
         rows[2 * k + 1] = value.b
 
 
-def gather_eight(pointer: Any, index: Lanes) -> tuple[Lanes, ...]:
-    """Return pointer[index] to pointer[index + 7] in every lane; the index is a double that holds a whole
-    number."""
-    from hoof_env.simd.values import transposed
-
-    machine, n = CURRENT.machine, index.n
+def gather_eight(pointer: Pointer, first: Lanes) -> tuple[Lanes, ...]:
+    """Return pointer[first] to pointer[first + 7] in every lane; `first` is a double that holds a whole number."""
+    machine, n = CURRENT.machine, first.n
     if machine.runs_now:
-        found = machine.table_rows(pointer, machine.whole_of(index.x), 8)
-        return tuple(Lanes(x, n) for x in found)
+        return tuple(Lanes(x, n) for x in machine.table_rows(pointer.x, machine.whole_of(first.x), 8))
     loaded = []
     for lane in range(max(n, 1)):
-        at = machine.new(f"fptosi double {machine.pick(index.x, lane, n)} to i64")
-        loaded.append(Lanes(machine.load(machine.at(pointer.x, at), wide("double", 8), 8), 8))
-    columns = transposed(loaded)
-    return tuple(Lanes(column.x, n) for column in columns)
+        at = machine.real_to_index(machine.pick(first.x, lane, n))
+        loaded.append(Lanes(machine.load(machine.at(pointer.x, at), "double", 8), 8))
+    return tuple(Lanes(column.x, n) for column in transposed(loaded))

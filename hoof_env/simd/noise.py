@@ -6,7 +6,7 @@ from __future__ import annotations
 from typing import Any
 
 from hoof_env.simd.machines import CURRENT
-from hoof_env.simd.values import Lanes, full, word
+from hoof_env.simd.values import Lanes, full, rounded, word
 
 GOLDEN = 0x9E3779B97F4A7C15
 _MIXING = ((30, 0xBF58476D1CE4E5B9), (27, 0x94D049BB133111EB), (31, 1))
@@ -28,5 +28,4 @@ def uniform(key: Lanes, count: Any, number: int) -> Any:
     bits = mixed(machine.whole("add", seed, (word(number) + 1) * GOLDEN % 2**64, n))
     fraction = machine.whole("or", machine.whole("lshr", bits, 12, n), _ONE, n)
     between = Lanes(machine.of_bits(fraction, n), n)
-    twice = Lanes((2.0 * between).x, n)
-    return twice - 3.0
+    return rounded(2.0 * between) - 3.0

@@ -1,47 +1,87 @@
-"""Values of kernels: lanes, planar vectors, truths, whole numbers; operators and functions on them.
+"""Values of kernels: lanes, planar vectors, truths, whole numbers; the operators and functions on them.
 
-`CURRENT.machine` carries the operations out: while a kernel is traced it writes instructions, otherwise it
-computes. A product that enters a sum is not rounded: `a * b + c` on lanes is one fused operation. A value
-remembers the factors that it is the product of; `rounded` makes it forget them, as passing a function does.
+The machine that runs (`machines.CURRENT`) carries the operations out: a `Writer` writes instructions while a
+kernel is traced, `Eager` computes with NumPy at once. Ordinary numbers are computed at once on either.
+
+A product that enters a sum is not rounded: `a * b + c` on lanes is one fused operation. The expression decides
+this: a value remembers the factors of which it is the product, and `rounded` makes it forget them.
 """
 
 from __future__ import annotations
 
-from typing import Any
+import math
+from collections.abc import Callable, Iterator
+from typing import Any, NoReturn, TypeVar, overload
 
 import numpy as np
 
 from hoof_env.simd.machines import CURRENT
 
-_REAL = (int, float, np.floating, np.integer)
+V = TypeVar("V")
 
 
 class TraceError(TypeError):
-    """Something that a kernel cannot do with a value."""
-
-
-def _no_truth(value: Any) -> bool:
-    raise TraceError(
-        f"`if`, `and`, `or` or `not` of {value.kind}, which is known only when the kernel runs: use where(condition,"
-        " yes, no), & and | in their place, or `when` for a condition that all lanes share; or scalar=True"
-    )
+    """Use of a value that a kernel cannot make."""
 
 
 class Value:
-    """Base of values."""
+    """Base of all values."""
 
     __slots__ = ()
     kind = "a value"
     __hash__ = None  # type: ignore[assignment]
-    __array_ufunc__ = None  # NumPy's numbers leave the operators to this class
 
-    def __iter__(self) -> Any:
-        raise TraceError(f"a loop over {self.kind}")
+    def __bool__(self) -> bool:
+        raise TraceError(
+            f"`if`, `while`, `and`, `or`, `not`, min() or max() of {self.kind}, which is known only when the kernel"
+            " runs: write np.where(condition, yes, no), `&`, `|` and `~` of comparisons in parentheses,"
+            " np.minimum and np.maximum"
+        )
+
+    def __iter__(self) -> Iterator[Any]:
+        raise TraceError(f"a loop over {self.kind}: a value of a kernel has no elements that Python could reach")
+
+    def __len__(self) -> int:
+        raise TraceError(f"len() of {self.kind}: a value of a kernel has no elements that Python could reach")
+
+    def _no_number(self) -> NoReturn:
+        raise TraceError(
+            f"float(), int() or a function of `math` of {self.kind}, which is known only when the kernel runs: write"
+            " NumPy's function, such as np.exp or np.sqrt"
+        )
 
     def __float__(self) -> float:
-        raise TraceError(f"float(), or a function of `math`, of {self.kind}: use those of simd, or scalar=True")
+        self._no_number()
 
-    __index__ = __int__ = __float__
+    def __int__(self) -> int:
+        self._no_number()
+
+    def __index__(self) -> int:
+        self._no_number()
+
+    def __round__(self, digits: Any = None) -> Any:
+        raise TraceError(f"round() of {self.kind}: write np.floor(x + 0.5)")
+
+    def __array__(self, *arguments: Any, **named: Any) -> Any:
+        raise TraceError(f"{self.kind} cannot become an array of NumPy: a kernel works on lanes")
+
+    def __array_ufunc__(self, ufunc: Any, method: str, *inputs: Any, **named: Any) -> Any:
+        function = UFUNCS.get(ufunc)
+        if method != "__call__" or named or function is None:
+            given = f"np.{ufunc.__name__}" + ("" if method == "__call__" else f".{method}")
+            extra = f" with {', '.join(named)}" if named else ""
+            raise TraceError(f"{given}{extra} of {self.kind}: kernels have {_names(UFUNCS)}")
+        return function(*inputs)
+
+    def __array_function__(self, function: Any, types: Any, inputs: Any, named: Any) -> Any:
+        made = FUNCTIONS.get(function)
+        if made is None:
+            raise TraceError(f"np.{function.__name__} of {self.kind}: kernels have {_names(FUNCTIONS)}")
+        return made(*inputs, **named)
+
+
+def _names(table: dict[Any, Any]) -> str:
+    return ", ".join(sorted({f"np.{function.__name__}" for function in table}))
 
 
 class Lanes(Value):
@@ -55,61 +95,70 @@ class Lanes(Value):
         self.n = n
         self.factors = factors
 
+    @overload
+    def __add__(self, other: Number) -> Lanes: ...
+    @overload
+    def __add__(self, other: Any) -> Any: ...
     def __add__(self, other: Any) -> Any:
         return _sum("+", self, other)
 
-    def __radd__(self, other: Any) -> Any:
+    def __radd__(self, other: Number) -> Lanes:
         return _sum("+", other, self)
 
-    def __sub__(self, other: Any) -> Any:
+    def __sub__(self, other: Number) -> Lanes:
         return _sum("-", self, other)
 
-    def __rsub__(self, other: Any) -> Any:
+    def __rsub__(self, other: Number) -> Lanes:
         return _sum("-", other, self)
 
+    @overload
+    def __mul__(self, other: Number) -> Lanes: ...
+    @overload
+    def __mul__(self, other: Plane) -> Plane: ...
     def __mul__(self, other: Any) -> Any:
-        return _product(self, other)
+        return product(self, other)
 
-    def __rmul__(self, other: Any) -> Any:
-        return _product(other, self)
+    def __rmul__(self, other: Number) -> Lanes:
+        return product(other, self)
 
-    def __truediv__(self, other: Any) -> Any:
+    def __truediv__(self, other: Number) -> Lanes:
         return _binary("fdiv", self, other) if is_real(other) else NotImplemented
 
-    def __rtruediv__(self, other: Any) -> Any:
+    def __rtruediv__(self, other: Number) -> Lanes:
         return _binary("fdiv", other, self) if is_real(other) else NotImplemented
 
     def __neg__(self) -> Lanes:
         return Lanes(CURRENT.machine.negative(self.x, self.n), self.n)
 
-    def __pow__(self, power: Any) -> Any:
-        if power == 2:
-            return self * self
-        raise TraceError("a power other than 2 of lanes: use simd.math.root_power")
+    def __pos__(self) -> Lanes:
+        return self
+
+    def __pow__(self, power: Number) -> Lanes:
+        return _power(self, power)
+
+    def __rpow__(self, base: Number) -> Lanes:
+        return _power(base, self)
 
     def __abs__(self) -> Lanes:
         return absolute(self)
 
-    def __lt__(self, other: Any) -> Any:
+    def __lt__(self, other: Number) -> Mask:
         return _comparison("<", self, other)
 
-    def __le__(self, other: Any) -> Any:
+    def __le__(self, other: Number) -> Mask:
         return _comparison("<=", self, other)
 
-    def __gt__(self, other: Any) -> Any:
+    def __gt__(self, other: Number) -> Mask:
         return _comparison(">", self, other)
 
-    def __ge__(self, other: Any) -> Any:
+    def __ge__(self, other: Number) -> Mask:
         return _comparison(">=", self, other)
 
-    def __eq__(self, other: Any) -> Any:
+    def __eq__(self, other: Number) -> Mask:  # type: ignore[override]
         return _comparison("==", self, other)
 
-    def __ne__(self, other: Any) -> Any:
+    def __ne__(self, other: Number) -> Mask:  # type: ignore[override]
         return _comparison("!=", self, other)
-
-    def __bool__(self) -> bool:
-        return _no_truth(self)
 
 
 class Mask(Value):
@@ -122,32 +171,39 @@ class Mask(Value):
         self.x = x
         self.n = n
 
-    def __and__(self, other: Any) -> Mask:
+    def __and__(self, other: Truth) -> Mask:
         return self._with("and", other)
 
-    def __or__(self, other: Any) -> Mask:
+    def __or__(self, other: Truth) -> Mask:
         return self._with("or", other)
 
     __rand__, __ror__ = __and__, __or__
 
     def _with(self, name: str, other: Any) -> Any:
-        if isinstance(other, bool):  # known when the kernel is traced
+        if isinstance(other, (bool, np.bool_)):  # known when the kernel is traced
             return (self if other else False) if name == "and" else (True if other else self)
-        if self.n != other.n:
+        if not isinstance(other, Mask):
             return NotImplemented
-        return Mask(CURRENT.machine.logic(name, self.x, other.x, self.n), self.n)
-
-    def to_whole(self) -> Index:
-        """Return 1 if it holds, else 0."""
-        return Index(CURRENT.machine.new(f"zext i1 {self.x} to i64"))
+        n = max(self.n, other.n)
+        x, y = (CURRENT.machine.spread_truth(part.x, part.n, n) for part in (self, other))
+        return Mask(CURRENT.machine.logic(name, x, y, n), n)
 
     def __invert__(self) -> Mask:
-        return Mask(CURRENT.machine.logic("xor", self.x, "true", 0), 0)
+        return Mask(CURRENT.machine.invert(self.x, self.n), self.n)
+
+    def __mul__(self, other: Number) -> Lanes:
+        return where(self, other, 0.0) if is_real(other) else NotImplemented
+
+    __rmul__ = __mul__
 
     def __bool__(self) -> bool:
         if CURRENT.machine.runs_now and not self.n:
             return bool(self.x)
-        return _no_truth(self)
+        return super().__bool__()
+
+    def to_whole(self) -> Index:
+        """Return 1 if it holds, else 0."""
+        return index(CURRENT.machine.truth_to_index(self.x))
 
 
 class Plane(Value):
@@ -162,20 +218,23 @@ class Plane(Value):
 
     @property
     def n(self) -> int:
+        """Number of lanes."""
         return self.a.n
 
     @property
     def real(self) -> Lanes:
+        """The x component, rounded."""
         return Lanes(self.a.x, self.a.n)
 
     @property
     def imag(self) -> Lanes:
+        """The y component, rounded."""
         return Lanes(self.b.x, self.b.n)
 
-    def __add__(self, other: Any) -> Any:
+    def __add__(self, other: Plane) -> Plane:
         return self._sum("+", other)
 
-    def __sub__(self, other: Any) -> Any:
+    def __sub__(self, other: Plane) -> Plane:
         return self._sum("-", other)
 
     def _sum(self, sign: str, other: Any) -> Any:
@@ -183,24 +242,23 @@ class Plane(Value):
             return NotImplemented
         return Plane(_sum(sign, self.a, other.a), _sum(sign, self.b, other.b))
 
-    def __mul__(self, other: Any) -> Any:
-        return _product(self, other)
+    def __mul__(self, other: Plane | Number) -> Plane:
+        return product(self, other)
 
-    def __rmul__(self, other: Any) -> Any:
-        return _product(other, self)
+    def __rmul__(self, other: Number) -> Plane:
+        return product(self, other)
 
-    def __truediv__(self, other: Any) -> Any:
+    def __truediv__(self, other: Number) -> Plane:
         if not is_real(other):
             return NotImplemented
+        if not self.n:
+            return Plane(self.a / other, self.b / other)
         # one reciprocal, since a division takes as long as several products
         per = _binary("fdiv", full(1.0, self.n), other)
-        return Plane(_product(self.a, per), _product(self.b, per))
+        return Plane(product(self.a, per), product(self.b, per))
 
     def __neg__(self) -> Plane:
         return Plane(-self.a, -self.b)
-
-    def __bool__(self) -> bool:
-        return _no_truth(self)
 
 
 class Index(Value):
@@ -209,32 +267,29 @@ class Index(Value):
     __slots__ = ("x",)
     kind = "a whole number"
 
-    def __init__(self, x: str) -> None:
+    def __init__(self, x: Any) -> None:
         self.x = x
 
     def _with(self, name: str, one: Any, other: Any) -> Any:
+        if isinstance(other, (float, Lanes)) or isinstance(one, (float, Lanes)):
+            one, other = (part.to_real() if isinstance(part, Index) else part for part in (one, other))
+            return {"add": _sum_of, "sub": _difference, "mul": product}[name](one, other)
         if not all(isinstance(value, (int, Index)) for value in (one, other)):
             return NotImplemented
-        return Index(CURRENT.machine.new(f"{name} i64 {word(one)}, {word(other)}"))
+        return Index(CURRENT.machine.index_binary(name, word(one), word(other)))
 
     def __add__(self, other: Any) -> Any:
-        if isinstance(other, (float, Lanes)):
-            return self.to_real() + other
         return self if isinstance(other, int) and other == 0 else self._with("add", self, other)
 
     __radd__ = __add__
 
     def __sub__(self, other: Any) -> Any:
-        if isinstance(other, (float, Lanes)):
-            return self.to_real() - other
         return self._with("sub", self, other)
 
     def __rsub__(self, other: Any) -> Any:
         return self._with("sub", other, self)
 
     def __mul__(self, other: Any) -> Any:
-        if isinstance(other, (float, Lanes)):
-            return self.to_real() * other
         return self if isinstance(other, int) and other == 1 else self._with("mul", self, other)
 
     __rmul__ = __mul__
@@ -251,54 +306,70 @@ class Index(Value):
     def _compared(self, name: str, other: Any) -> Any:
         if not isinstance(other, (int, Index)):
             return NotImplemented
-        return Mask(CURRENT.machine.new(f"icmp {name} i64 {self.x}, {word(other)}"), 0)
+        return Mask(CURRENT.machine.index_compare(name, self.x, word(other)), 0)
 
     def __lt__(self, other: Any) -> Any:
-        return self._compared("slt", other)
+        return self._compared("<", other)
 
     def __le__(self, other: Any) -> Any:
-        return self._compared("sle", other)
+        return self._compared("<=", other)
 
     def __gt__(self, other: Any) -> Any:
-        return self._compared("sgt", other)
+        return self._compared(">", other)
 
     def __ge__(self, other: Any) -> Any:
-        return self._compared("sge", other)
+        return self._compared(">=", other)
 
     def __eq__(self, other: Any) -> Any:
-        return self._compared("eq", other)
+        return self._compared("==", other)
 
     def __ne__(self, other: Any) -> Any:
-        return self._compared("ne", other)
-
-    def __bool__(self) -> bool:
-        return _no_truth(self)
+        return self._compared("!=", other)
 
     def to_real(self) -> Lanes:
         """Return it as a number."""
-        return Lanes(CURRENT.machine.new(f"sitofp i64 {self.x} to double"), 0)
+        return Lanes(CURRENT.machine.index_to_real(self.x), 0)
+
+
+Number = Lanes | Index | float
+"""Real number: lanes, or one that all lanes share."""
+
+Truth = Mask | bool
+"""Truth of each lane, or one that all lanes share."""
+
+Whole = Index | int
+"""Whole number that all lanes share."""
+
+_REAL = (Lanes, Index, int, float, np.floating, np.integer)
+
+
+def index(x: Any) -> Any:
+    """Return the payload of a whole number as a value: a Python int on a machine that computes at once."""
+    return int(x) if CURRENT.machine.runs_now else Index(x)
 
 
 def word(value: Any) -> Any:
-    """Return what stands for a whole number in an instruction."""
+    """Return the payload of a whole number."""
     return value.x if isinstance(value, Index) else int(value)
 
 
 def is_real(value: Any) -> bool:
-    """True for lanes and ordinary numbers."""
-    return isinstance(value, (Lanes, Index, *_REAL))
+    """Return True for lanes and ordinary numbers."""
+    return isinstance(value, _REAL)
 
 
 def payload(value: Any, n: int) -> Any:
     """Return a number as payload of n lanes."""
     if isinstance(value, Lanes):
-        if value.n == n or max(value.n, n) <= 1:
+        if value.n == n:
             return value.x
-        if value.n:
+        if value.n > 1 or (value.n and n > 1):
             raise TraceError(f"{value.n} lanes with {n}")
-        return CURRENT.machine.spread(value.x, n)
+        return CURRENT.machine.single(value.x) if value.n else CURRENT.machine.spread(value.x, n)
     if isinstance(value, Index):
         return CURRENT.machine.spread(value.to_real().x, n)
+    if isinstance(value, np.ndarray):
+        raise TraceError("an array of NumPy with a value of a kernel: expected a number")
     return CURRENT.machine.number(float(value), n)
 
 
@@ -311,7 +382,7 @@ def _lanes_of(*values: Any) -> int:
     return max((value.n for value in values if isinstance(value, (Lanes, Plane))), default=0)
 
 
-def _binary(name: str, one: Any, other: Any) -> Lanes:
+def _binary(name: str, one: Any, other: Any) -> Any:
     n = _lanes_of(one, other)
     return Lanes(CURRENT.machine.binary(name, payload(one, n), payload(other, n), n), n)
 
@@ -330,14 +401,23 @@ def _sum(sign: str, one: Any, other: Any) -> Any:
     return Lanes(machine.binary("fadd" if sign == "+" else "fsub", payload(one, n), payload(other, n), n), n)
 
 
-def _product(one: Any, other: Any) -> Any:
+def _sum_of(one: Any, other: Any) -> Any:
+    return one + other
+
+
+def _difference(one: Any, other: Any) -> Any:
+    return one - other
+
+
+def product(one: Any, other: Any) -> Any:
+    """Return the product of numbers or planar vectors; it is rounded unless it enters a sum next."""
     if isinstance(one, Plane) and isinstance(other, Plane):
-        x = _sum("-", _product(one.a, other.a), _product(one.b, other.b))
-        return Plane(x, _sum("+", _product(one.a, other.b), _product(one.b, other.a)))
+        x = _sum("-", product(one.a, other.a), product(one.b, other.b))
+        return Plane(x, _sum("+", product(one.a, other.b), product(one.b, other.a)))
     if isinstance(one, Plane):
         one, other = other, one
     if isinstance(other, Plane):
-        return Plane(_product(one, other.a), _product(one, other.b)) if is_real(one) else NotImplemented
+        return Plane(product(one, other.a), product(one, other.b)) if is_real(one) else NotImplemented
     if not (is_real(one) and is_real(other)):
         return NotImplemented
     n = _lanes_of(one, other)
@@ -346,99 +426,161 @@ def _product(one: Any, other: Any) -> Any:
 
 
 def _comparison(symbol: str, one: Any, other: Any) -> Any:
-    if not is_real(other):
+    if not is_real(other) or not is_real(one):
         return NotImplemented
     n = _lanes_of(one, other)
     return Mask(CURRENT.machine.compare(symbol, payload(one, n), payload(other, n), n), n)
 
 
-def rounded(value: Any) -> Any:
+MOST_PRODUCTS = 16
+"""Largest whole power that is made of products."""
+
+
+def _power(base: Any, power: Any) -> Any:
+    """Return a power: of whole numbers by products, of halves by roots, of others by the C library."""
+    if isinstance(power, (int, float, np.integer, np.floating)):
+        power = float(power)
+        if power == 2.0:
+            return base * base
+        if power == 0.5:
+            return sqrt(base)
+        if power.is_integer() and 0 < power <= MOST_PRODUCTS:
+            half = rounded(_power(base, power // 2)) if power > 1 else None
+            if half is None:
+                return base
+            square = rounded(half * half)
+            return square * base if power % 2 else square
+    return _library("pow")(base, power)
+
+
+def rounded(value: V) -> V:
     """Return a value, or a tuple of values, that enters sums rounded."""
+    made: Any = value
     if isinstance(value, Lanes):
-        return Lanes(value.x, value.n) if value.factors else value
-    if isinstance(value, Plane):
-        return Plane(rounded(value.a), rounded(value.b))
-    if type(value) is tuple:
-        return tuple(map(rounded, value))
-    if isinstance(value, tuple) and any(isinstance(part, (Lanes, Plane)) for part in value):
-        return type(value)(*map(rounded, value))
-    return value
+        made = Lanes(value.x, value.n) if value.factors else value
+    elif isinstance(value, Plane):
+        made = Plane(rounded(value.a), rounded(value.b))
+    elif type(value) is tuple:
+        made = tuple(map(rounded, value))
+    elif isinstance(value, tuple) and any(isinstance(part, (Lanes, Plane)) for part in value):
+        made = type(value)(*map(rounded, value))
+    return made  # type: ignore[no-any-return]
 
 
-# Functions. Ordinary numbers are computed at once, whatever the machine.
+# Functions. Ordinary numbers, and arrays of NumPy, are computed at once, whatever the machine.
 
 
 def _real_function(name: str, at_once: Any) -> Any:
     def function(x: Any) -> Any:
+        if isinstance(x, Index):
+            x = x.to_real()
         if not isinstance(x, Lanes):
             return at_once(x)
         return Lanes(CURRENT.machine.unary(name, x.x, x.n), x.n)
 
+    function.__name__ = at_once.__name__
+    function.__doc__ = f"Return NumPy's {at_once.__name__} of a number."
     return function
 
 
 sqrt = _real_function("sqrt", np.sqrt)
 absolute = _real_function("fabs", np.abs)
 floor = _real_function("floor", np.floor)
+ceil = _real_function("ceil", np.ceil)
 
 
-def vector(x: Any, y: Any) -> Any:
+def _library(name: str) -> Callable[..., Any]:
+    """Return a function of the C library, which is called lane by lane."""
+
+    def function(*inputs: Any) -> Any:
+        n = _lanes_of(*inputs)
+        return Lanes(CURRENT.machine.library(name, [payload(x, n) for x in inputs], n), n)
+
+    return function
+
+
+def vector(x: Number, y: Number) -> Plane:
     """Return the planar vector (x, y)."""
     n = _lanes_of(x, y)
-    kept = [part if isinstance(part, Lanes) and part.n == n else full(part, n) for part in (x, y)]
-    return Plane(*kept)
+    a, b = (part if isinstance(part, Lanes) and part.n == n else full(part, n) for part in (x, y))
+    return Plane(a, b)
 
 
-def perpendicular(z: Any) -> Any:
+def perpendicular(z: Plane) -> Plane:
     """Return a planar vector turned left by a right angle."""
-    return Plane(-z.b, Lanes(z.a.x, z.a.n, z.a.factors)) if isinstance(z, Plane) else 1j * z
+    if not isinstance(z, Plane):
+        return 1j * z
+    return Plane(-z.b, Lanes(z.a.x, z.a.n, z.a.factors))
 
 
 def dot(z: Plane, w: Plane) -> Lanes:
     """Return the scalar product of planar vectors."""
-    return _sum("+", _product(z.a, w.a), _product(z.b, w.b))
+    return _sum("+", product(z.a, w.a), product(z.b, w.b))  # type: ignore[no-any-return]
 
 
 def cross(z: Plane, w: Plane) -> Lanes:
     """Return z x w, positive if w is to the left of z."""
-    return _sum("-", _product(z.a, w.b), _product(z.b, w.a))
+    return _sum("-", product(z.a, w.b), product(z.b, w.a))  # type: ignore[no-any-return]
 
 
 def where(condition: Any, yes: Any, no: Any) -> Any:
     """Return `yes` where the condition holds, else `no`, lane by lane."""
     if isinstance(condition, (bool, np.bool_)):
         return yes if condition else no
+    if not isinstance(condition, Mask):
+        if isinstance(condition, Value):
+            raise TraceError(f"where() of {condition.kind}: expected a condition, such as x > 0.0")
+        return np.where(condition, yes, no)
     if isinstance(yes, Plane):
         return Plane(where(condition, yes.a, no.a), where(condition, yes.b, no.b))
+    if not (is_real(yes) and is_real(no)):
+        wrong = no if is_real(yes) else yes
+        raise TraceError(f"where() of {getattr(wrong, 'kind', type(wrong).__name__)}: expected two numbers")
     n = max(condition.n, _lanes_of(yes, no))
     chosen = CURRENT.machine.select(condition.x, payload(yes, n), payload(no, n), n, condition.n)
     return Lanes(chosen, n)
 
 
 def maximum(x: Any, y: Any) -> Any:
-    """Return y if it is larger, else x: NaN stays NaN if it is x."""
+    """Return the larger number of two; NaN if either is, as NumPy does."""
     return _chosen(">", x, y)
 
 
 def minimum(x: Any, y: Any) -> Any:
-    """Return y if it is smaller, else x: NaN stays NaN if it is x."""
+    """Return the smaller number of two; NaN if either is, as NumPy does."""
     return _chosen("<", x, y)
 
 
 def _chosen(symbol: str, x: Any, y: Any) -> Any:
+    x, y = (part.to_real() if isinstance(part, Index) else part for part in (x, y))
     if not (isinstance(x, Lanes) or isinstance(y, Lanes)):
+        if isinstance(x, np.ndarray) or isinstance(y, np.ndarray) or x != x or y != y:
+            return (np.maximum if symbol == ">" else np.minimum)(x, y)
         return y if (y > x if symbol == ">" else y < x) else x
     n = _lanes_of(x, y)
+    are_known = [not isinstance(part, Lanes) for part in (x, y)]
     x, y = full(x, n), full(y, n)
-    return where(_comparison(symbol, y, x), y, x)
+    if are_known[0]:  # x is chosen by a comparison that NaN fails, so y is NaN where it is NaN
+        return where(_comparison(f"{symbol}=", x, y), x, y)
+    takes = _comparison(symbol, y, x)
+    if not are_known[1]:
+        takes = takes | (y != y)
+    return where(takes, y, x)
 
 
-def any_lane(condition: Any) -> Any:
+def clip(x: Any, low: Any, high: Any) -> Any:
+    """Return a number limited to [low, high]."""
+    return minimum(maximum(x, low), high)
+
+
+def any_lane(condition: Truth) -> Any:
     """Return whether a condition holds in any lane."""
-    return condition if isinstance(condition, bool) else Mask(CURRENT.machine.any_lane(condition.x, condition.n), 0)
+    if isinstance(condition, bool):
+        return condition
+    return Mask(CURRENT.machine.any_lane(condition.x, condition.n), 0)
 
 
-def lane_of(x: Lanes, lane: Any) -> Lanes:
+def lane_of(x: Lanes, lane: Whole) -> Lanes:
     """Return one lane as an ordinary number."""
     return Lanes(CURRENT.machine.pick(x.x, word(lane), x.n), 0)
 
@@ -453,15 +595,17 @@ def lane_sum(start: Any, x: Any) -> Any:
     return full(total, x.n)
 
 
-def steady(x: Any) -> Any:
-    """Return x, which does not change for small changes of what it was computed from: a rounded number."""
-    stop = getattr(CURRENT.machine, "steady", None)
-    return Lanes(stop(x.x), x.n, x.factors) if stop and isinstance(x, Lanes) else x
+def steady(x: V) -> V:
+    """Return x, which does not change with small changes of what it was computed from: a number that was rounded
+    by adding a large constant. A machine that rearranges or differentiates must leave it alone."""
+    if isinstance(x, Lanes):
+        return Lanes(CURRENT.machine.steady(x.x), x.n, x.factors)  # type: ignore[return-value]
+    return x
 
 
-def whole(x: Lanes) -> Any:
+def whole(x: Any) -> Any:
     """Return an ordinary number that is whole as a whole number."""
-    return Index(CURRENT.machine.new(f"fptosi double {x.x} to i64")) if isinstance(x, Lanes) else int(x)
+    return index(CURRENT.machine.real_to_index(x.x)) if isinstance(x, Lanes) else int(x)
 
 
 def quarter_turns(cosine: Lanes, sine: Lanes, shifted: Lanes) -> tuple[Lanes, Lanes]:
@@ -469,13 +613,10 @@ def quarter_turns(cosine: Lanes, sine: Lanes, shifted: Lanes) -> tuple[Lanes, La
     say. Bits are moved, nothing is rounded or compared."""
     machine = CURRENT.machine
     n = shifted.n
-    if machine.runs_now:
-        x, y = machine.quarter_turns(cosine.x, sine.x, shifted.x, n)
-        return Lanes(x, n), Lanes(y, n)
     c, s, quarters = (machine.bits(value.x, n) for value in (cosine, sine, shifted))
     odd = machine.whole("sub", 0, machine.whole("and", quarters, 1, n), n)
     swap = machine.whole("and", machine.whole("xor", c, s, n), odd, n)
-    top = -(2**63)
+    top = 1 << 63
     sine_sign = machine.whole("and", machine.whole("shl", quarters, 62, n), top, n)
     next_quarter = machine.whole("add", quarters, 1, n)
     cosine_sign = machine.whole("and", machine.whole("shl", next_quarter, 62, n), top, n)
@@ -515,3 +656,82 @@ def transposed(rows: list[Lanes]) -> list[Lanes]:
             block = 2 * block
         columns += [Lanes(x, n) for x in square]
     return columns
+
+
+def _sign(x: Any) -> Any:
+    return where(x > 0.0, 1.0, where(x < 0.0, -1.0, x * 0.0))
+
+
+def _copysign(x: Any, y: Any) -> Any:
+    machine = CURRENT.machine
+    n = _lanes_of(x, y)
+    top = 1 << 63
+    size = machine.whole("and", machine.bits(payload(x, n), n), top - 1, n)
+    sign = machine.whole("and", machine.bits(payload(y, n), n), top, n)
+    return Lanes(machine.of_bits(machine.whole("or", size, sign, n), n), n)
+
+
+def _full_like(like: Any, value: Any) -> Any:
+    return full(value, like.n)
+
+
+LIBRARY = (
+    "exp", "exp2", "expm1", "log", "log2", "log10", "log1p", "sin", "cos", "tan", "sinh", "cosh", "tanh", "hypot",
+    "cbrt", "fmod",
+)  # fmt: skip
+"""Functions of NumPy that the C library has by the same name."""
+
+UFUNCS: dict[Any, Callable[..., Any]] = {
+    np.add: _sum_of,
+    np.subtract: _difference,
+    np.multiply: lambda x, y: x * y if isinstance(x, Value) else y * x,
+    np.divide: lambda x, y: x / y if isinstance(x, Value) else y.__rtruediv__(x),
+    np.negative: lambda x: -x,
+    np.positive: lambda x: x,
+    np.absolute: absolute,
+    np.fabs: absolute,
+    np.sqrt: sqrt,
+    np.square: lambda x: x * x,
+    np.reciprocal: lambda x: 1.0 / x,
+    np.floor: floor,
+    np.ceil: ceil,
+    np.power: _power,
+    np.float_power: _power,
+    np.minimum: minimum,
+    np.maximum: maximum,
+    np.sign: _sign,
+    np.copysign: _copysign,
+    np.isnan: lambda x: x != x,
+    np.isfinite: lambda x: x - x == 0.0,
+    np.less: lambda x, y: _comparison("<", x, y),
+    np.less_equal: lambda x, y: _comparison("<=", x, y),
+    np.greater: lambda x, y: _comparison(">", x, y),
+    np.greater_equal: lambda x, y: _comparison(">=", x, y),
+    np.equal: lambda x, y: _comparison("==", x, y),
+    np.not_equal: lambda x, y: _comparison("!=", x, y),
+    np.logical_and: lambda x, y: x & y,
+    np.logical_or: lambda x, y: x | y,
+    np.logical_not: lambda x: ~x,
+    np.bitwise_and: lambda x, y: x & y,
+    np.bitwise_or: lambda x, y: x | y,
+    np.invert: lambda x: ~x,
+    np.deg2rad: lambda x: x * (math.pi / 180),
+    np.rad2deg: lambda x: x * (180 / math.pi),
+    np.radians: lambda x: x * (math.pi / 180),
+    np.degrees: lambda x: x * (180 / math.pi),
+    np.arcsin: _library("asin"),
+    np.arccos: _library("acos"),
+    np.arctan: _library("atan"),
+    np.arctan2: _library("atan2"),
+    **{getattr(np, name): _library(name) for name in LIBRARY},
+}
+"""NumPy's functions of numbers that work on values."""
+
+FUNCTIONS: dict[Any, Callable[..., Any]] = {
+    np.where: where,
+    np.clip: clip,
+    np.zeros_like: lambda x: full(0.0, x.n),
+    np.ones_like: lambda x: full(1.0, x.n),
+    np.full_like: _full_like,
+}
+"""NumPy's other functions that do."""

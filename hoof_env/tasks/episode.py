@@ -11,7 +11,7 @@ import numpy as np
 from hoof_env.dynamics.form import engine_layout
 from hoof_env.dynamics.layout import PLAIN, Features, StrideSums, stride_peaks
 from hoof_env.gait import PARAMETERS
-from hoof_env.simd.layout import Block, Constants, Layout, Row, Size, Vector, extended
+from hoof_env.simd.layout import Block, Layout, Row, Size, Vector, extended
 from hoof_env.tasks.own_parts import Own
 from hoof_env.tasks.reward import TERMS
 
@@ -93,7 +93,7 @@ class _Memories(NamedTuple):
     own_rows: int
 
 
-class Memories(Constants, _Memories):
+class Memories(_Memories):
     """Layouts of the memory that a step works on, constants of its kernels.
 
     Attributes:
@@ -136,7 +136,7 @@ def task_type(terms: int, entries: int, gait: int = ACTIONS, more: tuple[Any, ..
 
     Args:
         terms: number of the reward's terms.
-        entries: number of slots of the observation, see `envs.observation_kernel.slots_of`.
+        entries: number of slots of the observation, see `envs.scene.Slots`.
         gait: number of gait parameters of a leg.
         more: further fields of the body's own.
     """

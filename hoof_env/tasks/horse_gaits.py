@@ -405,7 +405,7 @@ def command_gait(task, actions, episode, first_leg, parameters, n, scratch):  # 
             offset = 0.0 * speed
             if k < ACTED:
                 at = i * ACTED + k
-                action = clip(read(leg, actions, n * (COUNT * ACTED) + at, COUNT * ACTED), 1.0)
+                action = clip(read(actions, n * (COUNT * ACTED) + at, COUNT * ACTED, first_leg.lanes), 1.0)
                 offset = episode.offset[at]
                 offset = offset + FOLLOWED * (action - offset)
                 episode.offset[at] = offset

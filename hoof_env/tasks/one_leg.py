@@ -146,7 +146,7 @@ def command_rates(task, actions, episode, leg, parameters, n, scratch):  # type:
     """Command the rates that an action asks for, relative to where the gait is heading and within the limits;
     see `body.BodyKernels.command`."""
     for k in range(ACTIONS):
-        action = clip(read(leg, actions, n * ACTIONS + k, ACTIONS), 1.0)
+        action = clip(read(actions, n * ACTIONS + k, ACTIONS, leg.lanes), 1.0)
         heading = leg.state.gait[k] + task.lead * leg.state.gait_rate[k]
         command = heading + task.reach[k] * action
         leg.command[k] = minimum(maximum(command, task.low[k]), task.high[k])

@@ -1,42 +1,49 @@
 """Control flow that depends on values of the running kernel. With conditions and counts that are known when a
-kernel is traced, or on a machine that computes at once, all of it is Python's own."""
+kernel is traced, and on a machine that computes at once, all of it is Python's own."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from typing import Any
 
-from hoof_env.simd.machines import ALWAYS, CURRENT, wide
-from hoof_env.simd.values import Index, Lanes, Mask, Plane, full, is_real, word
+from hoof_env.simd.machines import CURRENT, wide
+from hoof_env.simd.values import Index, Lanes, Mask, Plane, Truth, Whole, full, word
 
 
-def when(condition: Any, *following: Any) -> Callable[[Callable[[], None]], None]:
-    """Return a decorator that runs a function where a condition holds:
+class Always:
+    """Condition of a machine without branches, such as JAX under `jit`: what may be skipped always runs."""
+
+
+def _is_known(condition: Any) -> bool:
+    return not isinstance(condition, Mask) or CURRENT.machine.runs_now
+
+
+def when(condition: Truth) -> Callable[[Callable[[], None]], None]:
+    """Return a decorator that runs a function where a condition holds that all lanes share:
 
     @when(any_lane(inside))
-    def _(): ...
+    def _() -> None: ...
+
+    What the function changes is in memory, or in a `Cell`.
     """
 
     def decorate(function: Callable[[], None]) -> None:
-        if not isinstance(condition, Mask) or CURRENT.machine.runs_now:
-            if getattr(condition, "x", condition) is ALWAYS or condition:
-                function()
-            return
         cond(condition, function, None)
 
     return decorate
 
 
-def cond(condition: Any, then: Callable[[], Any], otherwise: Any) -> Any:
+def cond(condition: Truth, then: Callable[[], Any], otherwise: Any) -> Any:
     """Return what `then` returns where a condition holds that all lanes share, else `otherwise`: a value or a
     tuple of values, or a function that returns them."""
-    if not isinstance(condition, Mask) or CURRENT.machine.runs_now:
-        if getattr(condition, "x", condition) is ALWAYS or condition:
+    if _is_known(condition):
+        if isinstance(getattr(condition, "x", None), Always) or condition:
             return then()
         return otherwise() if callable(otherwise) else otherwise
     machine = CURRENT.machine
+    x = condition.x  # type: ignore[union-attr]
     yes, no, end = (machine.label(name) for name in ("then", "else", "end"))
-    machine.do(f"br i1 {condition.x}, label %{yes}, label %{no if callable(otherwise) else end}")
+    machine.do(f"br i1 {x}, label %{yes}, label %{no if callable(otherwise) else end}")
     entry, at = machine.lines, len(machine.lines) - 1
     machine.begin(yes)
     given = then()
@@ -46,7 +53,7 @@ def cond(condition: Any, then: Callable[[], Any], otherwise: Any) -> Any:
         return None
     many = isinstance(given, tuple)
     values = given if many else () if given is None else (given,)
-    # through the stack: LLVM makes phi nodes of it
+    # through the stack, of which LLVM makes registers
     other = None if callable(otherwise) else otherwise if many else (otherwise,)
     kinds = [_kind_of(value, *(() if other is None else (other[k],))) for k, value in enumerate(values)]
     slots = [[machine.slot(wide("double", n)) for _ in range(parts)] for n, parts in kinds]
@@ -66,14 +73,15 @@ def cond(condition: Any, then: Callable[[], Any], otherwise: Any) -> Any:
     machine.begin(end)
     if given is None:
         return None
-    results = []
+    results: list[Any] = []
     for (n, _), places in zip(kinds, slots, strict=True):
-        parts = [Lanes(machine.load(place, wide("double", n), 64), n) for place in places]
+        parts = [Lanes(machine.load(place, "double", n, 64), n) for place in places]
         results.append(Plane(*parts) if len(parts) == 2 else parts[0])
     return tuple(results) if many else results[0]
 
 
 def _kind_of(*values: Any) -> tuple[int, int]:
+    """Return the number of lanes of values of one kind, and of what they consist."""
     n = max(getattr(value, "n", 0) for value in values)
     return n, 2 if any(isinstance(value, Plane) for value in values) else 1
 
@@ -83,37 +91,38 @@ def _keep(values: Any, kinds: Any, slots: Any) -> None:
     for value, (n, _), places in zip(values, kinds, slots, strict=True):
         parts = (value.a, value.b) if isinstance(value, Plane) else (value,)
         for part, place in zip(parts, places, strict=True):
-            machine.store(place, full(part, n).x, wide("double", n), 64)
+            machine.store(place, full(part, n).x, "double", n, 64)
 
 
-def loop(begin: Any, end: Any = None, step: Any = 1) -> Iterator[Any]:
+def loop(begin: Whole, end: Whole | None = None, step: Whole = 1) -> Iterator[Any]:
     """Run the body of a `for` with the numbers of `range`; traced once if a bound is known only when the kernel
     runs. What changes from turn to turn is in memory, or in a `Cell`."""
-    begin, end = (0, begin) if end is None else (begin, end)
-    if not any(isinstance(bound, Index) for bound in (begin, end, step)):
-        yield from range(begin, end, step)
+    first, last = (0, begin) if end is None else (begin, end)
+    if not any(isinstance(bound, Index) for bound in (first, last, step)):
+        yield from range(first, last, step)  # type: ignore[arg-type]
         return
     machine = CURRENT.machine
     counter = machine.slot("i64")
-    machine.store(counter, word(begin), "i64", 8)
+    machine.store(counter, word(first), "i64")
     test, body, after = (machine.label(name) for name in ("loop", "body", "after"))
     machine.do(f"br label %{test}")
     machine.begin(test)
-    now = machine.load(counter, "i64", 8)
-    goes_on = machine.new(f"icmp slt i64 {now}, {word(end)}")
+    now = machine.load(counter, "i64")
+    goes_on = machine.index_compare("<", now, word(last))
     machine.do(f"br i1 {goes_on}, label %{body}, label %{after}")
     machine.begin(body)
     yield Index(now)
-    machine.store(counter, machine.new(f"add i64 {now}, {word(step)}"), "i64", 8)
+    machine.store(counter, machine.index_binary("add", now, word(step)), "i64")
     machine.do(f"br label %{test}")
     machine.begin(after)
 
 
 class Cell:
-    """Variable of a kernel that changes inside `loop` or `when`: an ordinary or a whole number."""
+    """Variable of a kernel that changes inside `loop` or `when`: an ordinary number, or a whole one if it begins
+    as one."""
 
     def __init__(self, value: Any) -> None:
-        self._kind = "double" if is_real(value) and not isinstance(value, int) else "i64"
+        self._kind = "i64" if isinstance(value, (int, Index)) else "double"
         self._runs_now = CURRENT.machine.runs_now
         if not self._runs_now:
             self._slot = CURRENT.machine.slot(self._kind)
@@ -121,9 +130,10 @@ class Cell:
 
     @property
     def value(self) -> Any:
+        """The present value."""
         if self._runs_now:
             return self._value
-        x = CURRENT.machine.load(self._slot, self._kind, 8)
+        x = CURRENT.machine.load(self._slot, self._kind)
         return Lanes(x, 0) if self._kind == "double" else Index(x)
 
     @value.setter
@@ -132,16 +142,17 @@ class Cell:
             self._value = value
             return
         x = full(value, 0).x if self._kind == "double" else word(value)
-        CURRENT.machine.store(self._slot, x, self._kind, 8)
+        CURRENT.machine.store(self._slot, x, self._kind)
 
 
-def one_of(values: tuple[float, ...], k: Any) -> Any:
+def one_of(values: Any, k: Whole) -> Any:
     """Return the k-th of a few numbers."""
     if not isinstance(k, Index):
         return values[k]
     chosen: Any = values[-1]
     for j in range(len(values) - 2, -1, -1):
-        chosen = full(chosen, 0)
         mask = k == j
-        chosen = Lanes(CURRENT.machine.select(mask.x, full(values[j], 0).x, chosen.x, 0, 0), 0)
+        chosen = Lanes(CURRENT.machine.select(mask.x, full(values[j], 0).x, full(chosen, 0).x, 0, 0), 0)
     return full(chosen, 0)
+
+

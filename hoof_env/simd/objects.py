@@ -1,0 +1,107 @@
+"""Machine code of kernels in files: plain objects of the processor, in a folder of the user's.
+
+A file's name is the digest of all that its code follows from, so that no file is ever out of date. A file begins
+with the digest of its content. What others could write is not read, because it is run.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import sys
+import tempfile
+import time
+import warnings
+from contextlib import suppress
+from pathlib import Path
+
+FOLDER = "HOOF_ENV_CACHE_DIR"
+"""Environment variable: folder of the files in the place of the user's cache folder."""
+
+MOST_FILES = 2000
+"""Number of files beyond which the least recently used half goes; a file has 5 to 100 kB."""
+
+DAY = 86400.0
+"""Time after which the use of a file is noted again [s]."""
+
+DIGEST = hashlib.sha256().digest_size
+
+
+def folder() -> Path:
+    """Return the folder of the files: that of the environment variable, else one in the user's cache folder."""
+    if given := os.environ.get(FOLDER):
+        return Path(given)
+    home = Path(os.path.expanduser("~"))
+    if sys.platform == "win32":
+        base = Path(os.environ.get("LOCALAPPDATA") or home / "AppData" / "Local")
+    elif sys.platform == "darwin":
+        base = home / "Library" / "Caches"
+    else:
+        base = Path(os.environ.get("XDG_CACHE_HOME") or home / ".cache")
+    return base / "hoof-env" / "kernels"
+
+
+def read(name: str) -> bytes | None:
+    """Return the content of a file; None if there is none that can be trusted."""
+    path = folder() / name
+    try:
+        if not _is_own(path):
+            return None
+        found = path.read_bytes()
+    except OSError:
+        return None
+    content = found[DIGEST:]
+    if hashlib.sha256(content).digest() != found[:DIGEST]:
+        return None  # the disk was full, for one
+    with suppress(OSError):
+        if time.time() - path.stat().st_mtime > DAY:
+            os.utime(path)
+    return content
+
+
+def write(name: str, content: bytes) -> None:
+    """Keep a content in a file, at once or not at all; without a folder that can be written it is not kept."""
+    path = folder() / name
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True, mode=0o700)
+        if not _is_own(path.parent):
+            return
+        with tempfile.NamedTemporaryFile(dir=path.parent, delete=False) as new:
+            new.write(hashlib.sha256(content).digest() + content)
+        try:
+            os.replace(new.name, path)
+        except OSError:
+            os.unlink(new.name)
+        _make_room(path.parent)
+    except OSError:
+        return  # a read-only or full disk: each process compiles for itself
+
+
+def _is_own(path: Path) -> bool:
+    """Return True if nobody but this user can change a file, and those beside it."""
+    if not hasattr(os, "geteuid"):
+        return True  # the folders of Windows' users are their own
+    for place in {path, path.parent}:
+        try:
+            status = place.stat()
+        except FileNotFoundError:
+            return False
+        if status.st_uid != os.geteuid() or status.st_mode & 0o022:
+            warnings.warn(
+                f"hoof-env: {place} belongs to others, or others may write there: machine code in it is not"
+                f" used, and kernels are compiled in each process; let {FOLDER} name a folder of your own",
+                stacklevel=2,
+            )
+            return False
+    return True
+
+
+def _make_room(place: Path) -> None:
+    """Remove the least recently used half of too many files."""
+    files = [entry for entry in os.scandir(place) if entry.is_file()]
+    if len(files) <= MOST_FILES:
+        return
+    used = sorted(files, key=lambda entry: entry.stat().st_mtime)
+    for entry in used[: len(used) // 2]:
+        with suppress(OSError):  # another process may have removed it
+            os.unlink(entry.path)
