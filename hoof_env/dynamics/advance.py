@@ -48,7 +48,7 @@ from hoof_env.simd import (
     when,
     where,
 )
-from hoof_env.simd.compile import Kernel, inline_llvm
+from hoof_env.simd.compile import Kernel
 from hoof_env.simd.memory import Arrays, Given, RecordType
 
 LANES = 8
@@ -164,7 +164,6 @@ def unpack_model(record, tables, ground, lanes_are_legs, law, form):  # type: ig
     )
 
 
-@inline_llvm
 def read_trunk(trunk, memory):  # type: ignore[no-untyped-def]
     """Load state and settings from a `TrunkMemory`."""
     load_rows(trunk.state, memory.state)
@@ -172,7 +171,6 @@ def read_trunk(trunk, memory):  # type: ignore[no-untyped-def]
     keep_still(trunk)
 
 
-@inline_llvm
 def read_leg(leg, memory, form):  # type: ignore[no-untyped-def]
     """Load state, command and settings from a `LegMemory`; set the sums to 0."""
     load_rows(leg.state, memory.state)
@@ -190,7 +188,6 @@ def read_leg(leg, memory, form):  # type: ignore[no-untyped-def]
         lift_heel(leg, form.springs)
 
 
-@inline_llvm
 def find_result(trunk, legs, leg_count, lanes_are_legs, form):  # type: ignore[no-untyped-def]
     """Return how the environments ended, numbers of `parts.Result`. A number too large to be squared counts
     as not finite."""
@@ -216,14 +213,12 @@ def find_result(trunk, legs, leg_count, lanes_are_legs, form):  # type: ignore[n
     return where((total - total != 0.0) | (stuck > 0.0), failure, ending)
 
 
-@inline_llvm
 def store(memory, rows, count, good):  # type: ignore[no-untyped-def]
     """Store `count` rows in the lanes of memory where `good` holds."""
     for k in range(count):
         memory[k] = where(good, rows[k], memory[k])
 
 
-@inline_llvm
 def run_steps(  # type: ignore[no-untyped-def]
     trunk, legs, leg_count, model, account, constants, reactions, h, steps, keeps_account, reacts, joints
 ):
@@ -294,7 +289,6 @@ def load(trunk, legs, leg_count, account, memory, leg_memory, form):
         account[k] = 0.0
 
 
-@inline_llvm
 def start_motion(trunk, legs, leg_count, model, starts):  # type: ignore[no-untyped-def]
     """Turn the velocities of the environments that start into momenta."""
     begin_step(trunk, legs, leg_count, model)
@@ -332,7 +326,6 @@ def read_shapes(shapes, leg_count, constants, lanes, lanes_are_legs, form):
         shapes[k] = read(constants.first, k, stride, lanes)
 
 
-@inline_llvm
 def judge(trunk, legs, leg_count, before, resets, lanes_are_legs, form):  # type: ignore[no-untyped-def]
     """Return the results of the environments, and where the rows of the kernel are to be stored."""
     result = find_result(trunk, legs, leg_count, lanes_are_legs, form)
@@ -346,7 +339,6 @@ def judge(trunk, legs, leg_count, before, resets, lanes_are_legs, form):  # type
     return result, good
 
 
-@inline_llvm
 def store_trunk(trunk, account, memory, good, keeps_account, form):  # type: ignore[no-untyped-def]
     """Store the report, and where `good` holds what changes of the trunk."""
     report_trunk(trunk, memory.report)

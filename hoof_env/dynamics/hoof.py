@@ -16,16 +16,14 @@ from hoof_env.simd import (
     full_like,
     maximum,
     perpendicular,
+    rounded,
     vector,
     where,
 )
-from hoof_env.simd.compile import inline_llvm
 from hoof_env.simd.math import clip, root_power
-from hoof_env.simd.values import rounded
 from hoof_env.simd.user_functions import foreign, function_name, number_of
 
 
-@inline_llvm
 def level_ground(leg):  # type: ignore[no-untyped-def]
     """Set what is constant on ground that is level and the same everywhere: normal and scales of the
     terrain."""
@@ -38,7 +36,6 @@ def level_ground(leg):  # type: ignore[no-untyped-def]
     leg.heel.friction_scale = 1.0
 
 
-@inline_llvm
 def lift_heel(leg, springs):  # type: ignore[no-untyped-def]
     """Set the contact of a heel that is not there, of a hoof with one point, to nothing; it stays so."""
     leg.heel.penetration = 0.0
@@ -54,7 +51,6 @@ def lift_heel(leg, springs):  # type: ignore[no-untyped-def]
         leg.heel.mean_deflection_rate[k] = 0.0
 
 
-@inline_llvm
 def meet_ground(trunk, leg, model):  # type: ignore[no-untyped-def]
     """Compute the forces of the ground on toe and heel, and their generalised forces on crank and frame."""
     hip = leg.hip
@@ -79,7 +75,6 @@ def meet_ground(trunk, leg, model):  # type: ignore[no-untyped-def]
         leg.ground_moment_beta = toe_beta
 
 
-@inline_llvm
 def meet_point(trunk, leg, point, memory, arm, arm_by_theta, hip, hip_velocity, model):  # type: ignore[no-untyped-def]
     """Compute the motion of a hoof point; return the force of the ground on it and that force's parts along
     theta and beta. `arm` is the vector from O to the point in the leg's frame, `hip` is O's place [m]."""
@@ -95,7 +90,7 @@ def meet_point(trunk, leg, point, memory, arm, arm_by_theta, hip, hip_velocity, 
             place.real, model.ground_cells, model.ground_origin, model.ground_per_metre
         )
         normal = vector(normal_x, normal_y)
-        penetration = (height - place.imag) * normal_y
+        penetration = rounded((height - place.imag) * normal_y)
         rate = -dot(normal, velocity)
         sliding_speed = -cross(normal, velocity)
         point.ground_normal = normal
@@ -115,13 +110,11 @@ def meet_point(trunk, leg, point, memory, arm, arm_by_theta, hip, hip_velocity, 
     return force, dot(force, by_theta), cross(arm, force)
 
 
-@inline_llvm
 def force_of(point):  # type: ignore[no-untyped-def]
     """Return the force of the ground on a hoof point, in the world [N]."""
     return point.normal * point.ground_normal - point.friction * perpendicular(point.ground_normal)
 
 
-@inline_llvm
 def press_rigidly(trunk, point, memory, penetration, rate, sliding_speed, model):  # type: ignore[no-untyped-def]
     """Compute the forces on a point of a rigid hoof, which is the sole itself."""
     nothing = 0.0 * absolute(penetration)  # 0, but NaN where the penetration is NaN
@@ -155,7 +148,6 @@ def press_rigidly(trunk, point, memory, penetration, rate, sliding_speed, model)
     point.friction = friction
 
 
-@inline_llvm
 def press_through_spring(trunk, leg, point, memory, model):  # type: ignore[no-untyped-def]
     """Compute the forces on a point of a compliant hoof. Its sole has no mass: spring and damper carry the
     force of the ground.
@@ -208,7 +200,6 @@ def press_through_spring(trunk, leg, point, memory, model):  # type: ignore[no-u
     point.friction = -held
 
 
-@inline_llvm
 def latch(trunk, memory, inside, inverse_speed, penetration, rate, model):  # type: ignore[no-untyped-def]
     """Return 1 / v0 [s/m] of points that are in the ground, kept from when they entered it."""
 
@@ -219,7 +210,6 @@ def latch(trunk, memory, inside, inverse_speed, penetration, rate, model):  # ty
     return cond(any_lane(inside & (inverse_speed == 0.0)), entered, inverse_speed)
 
 
-@inline_llvm
 def inverse_entry_speed(trunk, memory, penetration, rate, model):  # type: ignore[no-untyped-def]
     """Return 1 / v0 [s/m] with v0 the approach speed at the crossing of the surface, interpolated between the
     last whole step and now."""
@@ -236,7 +226,6 @@ def inverse_entry_speed(trunk, memory, penetration, rate, model):  # type: ignor
     return span / maximum(entry, floor * span)
 
 
-@inline_llvm
 def ground_spring(ground, stiffness_scale, penetration, eighths):  # type: ignore[no-untyped-def]
     """Return the elastic force K d^n of Eq. 14 [N]."""
     # the usual exponent, 3/2, as a constant: `root_power` then has no branches
@@ -247,7 +236,6 @@ def ground_spring(ground, stiffness_scale, penetration, eighths):  # type: ignor
     return ground.stiffness * stiffness_scale * power
 
 
-@inline_llvm
 def contact_force(ground, stiffness_scale, penetration, rate, inverse_speed, eighths):  # type: ignore[no-untyped-def]
     """Return the normal force on a point inside the ground (Eq. 14), and its elastic part [N]."""
     spring = ground_spring(ground, stiffness_scale, penetration, eighths)
@@ -276,7 +264,6 @@ def law_of(contact_law: Callable[..., Any] | None) -> Any:
     force = foreign(contact_law)
     number = number_of(f"the contact law {function_name(contact_law)}")
 
-    @inline_llvm
     def push(ground, stiffness_scale, penetration, rate, inverse_speed, eighths):  # type: ignore[no-untyped-def]
         here = GroundHere(ground.stiffness * stiffness_scale, eighths, ground.chi, ground.dashpot)
         pushed = maximum(number(force(penetration, rate, inverse_speed, here)), 0.0)
@@ -285,7 +272,6 @@ def law_of(contact_law: Callable[..., Any] | None) -> Any:
     return push
 
 
-@inline_llvm
 def remember_contacts(leg):  # type: ignore[no-untyped-def]
     """Store penetration, rate and inverse approach speed of toe and heel at a whole step; the speed is 0
     outside the ground."""
@@ -293,7 +279,6 @@ def remember_contacts(leg):  # type: ignore[no-untyped-def]
     remember_point(leg.heel, leg.state.heel)
 
 
-@inline_llvm
 def remember_point(point, memory):  # type: ignore[no-untyped-def]
     """Store them for one point, see `remember_contacts`."""
     memory.penetration = point.penetration
@@ -305,7 +290,6 @@ def remember_point(point, memory):  # type: ignore[no-untyped-def]
 # States of the hooves' springs, for the functions of `stepping`; `count` rows a point, 0 of rigid hooves
 
 
-@inline_llvm
 def begin_springs(leg, count):  # type: ignore[no-untyped-def]
     """Set the springs of the first stage to the state itself."""
     for k in range(count):
@@ -313,7 +297,6 @@ def begin_springs(leg, count):  # type: ignore[no-untyped-def]
         leg.heel.deflection[k] = leg.state.heel.deflection[k]
 
 
-@inline_llvm
 def clear_springs(leg, count):  # type: ignore[no-untyped-def]
     """Set the means of the springs' rates to 0."""
     for k in range(count):
@@ -321,7 +304,6 @@ def clear_springs(leg, count):  # type: ignore[no-untyped-def]
         leg.heel.mean_deflection_rate[k] = 0.0
 
 
-@inline_llvm
 def weigh_springs(leg, count, weight):  # type: ignore[no-untyped-def]
     """Add the rates at the present stage to their means."""
     toe = leg.toe.mean_deflection_rate
@@ -331,7 +313,6 @@ def weigh_springs(leg, count, weight):  # type: ignore[no-untyped-def]
         heel[k] = heel[k] + weight * leg.heel.deflection_rate[k]
 
 
-@inline_llvm
 def move_springs(leg, count, elapsed):  # type: ignore[no-untyped-def]
     """Move the springs `elapsed` [s] from the step's start with the rates of the present stage."""
     for k in range(count):
@@ -339,7 +320,6 @@ def move_springs(leg, count, elapsed):  # type: ignore[no-untyped-def]
         leg.heel.deflection[k] = leg.state.heel.deflection[k] + elapsed * leg.heel.deflection_rate[k]
 
 
-@inline_llvm
 def end_springs(leg, count, averages, h):  # type: ignore[no-untyped-def]
     """Advance the springs' states by a step of `h` [s]."""
     for k in range(count):

@@ -14,8 +14,7 @@ from hoof_env.dynamics.parts import Result
 from hoof_env.ground.terrain import surface
 from hoof_env.leg.closed_form import carry, meet
 from hoof_env.leg.mechanism import Dyad
-from hoof_env.simd import any_lane, full_like, lane_sum, minimum, vector, when, where
-from hoof_env.simd.compile import inline_llvm
+from hoof_env.simd import any_lane, full_like, lane_sum, minimum, rounded, vector, when, where
 
 CHECK_EVERY = 5
 """Whole steps from one look to the next: to find all joints takes square roots and quotients."""
@@ -25,26 +24,22 @@ ROUNDING = 1e-6  # [m], more than G's places differ by rounding
 PITCH, HEIGHT, LOW_JOINT = float(Result.PITCH), float(Result.HEIGHT), float(Result.LOW_JOINT)
 
 
-@inline_llvm
 def has_moved(result):  # type: ignore[no-untyped-def]
     """Return where the motion that a call asked for happened, within the limits or beyond one."""
     return (result == 0.0) | (result >= PITCH)
 
 
-@inline_llvm
 def clear_limits(trunk):  # type: ignore[no-untyped-def]
     """Forget the limits that an earlier call passed."""
     trunk.violated_limit[0] = 0.0
 
 
-@inline_llvm
 def record_violation(trunk, is_beyond, result):  # type: ignore[no-untyped-def]
     """Keep the first of the limits that were passed."""
     before = trunk.violated_limit[0]
     trunk.violated_limit[0] = where((before == 0.0) & is_beyond, result, before)
 
 
-@inline_llvm
 def ground_height(place, model):  # type: ignore[no-untyped-def]
     """Return the height of the ground below a point [m]."""
     height = 0.0 * place.real
@@ -55,7 +50,6 @@ def ground_height(place, model):  # type: ignore[no-untyped-def]
     return height
 
 
-@inline_llvm
 def check_trunk(trunk, model):  # type: ignore[no-untyped-def]
     """Check the trunk's pitch, and its height above the ground."""
     limits, pitch = trunk.settings.limits, trunk.stage.pitch
@@ -64,26 +58,22 @@ def check_trunk(trunk, model):  # type: ignore[no-untyped-def]
     record_violation(trunk, (height < limits[2]) | (height > limits[3]), HEIGHT)
 
 
-@inline_llvm
 def moved(turn, place):  # type: ignore[no-untyped-def]
     """Return the point of the crank at its place in the leg's frame; `turn` is exp(i theta)."""
-    return vector(place.travel * turn.real, -turn.imag) * place.crank
+    return rounded(vector(place.travel * turn.real, -turn.imag) * place.crank)
 
 
-@inline_llvm
 def meeting(dyad, first, second):  # type: ignore[no-untyped-def]
     """Return the point at two lengths from `first` and `second`."""
     return meet(first, second, dyad.one2, dyad.excess, dyad.side)
 
 
-@inline_llvm
 def height_of_sole(trunk, leg, place):  # type: ignore[no-untyped-def]
     """Return the height of a point of the sole, at `place` from the toe towards the heel [m]."""
     toe, heel = leg.functions.toe, leg.functions.heel
     return trunk.place.imag + leg.hip.imag + (leg.turn * (toe + place * (heel - toe))).imag
 
 
-@inline_llvm
 def least_height(trunk, leg, reach):  # type: ignore[no-untyped-def]
     """Return a height that no point within `reach` of O comes below [m]."""
     return trunk.place.imag + leg.hip.imag - leg.settings.length_scale[0] * reach
@@ -96,7 +86,6 @@ def joint_check_of(structure: Structure) -> Any:
     """
     mechanism = structure.mechanism
 
-    @inline_llvm
     def bound(trunk, leg, shape):  # type: ignore[no-untyped-def]
         """Return a height below which no joint is: their places need not be found for it."""
         low = least_height(trunk, leg, shape.reach)
@@ -104,7 +93,6 @@ def joint_check_of(structure: Structure) -> Any:
             low = minimum(low, height_of_sole(trunk, leg, getattr(shape, f"sole_{name}")))
         return low
 
-    @inline_llvm
     def lowest_joint(trunk, leg, shape, model):  # type: ignore[no-untyped-def]
         """Return the height above the ground of the lowest joint."""
         crank = moved(vector(leg.cosine, leg.sine), shape)
@@ -126,7 +114,6 @@ def joint_check_of(structure: Structure) -> Any:
                 lowest = minimum(lowest, clearance(trunk, leg, places[name], model))
         return lowest
 
-    @inline_llvm
     def check_joints(trunk, leg, shape, model):  # type: ignore[no-untyped-def]
         low = trunk.settings.limits[4]
 
@@ -140,7 +127,6 @@ def joint_check_of(structure: Structure) -> Any:
     return check_joints
 
 
-@inline_llvm
 def clearance(trunk, leg, joint, model):  # type: ignore[no-untyped-def]
     """Return the height above the ground of a joint given in the leg's frame [m]."""
     place = trunk.place + leg.hip + leg.settings.length_scale[0] * (leg.turn * joint)

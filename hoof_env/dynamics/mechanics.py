@@ -33,25 +33,23 @@ from hoof_env.simd import (
     lane_sum,
     loop,
     perpendicular,
+    rounded,
     vector,
     where,
 )
-from hoof_env.simd.compile import inline_llvm, inline_source
 from hoof_env.simd.math import clip, cos_sin
 
 MOVING = Moving.size
 
 
-@inline_llvm
 def add(total, x, lanes_are_legs):  # type: ignore[no-untyped-def]
     """Return total + x, lane by lane; where the lanes are the legs of one trunk, return total plus the x of
     all lanes, one after the other as in a loop over legs."""
     if lanes_are_legs:
         return lane_sum(total, x)
-    return total + x
+    return total + rounded(x)
 
 
-@inline_source
 def evaluate(trunk, legs, leg_count, model, elapsed):  # type: ignore[no-untyped-def]
     """Compute all forces and accelerations at the present stage, `elapsed` [s] after the step's start."""
     if model.kind != FIXED:
@@ -79,14 +77,12 @@ def evaluate(trunk, legs, leg_count, model, elapsed):  # type: ignore[no-untyped
         accelerate_crank(trunk, block_at(legs, i), model.motors)
 
 
-@inline_llvm
 def find_crank(leg, model):  # type: ignore[no-untyped-def]
     """Compute cell, cosine and sine of the crank angle, for all legs before their look-ups need them."""
     locate(leg, model.cells)
     leg.cosine, leg.sine = cos_sin(leg.theta)
 
 
-@inline_llvm
 def look_up_functions(trunk, leg, model):  # type: ignore[no-untyped-def]
     """Look up the functions of the crank angle and their derivatives."""
     look_up(leg, model.tables)
@@ -99,7 +95,6 @@ def look_up_functions(trunk, leg, model):  # type: ignore[no-untyped-def]
     )
 
 
-@inline_llvm
 def scale_functions(value, slope, length, mass):  # type: ignore[no-untyped-def]
     """Scale the functions to those of a similar leg, `length` times as large with `mass` times the mass."""
     moment = mass * length
@@ -119,7 +114,6 @@ def scale_functions(value, slope, length, mass):  # type: ignore[no-untyped-def]
     value.frame_inertia_slope = inertia * value.frame_inertia_slope
 
 
-@inline_llvm
 def place_frame(trunk, leg, harmonics, elapsed):  # type: ignore[no-untyped-def]
     """Compute the leg's frame (E1), and its first moment and inertia in the world. The swing is phi = phi_0
     + phi_s sin(theta) + phi_c cos(theta) and higher harmonics, if any; each parameter moves as its filter
@@ -173,7 +167,6 @@ def place_frame(trunk, leg, harmonics, elapsed):  # type: ignore[no-untyped-def]
     )
 
 
-@inline_llvm
 def gait_parameter_at(leg, k, elapsed):  # type: ignore[no-untyped-def]
     """Return parameter k of the gait, its rate and acceleration, `elapsed` [s] after the step's start."""
     value = leg.state.gait[k]
@@ -190,7 +183,6 @@ def gait_parameter_at(leg, k, elapsed):  # type: ignore[no-untyped-def]
     return (*cond(elapsed != 0.0, moved, (value, rate)), acceleration)
 
 
-@inline_llvm
 def keep_still(trunk):  # type: ignore[no-untyped-def]
     """Set the trunk's constant quantities (those of a fixed trunk, or of one that does not pitch)."""
     for k in range(MOVING):
@@ -206,7 +198,6 @@ def keep_still(trunk):  # type: ignore[no-untyped-def]
     trunk.turn = vector(full_like(trunk, 1.0), 0.0)
 
 
-@inline_llvm
 def clear_trunk(trunk, kind):  # type: ignore[no-untyped-def]
     """Reset the trunk's sums before the legs are gathered."""
     if kind == FREE:
@@ -219,7 +210,6 @@ def clear_trunk(trunk, kind):  # type: ignore[no-untyped-def]
     trunk.relative_angular_momentum = 0.0
 
 
-@inline_llvm
 def gather_leg(trunk, leg, kind, lanes_are_legs):  # type: ignore[no-untyped-def]
     """Add a leg to first moment, momentum, inertia and spin about the trunk's centre of mass (E6)."""
     s = leg.first_moment
@@ -243,7 +233,6 @@ def gather_leg(trunk, leg, kind, lanes_are_legs):  # type: ignore[no-untyped-def
     trunk.relative_momentum = add(trunk.relative_momentum, drift, lanes_are_legs)
 
 
-@inline_source
 def gather_legs(trunk, legs, leg_count, model):  # type: ignore[no-untyped-def]
     """Compute the legs' functions and frames at the present state, and their sums about the trunk's centre of
     mass (E6): what the momentum of all bodies needs, without forces."""
@@ -256,7 +245,6 @@ def gather_legs(trunk, legs, leg_count, model):  # type: ignore[no-untyped-def]
         gather_leg(trunk, leg, model.kind, model.lanes_are_legs)
 
 
-@inline_llvm
 def move_trunk(trunk, kind):  # type: ignore[no-untyped-def]
     """Compute place and velocity of the trunk from centre of mass and momentum of all (E7), on a rail along x
     only, and the forces on it other than its legs'."""
@@ -301,7 +289,6 @@ def move_trunk(trunk, kind):  # type: ignore[no-untyped-def]
     trunk.fallen = where(place.imag < trunk.settings.bottom, 1.0, trunk.fallen)
 
 
-@inline_llvm
 def set_up_crank(trunk, leg, motors, elapsed):  # type: ignore[no-untyped-def]
     """Set up a crank's equation of motion (E5), with the trunk's acceleration a,
 
@@ -349,7 +336,6 @@ def set_up_crank(trunk, leg, motors, elapsed):  # type: ignore[no-untyped-def]
         leg.free_theta_acceleration = where(is_motor, free, wanted_rate)
 
 
-@inline_llvm
 def load_trunk(trunk, leg, kind, motors, lanes_are_legs):  # type: ignore[no-untyped-def]
     """Add a leg to the trunk's equations, its crank eliminated (E8), and to outer force and moment."""
     w = leg.theta_rate
@@ -396,7 +382,6 @@ def load_trunk(trunk, leg, kind, motors, lanes_are_legs):  # type: ignore[no-unt
         )
 
 
-@inline_llvm
 def accelerate_trunk(trunk, kind):  # type: ignore[no-untyped-def]
     """Solve the trunk's equations (E8) for its accelerations, by Cramer's rule."""
     load = trunk.rates.force + trunk.load
@@ -434,7 +419,6 @@ def accelerate_trunk(trunk, kind):  # type: ignore[no-untyped-def]
     trunk.pitch_acceleration = pitch_acc
 
 
-@inline_llvm
 def accelerate_crank(trunk, leg, motors):  # type: ignore[no-untyped-def]
     """Set the crank's acceleration; a motor's crank yields to the trunk's acceleration (E9)."""
     leg.theta_acceleration = leg.free_theta_acceleration

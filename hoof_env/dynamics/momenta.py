@@ -5,10 +5,8 @@ from __future__ import annotations
 from hoof_env.dynamics.mechanics import gather_legs
 from hoof_env.dynamics.parts import FREE, RAIL
 from hoof_env.simd import cross, dot, full_like, perpendicular, vector, where
-from hoof_env.simd.compile import inline_source
 
 
-@inline_source
 def velocities_to_momenta(trunk, legs, leg_count, model, starts):  # type: ignore[no-untyped-def]
     """Compute centre of mass, momentum and spin of all bodies at a start, as `mechanics.move_trunk` inverts
     it (E7).

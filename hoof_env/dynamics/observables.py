@@ -24,13 +24,11 @@ from numpy.typing import ArrayLike
 from hoof_env.dynamics.mechanics import add
 from hoof_env.errors import Floats
 from hoof_env.simd import absolute, block_at, dot, loop, maximum, minimum, perpendicular, sqrt, where
-from hoof_env.simd.compile import inline_llvm
 
 REVOLUTION = 2 * math.pi
 """One revolution of the crank [rad]."""
 
 
-@inline_llvm
 def find_drives(trunk, leg):  # type: ignore[no-untyped-def]
     """Compute torques and powers of crank and swing from the accelerations (E2 to E4)."""
     w = leg.theta_rate
@@ -66,7 +64,6 @@ def find_drives(trunk, leg):  # type: ignore[no-untyped-def]
     leg.swing_power = by_frame * where(is_motor, sway, k * w + sway)
 
 
-@inline_llvm
 def keep_account(trunk, legs, leg_count, model, account, weight):  # type: ignore[no-untyped-def]
     """Add the present stage's powers and forces, times `weight` [s], to an `Account`."""
     velocity = trunk.velocity
@@ -104,7 +101,6 @@ def keep_account(trunk, legs, leg_count, model, account, weight):  # type: ignor
             account.hoof[1] = add(account.hoof[1], weight * lost, lanes_are_legs)
 
 
-@inline_llvm
 def report_trunk(trunk, report):  # type: ignore[no-untyped-def]
     """Fill a `TrunkReport`."""
     report.place = trunk.place
@@ -114,7 +110,6 @@ def report_trunk(trunk, report):  # type: ignore[no-untyped-def]
     report.pitch_acceleration = trunk.pitch_acceleration
 
 
-@inline_llvm
 def report_leg(trunk, leg, report, form):  # type: ignore[no-untyped-def]
     """Fill a `LegReport`. The rows of a heel that is not there stay 0."""
     find_drives(trunk, leg)
@@ -136,7 +131,6 @@ def report_leg(trunk, leg, report, form):  # type: ignore[no-untyped-def]
         report_point(leg.heel, hip + leg.turn * leg.functions.heel, report.heel)
 
 
-@inline_llvm
 def report_point(point, place, report):  # type: ignore[no-untyped-def]
     """Fill a `PointReport`."""
     report.x = place.real
@@ -146,7 +140,6 @@ def report_point(point, place, report):  # type: ignore[no-untyped-def]
     report.friction = point.friction
 
 
-@inline_llvm
 def count_stride(trunk, leg, form, h):  # type: ignore[no-untyped-def]
     """Update the open stance and the sums with a whole step of `h` [s] that ends here."""
     find_drives(trunk, leg)

@@ -16,11 +16,10 @@ from hoof_env.dynamics.mechanics import (
 )
 from hoof_env.dynamics.stepping import begin_step
 from hoof_env.simd import block_at, columns, full_like, loop, new_rows, vector
-from hoof_env.simd.compile import Kernel, inline_source
+from hoof_env.simd.compile import Kernel
 from hoof_env.simd.memory import Arrays, Given
 
 
-@inline_source
 def push_cranks(trunk, legs, leg_count, model, impulse):  # type: ignore[no-untyped-def]
     """Add to the speeds of motors' cranks what an `impulse` [N s] on the trunk's centre of mass changes at
     once: (E8) and (E9) with impulses for forces, and jumps of speeds for accelerations."""

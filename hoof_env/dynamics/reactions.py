@@ -19,8 +19,7 @@ from hoof_env.dynamics.hoof import force_of
 from hoof_env.dynamics.leg_constants import PAPER_STRUCTURE, Structure
 from hoof_env.leg.closed_form import carry, meet, meet_acceleration, meet_rate
 from hoof_env.leg.mechanism import FRAME, Dyad, Mechanism
-from hoof_env.simd import cross, full_like, perpendicular, vector, where
-from hoof_env.simd.compile import inline_llvm
+from hoof_env.simd import cross, full_like, perpendicular, rounded, vector, where
 from hoof_env.simd.layout import Block, Layout, Row, Size
 from hoof_env.simd.values import Plane
 
@@ -54,33 +53,28 @@ class Point(NamedTuple):
     a: Any
 
 
-@inline_llvm
 def resting(rows, lift):  # type: ignore[no-untyped-def]
     """O itself."""
     still = vector(full_like(rows, 0.0), 0.0)
     return Point(still, still, lift)
 
 
-@inline_llvm
 def turning(place, frame_turn, rate, acc, lift):  # type: ignore[no-untyped-def]
     """A point of a body that turns about O, at `place` in the leg's frame."""
     p = place * frame_turn
-    return Point(p, vector(-rate * p.imag, rate * p.real), vector(-rate * rate, acc) * p + lift)
+    return Point(p, rounded(vector(-rate * p.imag, rate * p.real)), vector(-rate * rate, acc) * p + lift)
 
 
-@inline_llvm
 def crank_pin(g, crank_turn):  # type: ignore[no-untyped-def]
     """The place of the crank's pin in the leg's frame; the crank turns clockwise before the mirror."""
     return g.crank * vector(g.travel * crank_turn.real, -crank_turn.imag)
 
 
-@inline_llvm
 def crank_rate(g, frame_rate, rate):  # type: ignore[no-untyped-def]
     """The turning of the crank in the world, by its rates or accelerations."""
     return frame_rate - g.travel * rate
 
 
-@inline_llvm
 def meeting_point(dyad, first, second):  # type: ignore[no-untyped-def]
     """Motion of the point at two lengths from `first` and `second`."""
     at = meet(first.at, second.at, dyad.one2, dyad.excess, dyad.side)
@@ -90,7 +84,6 @@ def meeting_point(dyad, first, second):  # type: ignore[no-untyped-def]
     return Point(at, v, meet_acceleration(e1, e2, v - first.v, v - second.v, first.a, second.a))
 
 
-@inline_llvm
 def carried_point(place, first, second):  # type: ignore[no-untyped-def]
     """Motion of a point that a body, or a triangle of links, carries with `first` and `second`."""
     return Point(
@@ -101,14 +94,12 @@ def carried_point(place, first, second):  # type: ignore[no-untyped-def]
 # -- forces ------------------------------------------------------------------------------------
 
 
-@inline_llvm
 def rod_loads(rod, tail, head):  # type: ignore[no-untyped-def]
     """Forces at tail and head that move a rod as it moves, against its weight."""
     near, far = rod.near, rod.far
     return near * tail.a + far * head.a, near * head.a + far * tail.a
 
 
-@inline_llvm
 def solid_loads(solid, tail, head):  # type: ignore[no-untyped-def]
     """The same of a body whose centre of mass is anywhere."""
     mixed = solid.mixed
@@ -116,19 +107,16 @@ def solid_loads(solid, tail, head):  # type: ignore[no-untyped-def]
     return solid.tail * tail.a + mixed * head.a, solid.head * head.a + mirrored * tail.a
 
 
-@inline_llvm
 def moment(point, about, force):  # type: ignore[no-untyped-def]
     """Moment of a force at a point about another."""
     return cross(point.at - about.at, force)
 
 
-@inline_llvm
 def inverse_area(hinge, first, second):  # type: ignore[no-untyped-def]
     """1 / (twice the area of the triangle) that two parts span, where it changes."""
     return 1.0 / cross(hinge.at - first.at, hinge.at - second.at)
 
 
-@inline_llvm
 def hinge_force(hinge, first, second, inverse, turn_one, turn_two):  # type: ignore[no-untyped-def]
     """The force f on the first of two parts in their hinge, with one x f = turn_one about its far end, and
     two x f = -turn_two about that of the other."""
@@ -311,13 +299,11 @@ class Motion(NamedTuple):
     heel_force: Any
 
 
-@inline_llvm
 def force_on_first(g, motion):  # type: ignore[no-untyped-def]
     """The ground's force on the first foot of a mechanism."""
     return where(g.toe_is_first > 0.5, motion.toe_force, motion.heel_force)
 
 
-@inline_llvm
 def force_on_second(g, motion):  # type: ignore[no-untyped-def]
     """The ground's force on the second foot of a mechanism."""
     return where(g.toe_is_first > 0.5, motion.heel_force, motion.toe_force)
@@ -336,7 +322,6 @@ def reactions_of(structure: Structure) -> Any:
     """Return the kernel that keeps the `Reactions` of one leg with a structure."""
     mechanism = structure.mechanism
 
-    @inline_llvm
     def solve(g: Any, motion: Any, reactions: Any) -> None:
         statics = _Statics(structure, g, _trace_points(mechanism, g, motion))
         forces = [force_on_first(g, motion), force_on_second(g, motion)]
@@ -358,7 +343,6 @@ def reactions_of(structure: Structure) -> Any:
         locks = [statics.lock(weld) for weld in mechanism.welds]
         store(reactions, [*joints, *locks, driver, hip])
 
-    @inline_llvm
     def react(trunk, leg, constants, reactions):  # type: ignore[no-untyped-def]
         hip, pitch_rate, pitch_acc = leg.hip, trunk.rates.pitch_rate, trunk.pitch_acceleration
         weight = vector(full_like(trunk, 0.0), trunk.settings.gravity)

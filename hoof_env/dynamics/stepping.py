@@ -19,11 +19,9 @@ from hoof_env.dynamics.mechanics import MOVING
 from hoof_env.dynamics.parts import FIXED, FREE
 from hoof_env.gait import INNER, SPEED
 from hoof_env.simd import block_at, loop, when, where
-from hoof_env.simd.compile import inline_llvm
 from hoof_env.simd.math import clip
 
 
-@inline_llvm
 def filter_accelerations(leg, count, settings):  # type: ignore[no-untyped-def]
     """Set the accelerations of the command filters: bounded, towards a bounded rate, towards the command."""
     for k in range(count):
@@ -35,7 +33,6 @@ def filter_accelerations(leg, count, settings):  # type: ignore[no-untyped-def]
         leg.gait_acceleration[k] = clip(INNER * gain * (wanted - leg.state.gait_rate[k]), acc_bound)
 
 
-@inline_llvm
 def advance_rows(kind, to, start, factor, slope):  # type: ignore[no-untyped-def]
     """Set to = start + factor slope for all rows that move."""
     # the last two rows, pitch and spin, move only with a free trunk
@@ -46,7 +43,6 @@ def advance_rows(kind, to, start, factor, slope):  # type: ignore[no-untyped-def
             to[k] = start[k] + factor * slope[k]
 
 
-@inline_llvm
 def begin_step(trunk, legs, leg_count, model):  # type: ignore[no-untyped-def]
     """Set the first stage to the state itself, and the filters' accelerations for the whole step."""
     if model.kind != FIXED:
@@ -67,7 +63,6 @@ def begin_step(trunk, legs, leg_count, model):  # type: ignore[no-untyped-def]
             clear_springs(leg, model.form.springs)
 
 
-@inline_llvm
 def weigh_stage(trunk, legs, leg_count, model, weight):  # type: ignore[no-untyped-def]
     """Add the derivatives at the present stage to their means, if the scheme averages: otherwise the last
     stage's derivatives are those of the step."""
@@ -85,7 +80,6 @@ def weigh_stage(trunk, legs, leg_count, model, weight):  # type: ignore[no-untyp
             weigh_springs(leg, model.form.springs, weight)
 
 
-@inline_llvm
 def prescribed(leg, elapsed):  # type: ignore[no-untyped-def]
     """Return angle and rate of a prescribed crank `elapsed` [s] into the step, exactly as its filter
     moves."""
@@ -98,7 +92,6 @@ def prescribed(leg, elapsed):  # type: ignore[no-untyped-def]
     return theta, value + elapsed * (rate + 0.5 * elapsed * acceleration)
 
 
-@inline_llvm
 def next_stage(trunk, legs, leg_count, model, elapsed):  # type: ignore[no-untyped-def]
     """Move `elapsed` [s] from the step's start with the derivatives of the present stage."""
     if model.kind != FIXED:
@@ -113,7 +106,6 @@ def next_stage(trunk, legs, leg_count, model, elapsed):  # type: ignore[no-untyp
         move_springs(leg, model.form.springs, elapsed)
 
 
-@inline_llvm
 def use_new_rates(trunk, h):  # type: ignore[no-untyped-def]
     """Set the rates of centre and pitch to those at the step's end (semi-implicit Euler)."""
     rates = trunk.rates
@@ -121,7 +113,6 @@ def use_new_rates(trunk, h):  # type: ignore[no-untyped-def]
     rates.pitch_rate = rates.pitch_rate + h * trunk.pitch_acceleration
 
 
-@inline_llvm
 def end_step(trunk, legs, leg_count, model, h):  # type: ignore[no-untyped-def]
     """Advance the state by a step; the filters advance exactly."""
     if model.kind != FIXED:

@@ -5,8 +5,7 @@ from __future__ import annotations
 from hoof_env.dynamics.layout import StrideSums
 from hoof_env.dynamics.limits import has_moved
 from hoof_env.dynamics.names import RENAMED
-from hoof_env.simd import block_at, lane_of, maximum, minimum, where
-from hoof_env.simd.compile import inline_llvm
+from hoof_env.simd import block_at, maximum, minimum, rounded, where
 from hoof_env.tasks.episode import FAILED, TRUNCATED
 from hoof_env.tasks.reward import BEARING, LONGEST_STRIDE, Outcome
 
@@ -18,7 +17,6 @@ MOVED = {
 """Present names of attributes by the old ones, for messages; sums were attributes of the `Outcome` itself."""
 
 
-@inline_llvm
 def bear(episode, impulse, seconds):  # type: ignore[no-untyped-def]
     """Return the part of an impulse over the weight for which bearing is rewarded [s]: all within the
     allowance, less the part beyond it. The allowance grows with time, and the impulse uses it up; see
@@ -29,7 +27,6 @@ def bear(episode, impulse, seconds):  # type: ignore[no-untyped-def]
     return borne - (impulse - borne)
 
 
-@inline_llvm
 def sum_up(first_leg, layouts, works, sums):  # type: ignore[no-untyped-def]
     """Write the sums over all legs of the step into `sums`, 0 where the engine failed."""
     for k in range(layouts.sums):
@@ -40,7 +37,6 @@ def sum_up(first_leg, layouts, works, sums):  # type: ignore[no-untyped-def]
         sums[k] = where(works, total, 0.0)
 
 
-@inline_llvm
 def put_together(layouts, k, one, other):  # type: ignore[no-untyped-def]
     """Return the sum of two values of the k-th of `StrideSums`, of a peak the larger value."""
     if (layouts.peaks >> k) & 1:
@@ -48,7 +44,6 @@ def put_together(layouts, k, one, other):  # type: ignore[no-untyped-def]
     return one + other
 
 
-@inline_llvm
 def find_outcome(task, trunk, leg, episode, layouts, sums):  # type: ignore[no-untyped-def]
     """Return the outcome of the step; `sums` is memory for `StrideSums`."""
     # Where the engine failed the state is that of before the step: nothing is rewarded.
@@ -66,7 +61,7 @@ def find_outcome(task, trunk, leg, episode, layouts, sums):  # type: ignore[no-u
     return Outcome(
         seconds=seconds,
         progress=where(works, progress, 0.0),
-        commanded_progress=task.dt * episode.target,
+        commanded_progress=rounded(task.dt * episode.target),
         sums=sums,
         borne=borne,
         failed=where((trunk.result == 0.0) & (y > task.lowest) & (y < task.highest), 0.0, 1.0),
@@ -78,7 +73,6 @@ def find_outcome(task, trunk, leg, episode, layouts, sums):  # type: ignore[no-u
     )
 
 
-@inline_llvm
 def add_up(outcome, episode, layouts):  # type: ignore[no-untyped-def]
     """Add the step to the sums of the episode."""
     episode.time = episode.time + outcome.seconds
@@ -88,7 +82,6 @@ def add_up(outcome, episode, layouts):  # type: ignore[no-untyped-def]
         episode.sums[k] = put_together(layouts, k, episode.sums[k], outcome.sums[k])
 
 
-@inline_llvm
 def decide(task, outcome, episode):  # type: ignore[no-untyped-def]
     """Count the step, and return masks of the rows in which the episode ends, in which another speed is
     commanded from the next step on, and in which the trunk is pushed after this step."""
@@ -101,24 +94,3 @@ def decide(task, outcome, episode):  # type: ignore[no-untyped-def]
     episode.ended = ended
     episode.target = where(switched, episode.next_target, episode.target)
     return ended > 0.0, switched, steps >= episode.push_at
-
-
-@inline_llvm
-def outcome_of_one(outcome, lane, trunk, leg, episode, layouts, sums):  # type: ignore[no-untyped-def]
-    """Return one lane of an `Outcome` as ordinary numbers, for terms that take no lanes. `trunk`, `leg` and
-    `episode` are memory of that lane, `sums` is memory for its `StrideSums`."""
-    for k in range(layouts.sums):
-        sums[k] = lane_of(outcome.sums[k], lane)
-    return Outcome(
-        seconds=lane_of(outcome.seconds, lane),
-        progress=lane_of(outcome.progress, lane),
-        commanded_progress=lane_of(outcome.commanded_progress, lane),
-        sums=sums,
-        borne=lane_of(outcome.borne, lane),
-        failed=lane_of(outcome.failed, lane),
-        episode_seconds=outcome.episode_seconds,
-        weight=lane_of(outcome.weight, lane),
-        trunk=trunk,
-        leg=leg,
-        episode=episode,
-    )

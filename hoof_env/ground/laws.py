@@ -27,7 +27,6 @@ from collections.abc import Callable
 
 from hoof_env.errors import ParameterError, check_choice, check_number
 from hoof_env.simd import maximum, minimum
-from hoof_env.simd.compile import inline_llvm
 from hoof_env.simd.math import exp_of_negative
 
 
@@ -123,7 +122,6 @@ def _bisect(f: Callable[[float], float], low: float, high: float) -> float:
             high = middle
 
 
-@inline_llvm
 def normal_force(spring, chi, dashpot, rate, inverse_speed):  # type: ignore[no-untyped-def]
     """Return the normal force [N] on a point inside the ground (Eq. 14) from K d^n [N], chi [-], c [N s/m], v
     [m/s] and 1 / v0 [s/m]. The ground does not pull."""
@@ -136,7 +134,6 @@ FRICTION_LAWS = ("ambrosio", "threlfall", "tanh")
 AMBROSIO, THRELFALL, TANH = range(3)
 
 
-@inline_llvm
 def friction_part(speed, law, slow, fast):  # type: ignore[no-untyped-def]
     """Return the friction coefficient over its kinetic value, mu(|v|) / mu_k [-], 0 to 1; 0 at rest.
 

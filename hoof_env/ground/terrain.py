@@ -18,7 +18,6 @@ from numpy.typing import ArrayLike, NDArray
 
 from hoof_env.errors import ParameterError, check_number
 from hoof_env.simd import floor, gather_eight, maximum, minimum
-from hoof_env.simd.compile import inline_llvm
 
 MOST_KNOTS = 1_000_000
 """Largest number of knots."""
@@ -275,7 +274,6 @@ class TerrainGrid(NamedTuple):
     per_metre: float  # number of cells in a metre [1/m]
 
 
-@inline_llvm
 def surface(x, cells, origin, per_metre):  # type: ignore[no-untyped-def]
     """Return the ground at `x` [m], which may be lanes: height [m], normal x and y [-], factors of stiffness
     and friction [-]. Heights and factors are NaN where x is not finite."""

@@ -9,29 +9,24 @@ from __future__ import annotations
 
 import numpy as np
 
-from hoof_env.simd import perpendicular, sqrt
-from hoof_env.simd.compile import inline_llvm
+from hoof_env.simd import perpendicular, rounded, sqrt
 
 
-@inline_llvm
 def dot(a, b):  # type: ignore[no-untyped-def]
     """Return the scalar product of two planar vectors, which `simd.dot` takes as planes alone."""
     return a.real * b.real + a.imag * b.imag
 
 
-@inline_llvm
 def cross(a, b):  # type: ignore[no-untyped-def]
     """Return the out-of-plane component of the vector product of two planar vectors."""
     return a.real * b.imag - a.imag * b.real
 
 
-@inline_llvm
 def intersect(e1, e2, k1, k2):  # type: ignore[no-untyped-def]
     """Return the vector p with e1 . p = k1 and e2 . p = k2."""
-    return perpendicular(k2 * e1 - k1 * e2) / cross(e1, e2)
+    return rounded(perpendicular(k2 * e1 - k1 * e2) / cross(e1, e2))
 
 
-@inline_llvm
 def meet(first, second, one2, excess, side):  # type: ignore[no-untyped-def]
     """Return the point at two lengths from two points; NaN where the points are too far apart or too close.
 
@@ -45,13 +40,11 @@ def meet(first, second, one2, excess, side):  # type: ignore[no-untyped-def]
     return first + (span * along + perpendicular(span) * across)
 
 
-@inline_llvm
 def meet_rate(e1, e2, first_rate, second_rate):  # type: ignore[no-untyped-def]
     """Return the rate of such a point, which is e1 from `first` and e2 from `second`."""
     return intersect(e1, e2, dot(e1, first_rate), dot(e2, second_rate))
 
 
-@inline_llvm
 def meet_acceleration(e1, e2, w1, w2, first_acceleration, second_acceleration):  # type: ignore[no-untyped-def]
     """Return the acceleration of such a point, whose rates relative to the two points are w1 and w2."""
     k1 = dot(e1, first_acceleration) - dot(w1, w1)
@@ -59,7 +52,6 @@ def meet_acceleration(e1, e2, w1, w2, first_acceleration, second_acceleration): 
     return intersect(e1, e2, k1, k2)
 
 
-@inline_llvm
 def carry(origin, toward, place):  # type: ignore[no-untyped-def]
     """Return a point of a body by its place in axes from `origin` to `toward`, in their distance; also its
     rate from theirs, and its acceleration."""

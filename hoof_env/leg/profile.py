@@ -23,7 +23,6 @@ from hoof_env.errors import GeometryError, count, one_of
 from hoof_env.leg.assembly import centres, solve
 from hoof_env.leg.geometry import Geometry
 from hoof_env.simd import floor, maximum, minimum, steady
-from hoof_env.simd.compile import inline_llvm
 from hoof_env.simd.layout import Layout, Row, Vector
 from hoof_env.simd.machines import CURRENT
 from hoof_env.simd.math import ROUNDER
@@ -286,7 +285,6 @@ def _polynomials(rows: list[Any], angles: list[Any], first: int, last: int) -> t
     return values, slopes
 
 
-@inline_llvm
 def locate(leg, cells):  # type: ignore[no-untyped-def]
     """In which of `cells` of its table the crank angle of a leg is, and how far from its middle.
 

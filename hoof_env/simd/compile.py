@@ -275,18 +275,3 @@ def kernel(function: Callable[..., Any]) -> Kernel:
 def is_traced() -> bool:
     """Return True while a kernel is traced, and not run on NumPy."""
     return not CURRENT.machine.runs_now
-
-
-def inline_llvm(function: Any) -> Any:
-    from functools import wraps
-
-    from hoof_env.simd.values import rounded
-
-    @wraps(function)
-    def part(*arguments: Any) -> Any:
-        return rounded(function(*map(rounded, arguments)))
-
-    return part
-
-
-inline_source = inline_llvm

@@ -60,7 +60,7 @@ def root_power(d: Number, eighths: int) -> Lanes:
                 power = power * quarter
             if rest & 1:
                 power = power * sqrt(quarter)
-    return power
+    return rounded(power)
 
 
 def exp_of_negative(x: Number) -> Lanes:
@@ -86,7 +86,7 @@ def exp_of_negative(x: Number) -> Lanes:
     e = e * e
     e = e * e
     e = e * e
-    return e * e
+    return rounded(e * e)
 
 
 def tanh(x: Number) -> Lanes:

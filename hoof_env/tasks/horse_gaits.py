@@ -31,15 +31,14 @@ from hoof_env.simd import (
     maximum,
     minimum,
     read,
+    rounded,
     sqrt,
     vector,
     when,
     where,
 )
-from hoof_env.simd.compile import inline_llvm
 from hoof_env.simd.layout import Block, Layout, Row, Vector
 from hoof_env.simd.math import clip, cos_sin
-from hoof_env.simd.values import rounded
 
 Floats = NDArray[np.float64]
 
@@ -367,7 +366,6 @@ FOLLOWED = 0.1
 mean of the last actions, and decays under zero actions."""
 
 
-@inline_llvm
 def command_gait(task, actions, episode, first_leg, parameters, n, scratch):  # type: ignore[no-untyped-def]
     """Command the gait of the episode with the offsets that actions make; `scratch` has room for
     `SCRATCH_SIZE` numbers. See `body.BodyKernels.command`.
@@ -416,19 +414,16 @@ def command_gait(task, actions, episode, first_leg, parameters, n, scratch):  # 
             leg.command[k] = minimum(maximum(wanted, task.low[k]), task.high[k])
 
 
-@inline_llvm
 def phase_of(wave, half, fold, crank):  # type: ignore[no-untyped-def]
     """Return e^(i phase) of a pair for e^(i theta) = `crank`; see `Stride`."""
     return (1.0 / (1.0 + dot(wave, crank))) * (half * crank + fold * conjugate(crank) + wave)
 
 
-@inline_llvm
 def conjugate(z):  # type: ignore[no-untyped-def]
     """Return the complex conjugate of a planar vector."""
     return vector(z.real, -z.imag)
 
 
-@inline_llvm
 def refer_to_target(task, episode, switched):  # type: ignore[no-untyped-def]
     """Change the episode's gait to the reference gait of the new commanded speed in the rows `switched`; the
     kernel's form of `reference_gaits`."""

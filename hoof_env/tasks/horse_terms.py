@@ -9,7 +9,6 @@ from typing import Any
 from hoof_env.gait import PARAMETERS, WIDEST
 from hoof_env.ground.terrain import surface
 from hoof_env.simd import absolute, block_at, maximum, minimum, where
-from hoof_env.simd.compile import inline_llvm
 from hoof_env.simd.math import cos_sin
 from hoof_env.tasks.horse_gaits import LEGS
 from hoof_env.tasks.observation import PLAIN, TRUE_RATE, TRUTH, Entry, Scale, in_contact, tanh_of
@@ -43,8 +42,7 @@ def _in_bounds(k: int) -> Scale:
 
 def _of_leg(i: int, measure: Callable[[Any], Any]) -> Callable[[Any], Any]:
     """Return a function of a scene that measures its i-th leg."""
-    compiled = inline_llvm(measure)
-    return lambda scene: compiled(block_at(scene.leg, i))
+    return lambda scene: measure(block_at(scene.leg, i))
 
 
 def _sine(leg):  # type: ignore[no-untyped-def]

@@ -13,7 +13,6 @@ from hoof_env.errors import ParameterError
 from hoof_env.gait import LIMITS, FilterSettings
 from hoof_env.ground.terrain import surface
 from hoof_env.simd import where
-from hoof_env.simd.compile import inline_llvm
 from hoof_env.simd.math import cos_sin
 from hoof_env.simd.user_functions import check_function
 from hoof_env.tasks.own_parts import Constant, check_arguments, check_parts
@@ -173,13 +172,11 @@ def _cosine(scene):  # type: ignore[no-untyped-def]
     return cos_sin(scene.leg.state.crank_angle)[0]
 
 
-@inline_llvm
 def in_contact(memory):  # type: ignore[no-untyped-def]
     """Return 1 if a hoof point is inside the ground, else 0."""
     return where(memory.penetration > 0.0, 1.0, 0.0)
 
 
-@inline_llvm
 def _approach_speed(memory):  # type: ignore[no-untyped-def]
     """Return the approach speed of a hoof point in contact [m/s], else 0."""
     inverse = memory.inverse_approach_speed

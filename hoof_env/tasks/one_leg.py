@@ -29,7 +29,6 @@ from hoof_env.leg.presets import preset_error_type, preset_label
 from hoof_env.render.instant import ONE_HIP, Hips
 from hoof_env.render.picture import LegPicture, Picture
 from hoof_env.simd import maximum, minimum, read
-from hoof_env.simd.compile import inline_llvm
 from hoof_env.simd.math import clip
 from hoof_env.tasks.body import BodyKernels
 from hoof_env.tasks.episode import ACTIONS, Episode
@@ -141,7 +140,6 @@ def heading_now(engine: TrunkEngine, dt: float) -> Floats:
     return heading
 
 
-@inline_llvm
 def command_rates(task, actions, episode, leg, parameters, n, scratch):  # type: ignore[no-untyped-def]
     """Command the rates that an action asks for, relative to where the gait is heading and within the limits;
     see `body.BodyKernels.command`."""
@@ -152,7 +150,6 @@ def command_rates(task, actions, episode, leg, parameters, n, scratch):  # type:
         leg.command[k] = minimum(maximum(command, task.low[k]), task.high[k])
 
 
-@inline_llvm
 def keep_gait(task, episode, switched):  # type: ignore[no-untyped-def]
     """Do nothing: the gait of one leg does not depend on the commanded speed."""
 
