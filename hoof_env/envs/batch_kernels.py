@@ -19,9 +19,7 @@ from hoof_env.envs.infos import InfoLayout
 from hoof_env.envs.observation_kernel import from_outside, functions_of
 from hoof_env.envs.step import NOT_A_NUMBER, step_kernels
 from hoof_env.errors import ParameterError
-from hoof_env.gait import GaitParameters
 from hoof_env.simd.layout import views
-from hoof_env.tasks.observation import MIDDLE
 
 Floats = NDArray[np.float64]
 
@@ -188,7 +186,6 @@ class BatchKernels:
         """Compile or load every kernel of a step, by running it on no environment."""
         if self.paper:
             self._run_idle(self.kernels.apply_one, self.kernels.finish_one)
-            self.paper.compile(GaitParameters(*MIDDLE))
         else:
             self._run_idle(self.kernel)
         self._run_idle(self.observe_kernel)
