@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -110,15 +110,15 @@ class GroundForces:
 
     def __init__(self, ground: Ground, legs: int) -> None:
         self._ground = ground.to_record()
-        self.contacts = np.array([new_contacts() for _ in range(legs)])
+        self.contacts = [new_contacts() for _ in range(legs)]
 
     def __call__(
         self, limb: int, point: int, t: float, position: complex, velocity: complex, commit: bool
     ) -> complex:
-        kept = self.contacts[limb]
+        kept = self.contacts[limb][point]
         # Within a step an engine tries states that it may throw away: they must not latch
-        contact = kept[point] if commit else kept.copy()[point]
-        return complex(touch(contact, position, velocity, self._ground))
+        contact = kept if commit else replace(kept)
+        return touch(contact, position, velocity, self._ground)
 
 
 def corners(limb: Limb) -> tuple[str, str]:

@@ -8,16 +8,15 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from hoof_env.ground.contact import Ground, new_contacts, touch
+from hoof_env.ground.contact import Contact as Touch
+from hoof_env.ground.contact import Ground, GroundRecord, new_contacts, touch
 from hoof_env.paper.measure import POINTS, Trace
 from hoof_env.paper.reproduce import run_cycle
 from hoof_env.paper.rows import EXACT
-from hoof_env.simd.compile import kernel
 
 Floats = NDArray[np.float64]
 
@@ -93,12 +92,12 @@ def contact_on(gait: str, ground: Ground, rise: float = 0.0, speed: float = 1.0)
     return Contact(time, depth, rate, approach, force)
 
 
-@kernel
-def _follow(depth: Any, rate: Any, contacts: Any, ground: Any, approach: Any, force: Any) -> None:
+def _follow(
+    depth: Floats, rate: Floats, contacts: list[Touch], ground: GroundRecord, approach: Floats, force: Floats
+) -> None:
     """Fill approach speeds and forces, instant by instant."""
     for k in range(depth.shape[0]):
-        for point in range(2):
-            contact = contacts[point]
+        for point, contact in enumerate(contacts):
             pushed = touch(contact, complex(0.0, -depth[k, point]), complex(0.0, -rate[k, point]), ground)
             approach[k, point] = contact.approach
             force[k, point] = pushed.imag

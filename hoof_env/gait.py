@@ -4,7 +4,7 @@ pass; and the motion of crank and swing that follows."""
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, fields
 from functools import cache
 from types import MappingProxyType
@@ -16,7 +16,6 @@ from numpy.typing import NDArray
 from hoof_env.errors import ParameterError, check_choice, check_number
 from hoof_env.leg.geometry import Geometry, load_geometry
 from hoof_env.leg.presets import DEFAULT_PRESET, Preset, preset_error_type, preset_label, read_preset
-from hoof_env.simd.math import clip
 
 Gait = TypeVar("Gait")
 
@@ -263,20 +262,32 @@ def _read_gaits(preset: Preset) -> dict[str, Any]:
     return dict(gaits)
 
 
-FILTER = np.dtype([("value", "f8"), ("rate", "f8"), ("acc", "f8")])
-"""Record type of the state of one filter: a parameter, its rate and its acceleration (per s, per s^2)."""
-
 INNER = 5.0
 """Ratio of the gain of a filter's rate to that of its value; above 4 the approach does not oscillate."""
 
 SPEED, OFFSET, SIN, COS = range(4)
 """Order of the four filters, as in `PARAMETERS`."""
 
-MOTION = np.dtype(
-    [(name, "f8") for name in ("theta", "theta_rate", "theta_acc", "phi", "phi_rate", "phi_acc")]
-)
-"""Record type of the motion: crank angle (clockwise positive, not wrapped) and swing angle, with two
-derivatives each [rad, s]."""
+
+@dataclass(slots=True)
+class Filter:
+    """State of one filter: a parameter, its rate and its acceleration (per s, per s^2)."""
+
+    value: float = 0.0
+    rate: float = 0.0
+    acc: float = 0.0
+
+
+@dataclass(slots=True)
+class Motion:
+    """Crank angle (clockwise positive, not wrapped) and swing angle, with two derivatives each [rad, s]."""
+
+    theta: float = 0.0
+    theta_rate: float = 0.0
+    theta_acc: float = 0.0
+    phi: float = 0.0
+    phi_rate: float = 0.0
+    phi_acc: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -341,40 +352,43 @@ QUICK = FilterSettings(gain=100.0, crank_rate=100.0, crank_acc=1e4, swing_rate=1
 """Filters that let the crank follow a level stance: it slows down and speeds up within every stride."""
 
 
-def command_filters(filters, command, settings):  # type: ignore[no-untyped-def]
-    """Set each filter's acceleration: bounded, towards a bounded rate, towards the command."""
-    for k in range(filters.shape[0]):
-        row = min(k, 3)  # higher harmonics have the filters of the first
-        gain = settings[row, 0]
-        rate_bound = settings[row, 1]
-        acc_bound = settings[row, 2]
+def command_filters(
+    filters: Sequence[Filter], command: Sequence[float], settings: Sequence[Sequence[float]]
+) -> None:
+    """Set each filter's acceleration: bounded, towards a bounded rate, towards the command.
+
+    `settings` are rows of `FilterSettings.to_array`.
+    """
+    for one, wanted, (gain, rate_bound, acc_bound) in zip(filters, command, settings, strict=True):
         # a cascade: the outer loop asks for a rate, the inner one, `INNER` times as fast, follows it
-        wanted_rate = clip(gain * (command[k] - filters[k].value), rate_bound)
-        filters[k].acc = clip(INNER * gain * (wanted_rate - filters[k].rate), acc_bound)
+        wanted_rate = _clip(gain * (wanted - one.value), rate_bound)
+        one.acc = _clip(INNER * gain * (wanted_rate - one.rate), acc_bound)
 
 
-def advance_motion(motion, filters, h):  # type: ignore[no-untyped-def]
+def _clip(x: float, bound: float) -> float:
+    return min(max(x, -bound), bound)
+
+
+def advance_motion(motion: Motion, filters: Sequence[Filter], h: float) -> None:
     """Advance filters and crank angle by `h` [s], exactly for constant filter accelerations."""
     # before the filters: the angle is the integral of the speed from the step's start
     speed = filters[SPEED]
     motion.theta += h * (speed.value + h * (speed.rate / 2.0 + h * speed.acc / 6.0))
-    for k in range(4):
-        filters[k].value += h * (filters[k].rate + h * filters[k].acc / 2.0)
-        filters[k].rate += h * filters[k].acc
+    for one in filters:
+        one.value += h * (one.rate + h * one.acc / 2.0)
+        one.rate += h * one.acc
 
 
-def evaluate_motion(motion, filters):  # type: ignore[no-untyped-def]
+def evaluate_motion(motion: Motion, filters: Sequence[Filter]) -> None:
     """Fill rates and accelerations of crank and swing from crank angle and filters.
 
     phi = phi0 + A sin(theta) + B cos(theta), differentiated twice with phi0, A, B and theta all moving.
     """
-    s = np.sin(motion.theta)
-    c = np.cos(motion.theta)
-    offset = filters[OFFSET]
-    a = filters[SIN]
-    b = filters[COS]
-    w = filters[SPEED].value
-    w_rate = filters[SPEED].rate
+    s = math.sin(motion.theta)
+    c = math.cos(motion.theta)
+    speed, offset, a, b = filters
+    w = speed.value
+    w_rate = speed.rate
     motion.theta_rate = w
     motion.theta_acc = w_rate
     # (E1), as in `mechanics.place_frame`, but with the crank's acceleration
@@ -391,8 +405,6 @@ def evaluate_motion(motion, filters):  # type: ignore[no-untyped-def]
     )
 
 
-def steady_filters(parameters: NDArray[np.float64]) -> NDArray[np.void]:
-    """Return filters at rest at four parameters, shape (4,) of dtype `FILTER`."""
-    filters = np.zeros(4, dtype=FILTER)
-    filters["value"] = parameters
-    return filters
+def steady_filters(parameters: Iterable[float]) -> list[Filter]:
+    """Return filters at rest at four parameters."""
+    return [Filter(float(value)) for value in parameters]

@@ -293,13 +293,13 @@ def settings_of(
         "drag": trunk.drag,
         "gravity": GRAVITY,
         "bottom": float(np.min(scene.terrain.height)),
-        "stiffness": record["stiffness"],
-        "chi": record["chi"],
-        "dashpot": record["dashpot"],
-        "approach_floor": record["approach_floor"],
-        "friction": record["friction"],
-        "friction_slow": record["friction_slow"],
-        "friction_fast": record["friction_fast"],
+        "stiffness": record.stiffness,
+        "chi": record.chi,
+        "dashpot": record.dashpot,
+        "approach_floor": record.approach_floor,
+        "friction": record.friction,
+        "friction_slow": record.friction_slow,
+        "friction_fast": record.friction_fast,
     }
     # settings are checked to be finite like a state (`read_state`), so infinite bounds are replaced
     bounds = np.clip((*limits.pitch, *limits.height, limits.clearance), -NOWHERE, NOWHERE)

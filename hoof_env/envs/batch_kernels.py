@@ -16,11 +16,9 @@ from hoof_env.envs.infos import InfoLayout
 from hoof_env.envs.scene import ALL_ARRAYS, TaskKind, functions_of, is_from_outside, known_of
 from hoof_env.envs.step import NOT_A_NUMBER, StepKernels, step_kernels
 from hoof_env.errors import ParameterError
-from hoof_env.gait import GaitParameters
 from hoof_env.simd.compile import Kernel
 from hoof_env.simd.layout import views
 from hoof_env.simd.memory import Held
-from hoof_env.tasks.observation import MIDDLE
 
 Floats = NDArray[np.float64]
 
@@ -163,7 +161,6 @@ class BatchKernels:
         if self.paper:
             self.kernels.apply.compile()
             self.kernels.finish.compile()
-            self.paper.compile(GaitParameters(*MIDDLE))
         else:
             self.kernels.step.compile()
         self.kernels.observe.compile()

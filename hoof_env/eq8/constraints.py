@@ -8,11 +8,12 @@ the frame's orientation is d Phi / d phi.
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from hoof_env.gait import Motion
 from hoof_env.leg.assembly import body_coordinate, weld_angles
 from hoof_env.leg.geometry import Geometry
 from hoof_env.leg.kinematics import FrameMotion, pose
@@ -61,10 +62,10 @@ class Constraints:
         constant[self.driver_row, 3 * FRAME + 2] = -1.0
         self._constant = constant
 
-    def __call__(self, q: Vector, qd: Vector, motion: Any) -> Closure:
-        """Evaluate everything at coordinates q, rates qd (shape (size,) each) and a `MOTION` record."""
-        x = np.append(q, (0.0, 0.0, motion["phi"])).reshape(-1, 3)
-        v = np.append(qd, (0.0, 0.0, motion["phi_rate"]))
+    def __call__(self, q: Vector, qd: Vector, motion: Motion) -> Closure:
+        """Evaluate everything at coordinates q, rates qd (shape (size,) each) and the motion law's angles."""
+        x = np.append(q, (0.0, 0.0, motion.phi)).reshape(-1, 3)
+        v = np.append(qd, (0.0, 0.0, motion.phi_rate))
         i = self._i
         j = self._j
         x_rows = self._x_rows
@@ -80,7 +81,7 @@ class Constraints:
         error[x_rows] = gap.real
         error[y_rows] = gap.imag
         error[self._weld_rows] = x[self._welds[:, 0], 2] - x[self._welds[:, 1], 2] - self._weld_angles
-        error[self.driver_row] = x[self.crank, 2] + motion["theta"] - motion["phi"]
+        error[self.driver_row] = x[self.crank, 2] + motion.theta - motion.phi
 
         jacobian = self._constant.copy()
         for body, slope in ((i, 1j * arm_i), (j, -1j * arm_j)):
@@ -89,24 +90,25 @@ class Constraints:
         by_phi = jacobian[:, 3 * FRAME + 2]
 
         error_rate = jacobian @ v
-        error_rate[self.driver_row] += motion["theta_rate"]
+        error_rate[self.driver_row] += motion.theta_rate
 
-        gamma = -by_phi * motion["phi_acc"]
+        gamma = -by_phi * motion.phi_acc
         turning = arm_i * rate[i] ** 2 - arm_j * rate[j] ** 2
         gamma[x_rows] += turning.real
         gamma[y_rows] += turning.imag
-        gamma[self.driver_row] -= motion["theta_acc"]
+        gamma[self.driver_row] -= motion.theta_acc
         return Closure(error, error_rate, jacobian[:, : self.size], by_phi, gamma)
 
 
-def closed_form(geometry: Geometry, motion: Any) -> tuple[Vector, Vector]:
-    """The q and qd, shape (size,) each, that solve Eq. 2 for a `MOTION` record, welds and driver included."""
+def closed_form(geometry: Geometry, motion: Motion) -> tuple[Vector, Vector]:
+    """The q and qd, shape (size,) each, that solve Eq. 2 for angles of the motion law, welds and driver
+    included."""
     drawn = geometry.replace(travel=1)  # the paper's own frame, not the world's
-    frame = FrameMotion(motion["phi"], motion["phi_rate"])
-    p = pose(drawn, motion["theta"], motion["theta_rate"], frame=frame)
+    frame = FrameMotion(motion.phi, motion.phi_rate)
+    p = pose(drawn, motion.theta, motion.theta_rate, frame=frame)
     angles = p.angles.copy()
     # pose returns angles but for whole turns
-    angles[geometry.mechanism.crank] = motion["phi"] - motion["theta"]
+    angles[geometry.mechanism.crank] = motion.phi - motion.theta
     for (one, other), angle in zip(geometry.mechanism.welds, weld_angles(geometry), strict=True):
         angles[one] = angles[other] + angle
     q = np.column_stack([p.centres, angles])

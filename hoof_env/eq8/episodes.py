@@ -7,8 +7,7 @@ slower.
 
 from __future__ import annotations
 
-import copy
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import astuple
 from typing import Any, NamedTuple
 
@@ -94,12 +93,6 @@ class PaperSolver:
         self._accounts: Records = np.zeros(len(self.legs), ACCOUNT)
         self._threshold = LIFT_OFF * engine.weight
 
-    def compile(self, gait: GaitParameters) -> None:
-        """Compile or load all kernels by a step of a temporary leg."""
-        leg = copy.deepcopy(self.legs[0])
-        trace = leg.reset(gait)
-        leg.advance(gait.to_array(), trace)
-
     def start(self, envs: Sequence[int], gaits: Floats, crank_angle: Floats, x: Floats) -> None:
         """Start some environments.
 
@@ -123,8 +116,7 @@ class PaperSolver:
             kept = leg.state.copy()
             # Only the last row, which stays if the step fails.
             self.traces[env] = self.traces[env][-1:]
-            # A copy, because a strided command would be another type for numba than that of a leg alone.
-            result = leg.advance(memory.command[0, :, env].copy(), trace)
+            result = leg.advance(memory.command[0, :, env], trace)
             self.apart[env] = result is Result.OK and np.abs(leg.closure().error).max() > APART
             if self.apart[env]:
                 result = Result.NOT_FINITE
@@ -147,9 +139,8 @@ class PaperSolver:
 
     def get_state(self) -> dict[str, Any]:
         """Return everything that changes outside the engine's memory."""
-        states = [{name: array.copy() for name, array in vars(leg.state).items()} for leg in self.legs]
         return {
-            "legs": states,
+            "legs": [leg.state.to_arrays() for leg in self.legs],
             "accounts": self._accounts.copy(),
             "last": np.array([trace[-1] for trace in self.traces]),
         }
@@ -162,7 +153,7 @@ class PaperSolver:
         """
         try:
             pairs = zip(self.legs, state["legs"], strict=True)
-            legs = [_state_like(leg.state, leg_state) for leg, leg_state in pairs]
+            legs = [ConstrainedState.from_arrays(values, len(leg.state.q)) for leg, values in pairs]
             accounts = np.array(state["accounts"], ACCOUNT)
             last = np.array(state["last"], TRACE)
             if not len(accounts) == len(last) == len(legs):
@@ -245,17 +236,3 @@ class PaperSolver:
             "travel": travel,
             "slip": slip,
         }
-
-
-def _state_like(model: ConstrainedState, values: Mapping[str, Any]) -> ConstrainedState:
-    """Copy a state, with the types and shapes of another one.
-
-    Raises:
-        KeyError, TypeError, ValueError: a part is missing or has another shape.
-    """
-    parts = {}
-    for name, part in vars(model).items():
-        # [()] makes a record of an array without axes: kernels write to records, and those of a pickle are
-        # read-only.
-        parts[name] = np.array(values[name], part.dtype).reshape(part.shape)[()]
-    return ConstrainedState(**parts)

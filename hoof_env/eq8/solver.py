@@ -18,7 +18,8 @@ through one mirror.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import astuple, dataclass, fields, replace
 from typing import Any
 
 import numpy as np
@@ -31,31 +32,29 @@ from hoof_env.eq8.constraints import Closure, Constraints, Vector, closed_form
 from hoof_env.eq8.integrators import INTEGRATORS
 from hoof_env.errors import ParameterError, check_choice, check_number, finite, one_of
 from hoof_env.gait import (
-    MOTION,
     PARAMETERS,
+    Filter,
     FilterSettings,
     GaitParameters,
+    Motion,
     advance_motion,
     command_filters,
     evaluate_motion,
     gait_array,
     steady_filters,
 )
-from hoof_env.ground.contact import Ground, new_contacts, touch
+from hoof_env.ground.contact import Contact, Ground, new_contacts, touch
 from hoof_env.leg.assembly import body_coordinate, check_full_revolution
 from hoof_env.leg.geometry import Geometry
 from hoof_env.leg.kinematics import mirror
 from hoof_env.leg.profile import cross
 
 MOTION_NAMES = LEG_STATE[:2] + LEG_REPORT[:4]
-"""Names of the fields of `MOTION`, whose own are the symbols of Eq. 8's motion law."""
+"""Names of the fields of `Motion`, whose own are the symbols of Eq. 8's motion law."""
 
 TRACE = np.dtype([(name, "f8") for name in (*TRUNK_STATE, *TRUNK_REPORT, *LEG_STATE, *LEG_REPORT)])
 """State and report of one leg at the end of a substep, by the names that `TrunkEngine` gives them. On a fixed
 trunk its velocity, momentum and pitch are 0."""
-
-BODY = np.dtype([("time", "f8"), ("x", "f8")])
-"""Time [s] and place of O [m]."""
 
 
 def new_trace(rows: int) -> NDArray[np.void]:
@@ -63,24 +62,75 @@ def new_trace(rows: int) -> NDArray[np.void]:
     return np.zeros(rows, dtype=TRACE)
 
 
+@dataclass(slots=True)
+class Body:
+    """Time [s] and place of O [m]."""
+
+    time: float = 0.0
+    x: float = 0.0
+
+
+def record_type(kind: type) -> np.dtype[np.void]:
+    """Return the type of a record with the fields of a dataclass of numbers and truths."""
+    return np.dtype([(item.name, "b1" if item.type == "bool" else "f8") for item in fields(kind)])
+
+
+BODY, MOTION, FILTER, CONTACT = map(record_type, (Body, Motion, Filter, Contact))
+"""Record types of the parts of a state."""
+
+
 @dataclass
 class ConstrainedState:
-    """Everything that changes: copying its arrays copies the state."""
+    """Everything that changes."""
 
-    body: Any  # record of dtype `BODY`
-    motion: Any  # record of dtype `MOTION`
-    filters: NDArray[np.void]  # (4,)
-    contacts: NDArray[np.void]  # (2,), toe first
+    body: Body
+    motion: Motion
+    filters: list[Filter]  # (4,)
+    contacts: list[Contact]  # (2,), toe first
     q: Vector  # coordinates in the frame of the paper's drawing, (3 bodies,)
     qd: Vector  # and their rates
 
     def copy(self) -> ConstrainedState:
         """An independent copy."""
-        return ConstrainedState(**{name: array.copy() for name, array in vars(self).items()})
+        return ConstrainedState(
+            replace(self.body),
+            replace(self.motion),
+            [replace(one) for one in self.filters],
+            [replace(one) for one in self.contacts],
+            self.q.copy(),
+            self.qd.copy(),
+        )
 
-    def __setstate__(self, state: dict[str, Any]) -> None:
-        # A record that was pickled has memory that writing by name misses; one taken from an array has not.
-        vars(self).update({name: np.array(values)[()] for name, values in state.items()})
+    def to_arrays(self) -> dict[str, Any]:
+        """Return all as records and arrays of their own, by name."""
+        return {
+            "body": np.array(astuple(self.body), BODY)[()],
+            "motion": np.array(astuple(self.motion), MOTION)[()],
+            "filters": np.array([astuple(one) for one in self.filters], FILTER),
+            "contacts": np.array([astuple(one) for one in self.contacts], CONTACT),
+            "q": self.q.copy(),
+            "qd": self.qd.copy(),
+        }
+
+    @classmethod
+    def from_arrays(cls, arrays: Mapping[str, Any], size: int) -> ConstrainedState:
+        """Return the state of a leg with `size` coordinates from what `to_arrays` gives.
+
+        Raises:
+            KeyError, TypeError, ValueError: a part is missing or has another shape.
+        """
+
+        def part(name: str, kind: Any, *shape: int) -> Any:
+            return np.array(arrays[name], kind).reshape(shape)
+
+        return cls(
+            Body(*part("body", BODY).item()),
+            Motion(*part("motion", MOTION).item()),
+            [Filter(*one) for one in part("filters", FILTER, len(PARAMETERS)).tolist()],
+            [Contact(*one) for one in part("contacts", CONTACT, 2).tolist()],
+            part("q", np.float64, size),
+            part("qd", np.float64, size),
+        )
 
 
 class ConstrainedLeg:
@@ -124,7 +174,7 @@ class ConstrainedLeg:
         self.integrator = check_choice("integrator", integrator, INTEGRATORS)
         self.trunk = Trunk(kind="fixed", height=geometry.hip_height if height is None else height)
         self.constraints = Constraints(geometry)
-        self._settings = filters.to_array()
+        self._settings = filters.to_array().tolist()
         self._ground = ground.to_record()
         self._travel = float(geometry.travel)
         feet = [foot for foot in (geometry.toe, geometry.heel) if foot is not None]
@@ -140,9 +190,9 @@ class ConstrainedLeg:
         self._weight = np.zeros(size)
         self._weight[1::3] = -masses * GRAVITY  # Eq. 7
         self.state = ConstrainedState(
-            np.zeros(1, BODY)[0],
-            np.zeros(1, MOTION)[0],
-            steady_filters(np.zeros(4)),
+            Body(),
+            Motion(),
+            steady_filters([0.0] * len(PARAMETERS)),
             new_contacts(),
             np.zeros(size),
             np.zeros(size),
@@ -171,12 +221,11 @@ class ConstrainedLeg:
                 f"height, speed: a fixed trunk rests at {self.trunk.height:g} m, got {height!r} and {speed!r}"
             )
         state = self.state
-        command = gait_array(one_of("gait", gait, GaitParameters), 1)
-        state.body["time"] = 0.0
-        state.body["x"] = x
-        state.motion["theta"] = theta
-        state.filters[:] = steady_filters(command)
-        state.contacts[:] = new_contacts()
+        command = gait_array(one_of("gait", gait, GaitParameters), 1).tolist()
+        state.body = Body(0.0, x)
+        state.motion.theta = theta
+        state.filters = steady_filters(command)
+        state.contacts = new_contacts()
         evaluate_motion(state.motion, state.filters)
         state.q, state.qd = closed_form(self.geometry, state.motion)
         trace = new_trace(1)
@@ -197,12 +246,13 @@ class ConstrainedLeg:
             raise ParameterError(f"command: expected 4 values {PARAMETERS}, got shape {command.shape}")
         if one_of("trace", trace, np.ndarray).dtype != TRACE:
             raise ParameterError(f"trace: expected rows of new_trace, got an array of {trace.dtype}")
+        numbers = command.tolist()
         before = self.state.copy()
         result = Result.OK
         try:
             with np.errstate(all="ignore"):  # a diverging integration is a result, not a warning
                 for k, row in enumerate(trace):
-                    if not self._substep(command, before.body["time"] + (k + 1) * self.sim_dt, row):
+                    if not self._substep(numbers, before.body.time + (k + 1) * self.sim_dt, row):
                         result = Result.NOT_FINITE
                         break
         except np.linalg.LinAlgError:
@@ -232,38 +282,38 @@ class ConstrainedLeg:
         lock = float(welds[0]) if len(welds) == 1 else welds
         return Reactions(joints, lock, float(travel * load[-1]), hip)
 
-    def _substep(self, command: NDArray[np.float64], t: float, row: np.void) -> bool:
+    def _substep(self, command: Sequence[float], t: float, row: np.void) -> bool:
         """One step of h to time t; fills `row` and returns whether all is finite."""
         state = self.state
         command_filters(state.filters, command, self._settings)
 
         def acceleration(elapsed: float, q: Vector, qd: Vector) -> Vector:
             # Ground forces stay out: they do not change qdd, and a contact must not latch at a stage.
-            motion = state.motion.copy()
-            filters = state.filters.copy()
+            motion = replace(state.motion)
+            filters = [replace(one) for one in state.filters]
             advance_motion(motion, filters, elapsed)
             evaluate_motion(motion, filters)
             return self._solve(self.constraints(q, qd, motion))[0]
 
         state.q, state.qd = INTEGRATORS[self.integrator](acceleration, state.q, state.qd, self.sim_dt)
         advance_motion(state.motion, state.filters, self.sim_dt)
-        state.body["time"] = t
+        state.body.time = t
         return bool(np.isfinite([state.q, state.qd]).all()) and self._evaluate(command, row)
 
-    def _evaluate(self, command: NDArray[np.float64], row: np.void) -> bool:
+    def _evaluate(self, command: Sequence[float], row: np.void) -> bool:
         """Contact and multipliers at the present instant; fills `row`, returns whether these are finite."""
         state = self.state
         travel = self._travel
         command_filters(state.filters, command, self._settings)
         evaluate_motion(state.motion, state.filters)
-        trunk = complex(state.body["x"], self.trunk.height)
+        trunk = complex(state.body.x, self.trunk.height)
         arms = self._corner_arms()
         x, y, _ = state.q[self._columns].T
         vx, vy, turning = state.qd[self._columns].T
         at = x + 1j * y + arms
         velocity = vx + 1j * vy + 1j * turning * arms
         # a heel that is not there stays above the ground: `contacts` has one for it
-        for contact, place, rate in zip(state.contacts, at, velocity, strict=False):
+        for contact, place, rate in zip(state.contacts, at.tolist(), velocity.tolist(), strict=False):
             touch(contact, trunk + mirror(place, travel), mirror(rate, travel), self._ground)
         closure = self.closure()
         _, multipliers = self._solve(closure, self._ground_load())
@@ -277,29 +327,29 @@ class ConstrainedLeg:
         """Fill a row of dtype `TRACE`; `crank` and `hip` are the torques of the drives [N m]."""
         body = self.state.body
         motion = self.state.motion
-        row["time"] = body["time"]
-        row["x"] = body["x"]
+        row["time"] = body.time
+        row["x"] = body.x
         row["y"] = self.trunk.height
         row["centre_x"] = row["x"]
         row["centre_y"] = row["y"]
-        for name, symbol in zip(MOTION_NAMES, MOTION.names or (), strict=True):
-            row[name] = motion[symbol]
-        for name, command in zip(PARAMETERS, self.state.filters, strict=True):
-            row[name] = command["value"]
-            row[f"{name}_rate"] = command["rate"]
+        for name, angle in zip(MOTION_NAMES, astuple(motion), strict=True):
+            row[name] = angle
+        for name, one in zip(PARAMETERS, self.state.filters, strict=True):
+            row[name] = one.value
+            row[f"{name}_rate"] = one.rate
         row["crank_torque"] = crank
-        row["crank_power"] = crank * motion["theta_rate"]
+        row["crank_power"] = crank * motion.theta_rate
         row["hip_torque"] = hip
-        row["hip_power"] = hip * motion["phi_rate"]
+        row["hip_power"] = hip * motion.phi_rate
         for point, contact in zip(("toe", "heel"), self.state.contacts, strict=True):
-            for name in ("x", "penetration", "normal", "friction"):
-                row[f"{point}_{name}"] = contact[name]
-            row[f"{point}_penetration_rate"] = contact["rate"]
-            row[f"{point}_y"] = -contact["penetration"]
-            row[f"{point}_slide"] = contact["vx"]
-            row[f"{point}_inverse_approach_speed"] = (
-                1 / contact["approach"] if contact["approach"] > 0 else 0.0
-            )
+            row[f"{point}_x"] = contact.x
+            row[f"{point}_penetration"] = contact.penetration
+            row[f"{point}_normal"] = contact.normal
+            row[f"{point}_friction"] = contact.friction
+            row[f"{point}_penetration_rate"] = contact.rate
+            row[f"{point}_y"] = -contact.penetration
+            row[f"{point}_slide"] = contact.vx
+            row[f"{point}_inverse_approach_speed"] = 1 / contact.approach if contact.approach > 0 else 0.0
 
     def _corner_arms(self) -> NDArray[np.complex128]:
         """Toe and heel relative to the centres of their links, in the frame of q [m]."""
@@ -310,7 +360,7 @@ class ConstrainedLeg:
         load = np.zeros(self._size)
         arms = self._corner_arms()
         for contact, columns, arm in zip(self.state.contacts, self._columns, arms, strict=False):
-            force = mirror(complex(contact["friction"], contact["normal"]), self._travel)
+            force = mirror(complex(contact.friction, contact.normal), self._travel)
             load[columns] += force.real, force.imag, cross(arm, force)
         return load
 

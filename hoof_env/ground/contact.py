@@ -6,38 +6,44 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from typing import Any
-
-import numpy as np
-from numpy.typing import NDArray
+from typing import Any, NamedTuple
 
 from hoof_env.errors import ParameterError, check_choice, check_number
 from hoof_env.ground.laws import FRICTION_LAWS, NORMAL_LAWS, damping, friction_part, normal_force
 from hoof_env.leg.presets import DEFAULT_PRESET, Preset, preset_error_type, preset_label, read_preset
 from hoof_env.simd.math import EXPONENT_UNIT
 
-CONTACT = np.dtype(
-    [
-        ("penetration", "f8"),  # [m], negative above the ground (Eq. 10)
-        ("rate", "f8"),  # [m/s], positive while going in (Eq. 12)
-        ("approach", "f8"),  # [m/s], rate at touch-down, kept until the point leaves; 0 outside
-        ("normal", "f8"),  # [N], upward on the hoof (Eq. 14)
-        ("friction", "f8"),  # [N], along x on the hoof (Eq. 15)
-        ("x", "f8"),  # [m], place of the point
-        ("vx", "f8"),  # [m/s], sliding speed (Eq. 13)
-        ("inside", "b1"),
-    ]
-)
-"""State of one hoof point; contacts are arrays of two, toe first."""
-
 TOE = 0
 HEEL = 1
 
-_COPIED = ("stiffness", "exponent", "approach_floor", "friction", "friction_slow", "friction_fast")
-GROUND = np.dtype(
-    [(name, "f8") for name in (*_COPIED, "chi", "dashpot")] + [("friction_law", "i8"), ("interpolated", "b1")]
-)
-"""Record type of the settings of a `Ground`, for the kernels."""
+
+@dataclass(slots=True)
+class Contact:
+    """State of one hoof point; contacts are lists of two, toe first."""
+
+    penetration: float = 0.0  # [m], negative above the ground (Eq. 10)
+    rate: float = 0.0  # [m/s], positive while going in (Eq. 12)
+    approach: float = 0.0  # [m/s], rate at touch-down, kept until the point leaves; 0 outside
+    normal: float = 0.0  # [N], upward on the hoof (Eq. 14)
+    friction: float = 0.0  # [N], along x on the hoof (Eq. 15)
+    x: float = 0.0  # [m], place of the point
+    vx: float = 0.0  # [m/s], sliding speed (Eq. 13)
+    inside: bool = False
+
+
+class GroundRecord(NamedTuple):
+    """Settings of a `Ground` as numbers."""
+
+    stiffness: float
+    exponent: float
+    approach_floor: float
+    friction: float
+    friction_slow: float
+    friction_fast: float
+    chi: float  # damping factor [-]
+    dashpot: float  # its coefficient [N s/m]
+    friction_law: int  # index into `FRICTION_LAWS`
+    interpolated: bool
 
 
 @dataclass(frozen=True)
@@ -104,23 +110,29 @@ class Ground:
         """Damping factor chi [-] and dashpot coefficient c [N s/m], see `laws.damping`."""
         return damping(self.normal_law, self.restitution, self.stiffness, self.reference_mass)
 
-    def to_record(self) -> Any:
-        """Return the settings as one record of dtype `GROUND` for the kernels."""
-        record = np.zeros(1, dtype=GROUND)[0]
-        record["chi"], record["dashpot"] = self.damping
-        for name in _COPIED:
-            record[name] = getattr(self, name)
-        record["friction_law"] = FRICTION_LAWS.index(self.friction_law)
-        record["interpolated"] = self.approach == "interpolated"
-        return record
+    def to_record(self) -> GroundRecord:
+        """Return the settings as numbers."""
+        chi, dashpot = self.damping
+        return GroundRecord(
+            stiffness=float(self.stiffness),
+            exponent=float(self.exponent),
+            approach_floor=float(self.approach_floor),
+            friction=float(self.friction),
+            friction_slow=float(self.friction_slow),
+            friction_fast=float(self.friction_fast),
+            chi=chi,
+            dashpot=dashpot,
+            friction_law=FRICTION_LAWS.index(self.friction_law),
+            interpolated=self.approach == "interpolated",
+        )
 
 
-def new_contacts() -> NDArray[np.void]:
-    """Return contacts of toe and heel above the ground, shape (2,) of dtype `CONTACT`."""
-    return np.zeros(2, dtype=CONTACT)
+def new_contacts() -> list[Contact]:
+    """Return contacts of toe and heel above the ground."""
+    return [Contact(), Contact()]
 
 
-def latch(contact, penetration, rate, ground):  # type: ignore[no-untyped-def]
+def latch(contact: Contact, penetration: float, rate: float, ground: GroundRecord) -> None:
     """Update penetration and rate of a point; on entering the ground, latch its approach speed (floored)."""
     if penetration > 0.0 and not contact.inside:
         speed = rate
@@ -136,7 +148,7 @@ def latch(contact, penetration, rate, ground):  # type: ignore[no-untyped-def]
     contact.rate = rate
 
 
-def touch(contact, position, velocity, ground):  # type: ignore[no-untyped-def]
+def touch(contact: Contact, position: complex, velocity: complex, ground: GroundRecord) -> complex:
     """Return the force of the ground, y = 0, on one hoof point, as the complex number friction + i normal
     [N]; update `contact`. Position and velocity of the point are complex [m, m/s]."""
     latch(contact, -position.imag, -velocity.imag, ground)  # Eqs. 10 and 12
@@ -146,7 +158,7 @@ def touch(contact, position, velocity, ground):  # type: ignore[no-untyped-def]
     contact.friction = 0.0
     if contact.inside:
         # Eq. 14
-        spring = ground.stiffness * contact.penetration**ground.exponent
+        spring = ground.stiffness * _power(contact.penetration, ground.exponent)
         contact.normal = normal_force(spring, ground.chi, ground.dashpot, contact.rate, 1 / contact.approach)
         speed = abs(contact.vx)
         part = friction_part(speed, ground.friction_law, ground.friction_slow, ground.friction_fast)
@@ -154,6 +166,14 @@ def touch(contact, position, velocity, ground):  # type: ignore[no-untyped-def]
         if speed > 0.0:
             contact.friction = -math.copysign(ground.friction * part * contact.normal, contact.vx)
     return complex(contact.friction, contact.normal)
+
+
+def _power(base: float, exponent: float) -> float:
+    """Return a power, infinite where it is too large for a number, as in a solution that diverges."""
+    try:
+        return base**exponent
+    except OverflowError:
+        return math.inf
 
 
 HERTZ = 1.5

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hoof_env.errors import GeometryError
-from hoof_env.leg.closed_form import solve_all
+from hoof_env.leg.closed_form import solve_points
 from hoof_env.leg.mechanism import FRAME, BodyPoint, Dyad
 
 if TYPE_CHECKING:
@@ -62,12 +62,16 @@ def solve(geometry: Geometry, theta: Any) -> tuple[NDArray[np.complex128], ...]:
     Each has shape (len(theta), points); NaN where the linkage cannot be closed.
     """
     theta = np.asarray(theta, dtype=np.float64)
-    z, dz, ddz = (np.empty((theta.size, len(geometry.mechanism.points)), np.complex128) for _ in range(3))
     crank = geometry.lengths[geometry.mechanism.crank_length]
     fixed = np.array(list(geometry.fixed.values()), np.complex128)
-    with np.errstate(invalid="ignore", divide="ignore"):
-        solve_all(theta, crank, fixed, *tables(geometry), z, dz, ddz)
-    return z, dz, ddz
+    points = solve_points(theta, crank, fixed, *tables(geometry))
+    solved = tuple(np.empty((theta.size, len(points)), np.complex128) for _ in range(3))
+    parts = [(array.real, array.imag) for array in solved]
+    for k, point in enumerate(points):
+        for (real, imag), vectors in zip(parts, point, strict=True):
+            real[:, k] = vectors.real
+            imag[:, k] = vectors.imag
+    return solved
 
 
 def centres(geometry: Geometry, z: NDArray[np.complex128], mirrored: bool) -> NDArray[np.complex128]:

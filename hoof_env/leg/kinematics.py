@@ -8,6 +8,7 @@ people.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -16,6 +17,7 @@ from numpy.typing import NDArray
 from hoof_env.errors import ParameterError, check_choice, check_number, one_of
 from hoof_env.leg.assembly import centres, solve
 from hoof_env.leg.checks import count_of
+from hoof_env.leg.closed_form import Vectors
 from hoof_env.leg.geometry import Geometry
 from hoof_env.leg.mechanism import Mechanism
 
@@ -25,22 +27,40 @@ def mirror(z: complex, travel: float) -> complex:
     return complex(travel * z.real, z.imag)
 
 
-def place(z, dz, ddz, theta_rate, theta_acc, phi, phi_rate, phi_acc, travel):  # type: ignore[no-untyped-def]
-    """Motion relative to O, in world axes, of a point given in the frame of the leg.
+def place(
+    z: Vectors,
+    dz: Vectors,
+    ddz: Vectors,
+    theta_rate: float,
+    theta_acc: float,
+    phi: float,
+    phi_rate: float,
+    phi_acc: float,
+    travel: float,
+) -> tuple[Vectors, Vectors, Vectors]:
+    """Motion relative to O, in world axes, of points given in the frame of the leg.
 
     The frame has turned by phi (in its own sense, before the mirror). Returns position [m], velocity [m/s]
-    and acceleration [m/s^2], all complex.
+    and acceleration [m/s^2].
     """
-    turn = complex(np.cos(phi), np.sin(phi))
+    turn = Vectors(math.cos(phi), math.sin(phi))
     by_theta = dz * turn
-    by_phi = 1j * z * turn
+    by_phi = z.turned_left() * turn
     velocity = by_theta * theta_rate + by_phi * phi_rate
     acceleration = (
         by_theta * theta_acc
         + by_phi * phi_acc
-        + turn * (ddz * theta_rate**2 + 2j * dz * theta_rate * phi_rate - z * phi_rate**2)
+        + turn
+        * (
+            ddz * (theta_rate * theta_rate)
+            + (2.0 * dz).turned_left() * theta_rate * phi_rate
+            - z * (phi_rate * phi_rate)
+        )
     )
-    return mirror(z * turn, travel), mirror(velocity, travel), mirror(acceleration, travel)
+    position, velocity, acceleration = (
+        Vectors(travel * w.real, w.imag) for w in (z * turn, velocity, acceleration)
+    )
+    return position, velocity, acceleration
 
 
 @dataclass(frozen=True)
@@ -127,15 +147,11 @@ def pose(
     theta_rate, theta_acc = check_number("theta_rate", theta_rate), check_number("theta_acc", theta_acc)
     frame = FrameMotion() if frame is None else one_of("frame", frame, FrameMotion)
     mechanism = one_of("geometry", geometry, Geometry).mechanism
-    z, dz, ddz = (w[0] for w in solve(geometry, [theta]))
-    motion = [
-        place(z[k], dz[k], ddz[k], theta_rate, theta_acc,
-              float(frame.phi), float(frame.phi_rate), float(frame.phi_acc), float(geometry.travel))
-        for k in range(len(mechanism.points))
-    ]  # fmt: skip
-    r = np.array([m[0] for m in motion]) + complex(*frame.position)
-    v = np.array([m[1] for m in motion]) + complex(*frame.velocity)
-    a = np.array([m[2] for m in motion]) + complex(*frame.acceleration)
+    z, dz, ddz = (Vectors(w.real[0], w.imag[0]) for w in solve(geometry, [theta]))
+    swing = frame.phi, frame.phi_rate, frame.phi_acc
+    motion = place(z, dz, ddz, theta_rate, theta_acc, *swing, float(geometry.travel))
+    drift = frame.position, frame.velocity, frame.acceleration
+    r, v, a = (_complex(w) + complex(*of_frame) for w, of_frame in zip(motion, drift, strict=True))
     link, dlink, ddlink = (w[mechanism.heads] - w[mechanism.tails] for w in (r, v, a))
     length2 = np.abs(link) ** 2
     return Pose(
@@ -150,6 +166,12 @@ def pose(
         angular_velocities=(np.conj(link) * dlink).imag / length2,
         angular_accelerations=(np.conj(link) * ddlink).imag / length2,
     )
+
+
+def _complex(z: Vectors) -> NDArray[np.complex128]:
+    result = np.empty(len(z.real), np.complex128)
+    result.real, result.imag = z.real, z.imag
+    return result
 
 
 def _xy(z: NDArray[np.complex128]) -> NDArray[np.float64]:

@@ -82,6 +82,12 @@ BETWEEN = np.array([-0.4999, -0.23, 0.06, 0.31, 0.4999])
 
 ROW = float(FUNCTIONS * (DEGREE + 1))  # numbers in a row of the table
 
+PIECE = 2048
+"""Number of angles whose functions are computed at once: many more take twice as long an angle."""
+
+ROWS = 256
+"""Number of rows that BLAS multiplies at once."""
+
 DERIVATIVE_ERROR = 1e-9
 """The number of cells is the smallest that keeps derivatives this good, relative to their largest value, or
 the largest where none does."""
@@ -100,6 +106,13 @@ def functions(
     geometry: Geometry, theta: NDArray[np.float64]
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """`Functions` in closed form, shape (len(theta), FUNCTIONS), and derivatives of the first `SLOPED`."""
+    pieces = [_piece(geometry, theta[begin : begin + PIECE]) for begin in range(0, max(len(theta), 1), PIECE)]
+    value, slope = (np.concatenate(parts) for parts in zip(*pieces, strict=True))
+    return value, slope
+
+
+def _piece(geometry: Geometry, theta: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Return what `functions` does, of angles that are few enough for the processor's cache."""
     z, dz, ddz = places(geometry, theta)
     m, inertia = geometry.body_masses, geometry.body_inertias
     mechanism = geometry.mechanism
@@ -108,17 +121,26 @@ def functions(
     length2 = geometry.body_lengths**2
     turn, dturn = cross(link, dlink) / length2, cross(link, ddlink) / length2
     toe, heel = (mechanism.number[point] for point in geometry.corners)
-    s, ds, dds = r @ m, v @ m, acc @ m
+    s, ds, dds = (_weighted(w, m) for w in (r, v, acc))
     value = [
         z[:, toe].real, z[:, toe].imag, z[:, heel].real, z[:, heel].imag, ds.real, ds.imag,
-        np.abs(v) ** 2 @ m + turn**2 @ inertia, cross(r, v) @ m + turn @ inertia,
-        s.real, s.imag, np.abs(r) ** 2 @ m + inertia.sum(), 2 * _dot(r, v) @ m,
+        _weighted(np.abs(v) ** 2, m) + _weighted(turn**2, inertia),
+        _weighted(cross(r, v), m) + _weighted(turn, inertia),
+        s.real, s.imag, _weighted(np.abs(r) ** 2, m) + inertia.sum(), _weighted(2 * _dot(r, v), m),
     ]  # fmt: skip
     slope = [
         dz[:, toe].real, dz[:, toe].imag, dz[:, heel].real, dz[:, heel].imag, dds.real, dds.imag,
-        2 * (_dot(v, acc) @ m + (turn * dturn) @ inertia), cross(r, acc) @ m + dturn @ inertia,
+        2 * (_weighted(_dot(v, acc), m) + _weighted(turn * dturn, inertia)),
+        _weighted(cross(r, acc), m) + _weighted(dturn, inertia),
     ]  # fmt: skip
     return np.stack(value, 1), np.stack(slope, 1)
+
+
+def _weighted(rows: NDArray[Any], weights: NDArray[np.float64]) -> NDArray[Any]:
+    """Return the weighted sum of each row. So many rows at once are too few for BLAS to start its threads,
+    which would wait for longer than they work."""
+    begins = range(0, max(len(rows), 1), ROWS)
+    return np.concatenate([rows[begin : begin + ROWS] @ weights for begin in begins])
 
 
 def _dot(a: NDArray[np.complex128], b: NDArray[np.complex128]) -> NDArray[np.float64]:

@@ -508,8 +508,6 @@ def vector(x: Number, y: Number) -> Plane:
 
 def perpendicular(z: Plane) -> Plane:
     """Return a planar vector turned left by a right angle."""
-    if not isinstance(z, Plane):
-        return 1j * z
     return Plane(-z.b, Lanes(z.a.x, z.a.n, z.a.factors))
 
 

@@ -10,7 +10,7 @@ from hoof_env.dynamics.engine import TrunkEngine
 from hoof_env.dynamics.parts import Limb, Limits, Motor, Prescribed, Result, Trunk
 from hoof_env.eq8.constraints import Constraints, closed_form
 from hoof_env.eq8.solver import ConstrainedLeg, new_trace
-from hoof_env.gait import MOTION, GaitParameters
+from hoof_env.gait import GaitParameters, Motion
 from hoof_env.ground.terrain import Terrain
 from hoof_env.leg.geometry import load_geometry
 from hoof_env.leg.kinematics import FrameMotion, pose
@@ -38,14 +38,10 @@ def in_stance(leg):
     return float(theta[lowest]), places[lowest]
 
 
-def a_motion(theta, theta_rate=0.0, theta_acc=0.0, phi=0.0, phi_rate=0.0, phi_acc=0.0):
-    return np.array([(theta, theta_rate, theta_acc, phi, phi_rate, phi_acc)], dtype=MOTION)[0]
-
-
 def check_eq_2(leg, theta):
     """The closed form satisfies Eq. 2 and its rate, and its Jacobian and gamma are those of differences."""
     constraints = Constraints(leg)
-    motion = a_motion(theta, 4.0, 1.5, 0.2, -0.7, 0.4)
+    motion = Motion(theta, 4.0, 1.5, 0.2, -0.7, 0.4)
     q, qd = closed_form(leg, motion)
     closure = constraints(q, qd, motion)
     assert closure.error.shape == (3 * len(leg.mechanism.bodies),)
@@ -60,9 +56,9 @@ def check_eq_2(leg, theta):
     # along a motion on which the constraints hold, Phi_q qdd = gamma; differences of the closed form give qdd
     rates = []
     for time in (-1e-5, 1e-5):
-        theta_t = motion["theta"] + 4.0 * time + 1.5 * time**2 / 2
+        theta_t = motion.theta + 4.0 * time + 1.5 * time**2 / 2
         phi_t = 0.2 - 0.7 * time + 0.4 * time**2 / 2
-        moved = a_motion(theta_t, 4.0 + 1.5 * time, 1.5, phi_t, -0.7 + 0.4 * time, 0.4)
+        moved = Motion(theta_t, 4.0 + 1.5 * time, 1.5, phi_t, -0.7 + 0.4 * time, 0.4)
         rates.append(closed_form(leg, moved)[1])
     qdd = (rates[1] - rates[0]) / 2e-5
     np.testing.assert_allclose(closure.jacobian @ qdd, closure.gamma, atol=1e-5 * max(1, np.abs(qdd).max()))

@@ -140,7 +140,7 @@ def test_a_linkage_that_diverges_ends_the_episode_and_pays_nothing(settings):
     env.record()
     done = False
     while not done:
-        before, time = summary_of(env.batch, 0), env.batch.paper.legs[0].state.body["time"]
+        before, time = summary_of(env.batch, 0), env.batch.paper.legs[0].state.body.time
         observation, reward, done, truncated, info = env.step(np.zeros(4, np.float32))
         assert not truncated
         assert np.isfinite(observation).all()

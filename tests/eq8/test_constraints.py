@@ -9,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from hoof_env.eq8.constraints import Constraints, closed_form
-from hoof_env.gait import MOTION
+from hoof_env.gait import Motion
 from hoof_env.leg.geometry import load_geometry
 from tests.legs import FIRST_FIT
 from tests.linkage import BODY_LENGTHS, SIZE
@@ -27,10 +27,6 @@ PRINTED = (
 angle = st.floats(-50, 50)
 swing = st.floats(-1.5, 1.5)
 rate = st.floats(-15, 15)
-
-
-def a_motion(theta, theta_rate=0.0, theta_acc=0.0, phi=0.0, phi_rate=0.0, phi_acc=0.0):
-    return np.array([(theta, theta_rate, theta_acc, phi, phi_rate, phi_acc)], dtype=MOTION)[0]
 
 
 @pytest.fixture(scope="module")
@@ -70,7 +66,7 @@ def test_jacobian_and_gamma_are_the_derivatives_of_the_printed_rows(symbolic):
     generator = np.random.default_rng(0)
     for _ in range(20):  # anywhere, also with the loops open
         q, qd, m = generator.normal(size=42), generator.normal(size=42), generator.normal(size=6)
-        closure = CONSTRAINTS(q, qd, a_motion(*m))
+        closure = CONSTRAINTS(q, qd, Motion(*m))
         names = ("error", "error_rate", "jacobian", "by_phi", "gamma")
         for name, expected in zip(names, symbolic(q, qd, m), strict=True):
             got = getattr(closure, name)
@@ -80,7 +76,7 @@ def test_jacobian_and_gamma_are_the_derivatives_of_the_printed_rows(symbolic):
 @settings(max_examples=100, deadline=None)
 @given(angle, rate, swing, rate, st.sampled_from([1, -1]))
 def test_the_closed_form_solves_position_and_velocity(theta, theta_rate, phi, phi_rate, travel):
-    motion = a_motion(theta, theta_rate, phi=phi, phi_rate=phi_rate)
+    motion = Motion(theta, theta_rate, phi=phi, phi_rate=phi_rate)
     closure = CONSTRAINTS(*closed_form(GEOMETRY.replace(travel=travel), motion), motion)
     assert np.abs(closure.error).max() < 1e-12
     assert np.abs(closure.error_rate).max() < 1e-12 * (1 + abs(theta_rate) + abs(phi_rate))
@@ -89,7 +85,7 @@ def test_the_closed_form_solves_position_and_velocity(theta, theta_rate, phi, ph
 @settings(max_examples=25, deadline=None)
 @given(angle, swing, st.integers(0, 2**32 - 1))
 def test_newton_returns_to_the_closed_form(theta, phi, seed):
-    motion = a_motion(theta, phi=phi)
+    motion = Motion(theta, phi=phi)
     exact, rest = closed_form(GEOMETRY, motion)
     q = exact + np.random.default_rng(seed).uniform(-1e-2, 1e-2, SIZE)
     for _ in range(8):
@@ -100,5 +96,5 @@ def test_newton_returns_to_the_closed_form(theta, phi, seed):
 
 def test_nothing_is_free():
     for theta in np.linspace(0, 2 * np.pi, 60):
-        motion = a_motion(theta, phi=0.3)
+        motion = Motion(theta, phi=0.3)
         assert np.linalg.matrix_rank(CONSTRAINTS(*closed_form(GEOMETRY, motion), motion).jacobian) == 42

@@ -285,8 +285,8 @@ def test_a_failure_is_a_result_and_puts_the_state_back(spoil, result):
     before = leg.state.copy()
     assert leg.advance(WALK.to_array(), new_trace(10)) is result
     assert "put back" in result.message
-    for name, value in vars(before).items():
-        assert getattr(leg.state, name).tobytes() == value.tobytes(), name
+    for name, value in before.to_arrays().items():
+        assert leg.state.to_arrays()[name].tobytes() == value.tobytes(), name
 
 
 @pytest.mark.parametrize("copied", [copy.deepcopy, lambda leg: pickle.loads(pickle.dumps(leg))])
@@ -296,7 +296,7 @@ def test_a_copy_goes_on_bit_for_bit(copied):
     for runner in (leg, copied(leg)):
         first, second = new_trace(30), new_trace(30)
         runner.advance(WALK.to_array(), first)
-        start = runner.reset(WALK, theta=2.0, x=0.5)  # which writes to the records by name
+        start = runner.reset(WALK, theta=2.0, x=0.5)
         runner.advance(RUN.to_array(), second)
         runs.append([rows.tobytes() for rows in (first, start, second, *vars(runner.state).values())])
     assert runs[0] == runs[1]

@@ -1,5 +1,7 @@
 """Commands become motion that a machine could make, and every derivative of it is a derivative."""
 
+from copy import deepcopy
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -7,8 +9,8 @@ from hypothesis import strategies as st
 
 from hoof_env.gait import (
     LIMITS,
-    MOTION,
     FilterSettings,
+    Motion,
     advance_motion,
     command_filters,
     evaluate_motion,
@@ -30,9 +32,12 @@ SECOND = np.array([-9, 128, -1008, 8064, -14350, 8064, -1008, 128, -9]) / 5040
 
 
 def start(gait, theta=0.0):
-    motion = np.zeros(1, dtype=MOTION)[0]
-    motion["theta"] = theta
-    return motion, steady_filters(gait)
+    return Motion(theta), steady_filters(gait)
+
+
+def of(filters, name):
+    """What all filters have by one name, shape (4,)."""
+    return np.array([getattr(one, name) for one in filters])
 
 
 def play(sequence, h, gait, theta=0.0):
@@ -40,7 +45,7 @@ def play(sequence, h, gait, theta=0.0):
     motion, filters = start(gait, theta)
     for command, substeps in sequence:
         for _ in range(substeps):
-            command_filters(filters, command, TABLE)
+            command_filters(filters, command.tolist(), TABLE.tolist())
             advance_motion(motion, filters, h)
             evaluate_motion(motion, filters)
             yield motion, filters
@@ -50,10 +55,10 @@ def play(sequence, h, gait, theta=0.0):
 @settings(deadline=None, max_examples=80)
 def test_rates_and_accelerations_are_bounded_and_values_stay_in_range(sequence, gait, h):
     for _, filters in play(sequence, h, gait):
-        assert (np.abs(filters["rate"]) <= TABLE[:, 1] * (1 + 1e-12)).all()
-        assert (np.abs(filters["acc"]) <= TABLE[:, 2]).all()
-        assert (filters["value"] >= LOW - 1e-9).all()
-        assert (filters["value"] <= HIGH + 1e-9).all()
+        assert (np.abs(of(filters, "rate")) <= TABLE[:, 1] * (1 + 1e-12)).all()
+        assert (np.abs(of(filters, "acc")) <= TABLE[:, 2]).all()
+        assert (of(filters, "value") >= LOW - 1e-9).all()
+        assert (of(filters, "value") <= HIGH + 1e-9).all()
 
 
 @given(gait=commands, command=commands, h=st.sampled_from([1e-3, SETTINGS.longest_step]))
@@ -62,12 +67,12 @@ def test_a_command_is_reached_without_overshoot(gait, command, h):
     way = np.sign(command - gait)
     before = gait
     for _, filters in play([(command, round(4.0 / h))], h, gait):
-        now = filters["value"].copy()
+        now = of(filters, "value")
         assert (way * (now - before) >= -1e-12).all()  # never back
         assert (way * (command - now) >= -1e-9).all()  # never beyond
         before = now
     assert before == pytest.approx(command, abs=1e-9)
-    assert filters["rate"] == pytest.approx(np.zeros(4), abs=1e-8)
+    assert of(filters, "rate") == pytest.approx(np.zeros(4), abs=1e-8)
 
 
 @given(sequence=sequences, gait=commands, theta=st.floats(-10, 10))
@@ -76,14 +81,14 @@ def test_derivatives_are_those_of_the_motion_while_commands_change(sequence, gai
     motion, filters = list(play(sequence, 1e-3, gait, theta))[-1]
     path = []  # the accelerations of the filters are constant over a substep: go on and back with them
     for k in OFFSETS:
-        there, moved = motion.copy(), filters.copy()
+        there, moved = deepcopy((motion, filters))
         advance_motion(there, moved, 1e-3 * k)
         evaluate_motion(there, moved)
-        path.append((there["theta"], there["phi"]))
+        path.append((there.theta, there.phi))
     evaluate_motion(motion, filters)
     rates, accelerations = FIRST @ path / 1e-3, SECOND @ path / 1e-6
-    assert (motion["theta_rate"], motion["phi_rate"]) == pytest.approx(rates, rel=1e-8, abs=1e-8)
-    assert (motion["theta_acc"], motion["phi_acc"]) == pytest.approx(accelerations, rel=1e-6, abs=1e-5)
+    assert (motion.theta_rate, motion.phi_rate) == pytest.approx(rates, rel=1e-8, abs=1e-8)
+    assert (motion.theta_acc, motion.phi_acc) == pytest.approx(accelerations, rel=1e-6, abs=1e-5)
 
 
 @given(sequence=sequences, gait=commands, h=st.floats(1e-4, 0.05))
@@ -91,17 +96,17 @@ def test_derivatives_are_those_of_the_motion_while_commands_change(sequence, gai
 def test_a_step_is_exact(sequence, gait, h):
     """Under constant filter accelerations a value is quadratic in time: Simpson's rule sums it exactly."""
     motion, filters = list(play(sequence, 1e-3, gait))[-1]
-    values, angle = [], float(motion["theta"])
+    values, angle = [], float(motion.theta)
     for part in (0.0, 0.5, 1.0):
-        moved = filters.copy()
-        advance_motion(motion.copy(), moved, h * part)
-        start_value, rate, acc = (filters[name] for name in ("value", "rate", "acc"))
-        assert moved["value"] == pytest.approx(start_value + h * part * rate + (h * part) ** 2 / 2 * acc)
-        assert moved["rate"] == pytest.approx(rate + h * part * acc)
-        values.append(moved["value"][0])
+        there, moved = deepcopy((motion, filters))
+        advance_motion(there, moved, h * part)
+        start_value, rate, acc = (of(filters, name) for name in ("value", "rate", "acc"))
+        assert of(moved, "value") == pytest.approx(start_value + h * part * rate + (h * part) ** 2 / 2 * acc)
+        assert of(moved, "rate") == pytest.approx(rate + h * part * acc)
+        values.append(moved[0].value)
     advance_motion(motion, filters, h)
     simpson = h * (values[0] + 4 * values[1] + values[2]) / 6
-    assert motion["theta"] - angle == pytest.approx(simpson, abs=1e-12)
+    assert motion.theta - angle == pytest.approx(simpson, abs=1e-12)
 
 
 @given(sequence=sequences, gait=commands)
@@ -110,8 +115,8 @@ def test_the_recorded_rates_add_up_to_the_recorded_motion(sequence, gait):
     """Trapezoidal sums over the whole history, command changes included; what is left is of order h^2."""
     h = 5e-5  # with 1e-4 eight changes of the command can leave a little more than the bound
     sequence = [(command, 2 * substeps) for command, substeps in sequence]
-    names = ["theta", "theta_rate", "phi", "phi_rate"]
-    theta, theta_rate, phi, phi_rate = np.array([tuple(m[names]) for m, _ in play(sequence, h, gait)]).T
+    rows = [(m.theta, m.theta_rate, m.phi, m.phi_rate) for m, _ in play(sequence, h, gait)]
+    theta, theta_rate, phi, phi_rate = np.transpose(rows)
     for value, rate in ((theta, theta_rate), (phi, phi_rate)):
         assert value[-1] - value[0] == pytest.approx(h * (rate[1:] + rate[:-1]).sum() / 2, abs=2e-7)
 
@@ -119,12 +124,12 @@ def test_the_recorded_rates_add_up_to_the_recorded_motion(sequence, gait):
 def test_a_kept_command_keeps_every_bit():
     gait = np.array([2 * np.pi, 0.3434509445955683, 0.10151325708757945, -0.15539461237071284])
     for _, filters in play([(gait, 3000)], 1e-3, gait):
-        assert (filters["value"] == gait).all()
-        assert (filters["rate"] == 0).all()
+        assert (of(filters, "value") == gait).all()
+        assert (of(filters, "rate") == 0).all()
 
 
 def test_without_amplitude_the_frame_stands_still_and_the_crank_angle_is_not_wrapped():
     gait = np.array([4 * np.pi, 0.7, 0.0, 0.0])
     for motion, _ in play([(gait, 10000)], 1e-3, gait):
-        assert (motion["phi"], motion["phi_rate"], motion["phi_acc"]) == (0.7, 0.0, 0.0)
-    assert motion["theta"] == pytest.approx(40 * np.pi, rel=1e-12)
+        assert (motion.phi, motion.phi_rate, motion.phi_acc) == (0.7, 0.0, 0.0)
+    assert motion.theta == pytest.approx(40 * np.pi, rel=1e-12)

@@ -7,13 +7,13 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from numba import njit
 
 from hoof_env.ground import laws
 from hoof_env.ground.laws import AMBROSIO, FRICTION_LAWS, TANH, THRELFALL
-from hoof_env.simd import read, rows, write
-from hoof_env.simd.memory import address, doubles
-from tests.ground.compiled_laws import friction_coefficient, friction_force
+from hoof_env.simd import loop, read, rows, write
+from hoof_env.simd.compile import Kernel
+from hoof_env.simd.memory import doubles
+from tests.ground.plain_laws import friction_coefficient, friction_force
 from tests.oracle import laws as oracle
 
 KINETIC, SLOW, FAST = 0.4, 1e-3, 1e-2
@@ -74,23 +74,23 @@ def test_regimes(law, speed, expected):
     assert part(speed, law) == pytest.approx(expected, abs=1e-12)
 
 
-def in_lanes(lanes):
-    @njit(error_model="numpy")
-    def loop(speed, law, out):
-        row = rows(doubles(lanes), lanes, None)
-        for n in range(0, speed.size, lanes):
-            x = laws.friction_part(read(row, address(speed), n, 1), law, SLOW, FAST)
-            write(x, address(out), n, 1)
+def in_lanes(lanes, law):
+    """A kernel that fills its second array from its first."""
 
-    return loop
+    def fill(speed, out, count):
+        row = rows(doubles(lanes), lanes, None)
+        for n in loop(0, count, lanes):
+            write(laws.friction_part(read(row, speed, n, 1), law, SLOW, FAST), out, n, 1)
+
+    return Kernel(fill, ["pointer", "pointer", "index"])
 
 
 @pytest.mark.parametrize("law", LAWS)
 def test_a_lane_has_the_bits_that_it_has_alone(law):
     speed = np.abs(np.random.default_rng(0).normal(scale=0.02, size=1000))
     together, alone = np.empty((2, 1000))
-    in_lanes(8)(speed, law, together)
-    in_lanes(1)(speed, law, alone)
+    for lanes, out in ((8, together), (1, alone)):
+        in_lanes(lanes, law)(speed.ctypes.data, out.ctypes.data, speed.size)
     np.testing.assert_array_equal(together.view(np.int64), alone.view(np.int64))
-    plain = [part(v, law) for v in speed]  # which is not fused
+    plain = [part(v, law) for v in speed.tolist()]  # which is not fused
     np.testing.assert_allclose(together, plain, rtol=0, atol=1e-13)

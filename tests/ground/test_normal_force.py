@@ -14,7 +14,7 @@ from hoof_env.ground.laws import (
     restitution_of_damping_ratio,
     restitution_of_factor,
 )
-from tests.ground.compiled_laws import normal_force
+from tests.ground.plain_laws import normal_force
 
 # Golden: restitution that a free impact returns, by law and nominal cr; from a table computed with another
 # program, whose ODE solutions for n = 1, 1.5 and 2 agreed with it. None: the damping has no bound there.

@@ -4,13 +4,12 @@ import math
 
 import numpy as np
 import pytest
-from numba import njit
 from scipy.integrate import solve_ivp
 
 from hoof_env.ground.contact import Ground
 from hoof_env.ground.stiffness import SCHEME_LIMITS, ContactRates, contact_rates
 from hoof_env.ground.terrain import Terrain
-from tests.ground.compiled_laws import friction_force, normal_force
+from tests.ground.plain_laws import friction_force, normal_force
 
 GRAVITY = 9.81
 STAGES = {  # fractions of the step, each stage from the one before, and weights
@@ -21,7 +20,6 @@ STAGES = {  # fractions of the step, each stage from the one before, and weights
 FLOOR = 1e-4
 
 
-@njit(error_model="numpy")
 def approach_speed(kept, d_before, rate_before, d, rate):
     """At the interpolated touch-down, kept while the point stays inside; 0 outside."""
     if d <= 0.0 or kept > 0.0:
@@ -30,12 +28,10 @@ def approach_speed(kept, d_before, rate_before, d, rate):
     return max(rate_before + part * (rate - rate_before), FLOOR)
 
 
-@njit(error_model="numpy")
 def pull(d, rate, v0, mass, k, n, chi, weight):
     return (weight - normal_force(d, rate, v0, k, n, chi, 0.0)) / mass
 
 
-@njit(error_model="numpy")
 def fall(d, rate, h, steps, fractions, weights, mass, k, n, chi, weight):
     """Depth and rate after some steps; the approach speed is latched at whole steps, provisional within."""
     before, rate_before, v0 = d, rate, 0.0
@@ -43,12 +39,12 @@ def fall(d, rate, h, steps, fractions, weights, mass, k, n, chi, weight):
         v0 = approach_speed(v0, before, rate_before, d, rate)
         before, rate_before = d, rate
         speed, acc = rate, pull(d, rate, v0, mass, k, n, chi, weight)
-        if fractions.size == 0:  # semi-implicit Euler
+        if len(fractions) == 0:  # semi-implicit Euler
             rate = rate + h * acc
             d = d + h * rate
             continue
         mean_speed, mean_acc = weights[0] * speed, weights[0] * acc
-        for j in range(1, fractions.size):
+        for j in range(1, len(fractions)):
             at, speed = before + fractions[j] * h * speed, rate_before + fractions[j] * h * acc
             latched = approach_speed(v0, before, rate_before, at, speed)
             acc = pull(at, speed, latched, mass, k, n, chi, weight)
@@ -77,7 +73,7 @@ def error(scheme, h, bounce, speed, law, phases=16):
     """Of the state after the bounce, the worst over the places of the touch-down within a step."""
     duration, lift_off, deepest = bounce
     g = law[4] / law[0]
-    stages = [np.array(row, dtype=float) for row in STAGES.get(scheme, ((), ()))]
+    stages = STAGES.get(scheme, ((), ()))
     worst = 0.0
     for phase in range(phases):
         lead = (2 + (phase + 0.5) / phases) * h
@@ -174,8 +170,7 @@ def test_a_slow_touch_down_under_load_is_damped_without_ringing(scheme):
     rates = contact_rates(ground, mass, load, speed)
     assert rates.damping > rates.elastic
     h = min(rates.longest_steps(scheme)[name] for name in ("elastic", "damping"))
-    stages = [np.array(row, dtype=float) for row in STAGES[scheme]]
-    d, rate = fall(-1e-9, speed, h, int(2 / h), *stages, mass, 1e6, 1.5, 0.75, load)
+    d, rate = fall(-1e-9, speed, h, int(2 / h), *STAGES[scheme], mass, 1e6, 1.5, 0.75, load)
     assert d == pytest.approx((load / 1e6) ** (1 / 1.5), rel=1e-6)
     assert rate == pytest.approx(0, abs=1e-6)
 

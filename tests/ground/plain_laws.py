@@ -1,13 +1,10 @@
-"""The laws of `hoof_env.ground.laws` as functions that Python can call."""
+"""The laws of `hoof_env.ground.laws` for plain numbers, as the paper's solver calls them."""
 
 import math
-
-from numba import njit
 
 from hoof_env.ground import laws
 
 
-@njit(error_model="numpy")
 def friction_coefficient(speed, law, kinetic, slow, fast):
     return kinetic * laws.friction_part(speed, law, slow, fast)
 
@@ -16,7 +13,6 @@ def friction_force(velocity, normal, law, kinetic, slow, fast):
     return -math.copysign(friction_coefficient(abs(velocity), law, kinetic, slow, fast) * normal, velocity)
 
 
-@njit(error_model="numpy")
 def normal_force(penetration, rate, approach, stiffness, exponent, chi, dashpot):
     if penetration <= 0.0:
         return 0.0
