@@ -354,7 +354,7 @@ def load_trunk(trunk, leg, kind, motors, lanes_are_legs):  # type: ignore[no-unt
         + w * w * slope
         + frame_rate * (2.0 * w * perpendicular(leg.moment_by_theta) - frame_rate * s)
     )
-    centripetal = pitch_rate * pitch_rate * hip  # minus O's acceleration there
+    centripetal = rounded(pitch_rate * pitch_rate * hip)  # minus O's acceleration there
     # loads of (E8)
     trunk.load = add(trunk.load, mass * centripetal - moment_acceleration - free * u, lanes_are_legs)
     # A - sum u u^T / I of (E8); prescribed cranks have 1 / I = 0
