@@ -1,4 +1,5 @@
-"""Numbers side by side: values of kernels that work on many environments, or many legs, in one instruction."""
+"""Numbers side by side: values of kernels that work on many environments, or many legs, in one
+instruction."""
 
 from hoof_env.simd.control import Cell, cond, loop, one_of, when
 from hoof_env.simd.memory import (

@@ -1,9 +1,10 @@
 """Kernels: plain functions that are traced once, and compiled by LLVM to machine code.
 
-A trace runs the function with values that write its instructions (`machines.Writer`). The text that results is all
-that the machine code depends on, besides the processor and LLVM: its digest is the name under which the code is
-found, in this process and in files (`objects`). Without fast-math, so that a result does not depend on how the
-compiler arranged a loop.
+A trace runs the function with values that write its instructions (`machines.Writer`). The text that results
+is all
+that the machine code depends on, besides the processor and LLVM: its digest is the name under which the
+code is found, in this process and in files (`objects`). Without fast-math, so that a result does not depend
+on how the compiler arranged a loop.
 """
 
 from __future__ import annotations
@@ -25,7 +26,7 @@ from hoof_env.errors import HoofEnvError
 from hoof_env.simd import objects
 from hoof_env.simd.machines import CURRENT, Eager, Place, Writer, running_on
 from hoof_env.simd.memory import AXES, Arrays, Given, Held, Matrix, Pointer
-from hoof_env.simd.values import Index, Lanes, Mask, Number, Whole
+from hoof_env.simd.values import Index, Lanes, Mask, Number, Whole, word
 
 LEVEL = 2
 """LLVM's level of optimisation: without its vectorisers, for the code is vectors already."""
@@ -93,7 +94,9 @@ def compiled(text: str) -> bytes:
         words = str(error).strip().splitlines()
         hint = ""
         if "dominate" in str(error):
-            hint = "; a value that was made inside `when`, `cond` or `loop` is used outside: keep it in a `Cell`"
+            hint = (
+                "; a value that was made inside `when`, `cond` or `loop` is used outside: keep it in a `Cell`"
+            )
         raise CompilerError(f"LLVM refuses a kernel{hint}: {words[0] if words else error!r}") from error
 
 
@@ -144,7 +147,8 @@ def code_of(text: str, name: str) -> Code:
 
 
 Parameter = Any
-"""What a kernel takes: `Arrays` for what `Arrays.hold` returns, `Matrix` for an array of doubles, `float`, `int`."""
+"""What a kernel takes: `Arrays` for what `Arrays.hold` returns, `Matrix` for an array of doubles, `float`,
+`int`."""
 
 
 class Kernel:
@@ -154,7 +158,8 @@ class Kernel:
         function: the function, of values.
         parameters: what each of its arguments is, see `Parameter`.
         name: name for messages and files.
-        threads: True if several threads may run it at once, without Python's lock; a call takes a little longer.
+        threads: True if several threads may run it at once, without Python's lock; a call takes a little
+        longer.
 
     Attributes:
         call: the machine code as a function of ctypes, which checks no types; None before the first call.
@@ -232,13 +237,14 @@ def traced(function: Callable[..., Any], parameters: Sequence[Parameter]) -> tup
                 declared.append(f"i64 {x}")
                 given.append(Index(x))
         result = function(*given)
-        kind, x, ctype = "void", "", None
         if isinstance(result, Mask):
             result = result.to_whole()
+        of_nothing: tuple[str, str, Any] = ("void", "", None)
+        kind, x, ctype = of_nothing
         if isinstance(result, Lanes):
             kind, x, ctype = "double", result.x, ctypes.c_double
         elif result is not None:
-            kind, x, ctype = "i64", result.x if isinstance(result, Index) else int(result), ctypes.c_int64
+            kind, x, ctype = "i64", str(word(result)), ctypes.c_int64
         machine.do(f"ret {kind} {x}")
         return machine.text("kernel", declared, kind), ctype
 
@@ -265,7 +271,8 @@ def run_now(kernel: Kernel, *arguments: Any, exact: bool = True) -> Any:
 
 
 def kernel(function: Callable[..., Any]) -> Kernel:
-    """Make a kernel of a function, whose annotations say what its arguments are: `Matrix`, `Number` or `Whole`."""
+    """Make a kernel of a function, whose annotations say what its arguments are: `Matrix`, `Number` or
+    `Whole`."""
     kinds = {Matrix: Matrix, Number: float, Lanes: float, Whole: int, Index: int}
     hints = get_type_hints(function)
     names = function.__code__.co_varnames[: function.__code__.co_argcount]

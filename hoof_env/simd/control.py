@@ -95,11 +95,11 @@ def _keep(values: Any, kinds: Any, slots: Any) -> None:
 
 
 def loop(begin: Whole, end: Whole | None = None, step: Whole = 1) -> Iterator[Any]:
-    """Run the body of a `for` with the numbers of `range`; traced once if a bound is known only when the kernel
-    runs. What changes from turn to turn is in memory, or in a `Cell`."""
+    """Run the body of a `for` with the numbers of `range`; traced once if a bound is known only when the
+    kernel runs. What changes from turn to turn is in memory, or in a `Cell`."""
     first, last = (0, begin) if end is None else (begin, end)
     if not any(isinstance(bound, Index) for bound in (first, last, step)):
-        yield from range(first, last, step)  # type: ignore[arg-type]
+        yield from range(first, last, step)
         return
     machine = CURRENT.machine
     counter = machine.slot("i64")
@@ -118,8 +118,8 @@ def loop(begin: Whole, end: Whole | None = None, step: Whole = 1) -> Iterator[An
 
 
 class Cell:
-    """Variable of a kernel that changes inside `loop` or `when`: an ordinary number, or a whole one if it begins
-    as one."""
+    """Variable of a kernel that changes inside `loop` or `when`: an ordinary number, or a whole one if it
+    begins as one."""
 
     def __init__(self, value: Any) -> None:
         self._kind = "i64" if isinstance(value, (int, Index)) else "double"
@@ -154,5 +154,3 @@ def one_of(values: Any, k: Whole) -> Any:
         mask = k == j
         chosen = Lanes(CURRENT.machine.select(mask.x, full(values[j], 0).x, full(chosen, 0).x, 0, 0), 0)
     return full(chosen, 0)
-
-

@@ -39,7 +39,7 @@ HALF_PI_LOW = float.fromhex("0x1.0b4611a626331p-34")  # the rest
 ROUNDER = 1.5 * 2.0**52  # adding and subtracting it rounds to the nearest whole number
 
 
-def root_power(d: Number, eighths: int) -> Lanes:
+def root_power(d: Lanes, eighths: int) -> Lanes:
     """Return d^(eighths / 8) by square roots; 0 for negative d, relative error below 1e-15. `eighths` is a
     whole number from 8 to 24, the same in all lanes."""
     base = maximum(d, 0.0)
@@ -63,13 +63,12 @@ def root_power(d: Number, eighths: int) -> Lanes:
     return rounded(power)
 
 
-def exp_of_negative(x: Number) -> Lanes:
+def exp_of_negative(x: Lanes) -> Lanes:
     """Return exp(x) for x <= 0, relative error below 1e-13; exp(-40) below -40. The series of exp(x / 256),
     squared eight times."""
     # Taylor's series to the tenth power, by Horner's rule
     y = maximum(x, LOWEST_EXPONENT) * (1 / 256)
-    e = 1 / 3628800
-    e = e * y + 1 / 362880
+    e = 1 / 3628800 * y + 1 / 362880
     e = e * y + 1 / 40320
     e = e * y + 1 / 5040
     e = e * y + 1 / 720
@@ -89,14 +88,14 @@ def exp_of_negative(x: Number) -> Lanes:
     return rounded(e * e)
 
 
-def tanh(x: Number) -> Lanes:
+def tanh(x: Lanes) -> Lanes:
     """Return the hyperbolic tangent, error below 1e-13."""
     e = exp_of_negative(-2.0 * absolute(x))
     part = (1.0 - e) / (1.0 + e)
     return where(x < 0.0, -part, part)
 
 
-def cos_sin(angle: Number) -> tuple[Lanes, Lanes]:
+def cos_sin(angle: Lanes) -> tuple[Lanes, Lanes]:
     """Return cosine and sine of `angle` [rad], error below 2e-16 for |angle| < 1e4."""
     shifted = steady(angle * TWO_OVER_PI + ROUNDER)
     turns = shifted - ROUNDER  # quarter turns to the nearest multiple of pi / 2
@@ -118,6 +117,6 @@ def cos_sin(angle: Number) -> tuple[Lanes, Lanes]:
     return quarter_turns(cosine, sine, shifted)
 
 
-def clip(x: Number, bound: Number) -> Lanes:
+def clip(x: Lanes, bound: Number) -> Lanes:
     """Return `x` limited to [-bound, bound]."""
     return minimum(maximum(x, -bound), bound)

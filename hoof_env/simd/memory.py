@@ -1,7 +1,7 @@
 """Memory of kernels: rows of lanes on the stack, columns of arrays, and the arrays and records of a caller.
 
-`Arrays` declares the arrays that a kernel takes; `Arrays.hold` makes a `Held` of them, one owner of arrays and
-addresses, which is all that Python hands to machine code.
+`Arrays` declares the arrays that a kernel takes; `Arrays.hold` makes a `Held` of them, one owner of arrays
+and addresses, which is all that Python hands to machine code.
 """
 
 from __future__ import annotations
@@ -15,7 +15,20 @@ from numpy.typing import NDArray
 
 from hoof_env.simd.layout import Named, Row, Vector
 from hoof_env.simd.machines import CURRENT, Place
-from hoof_env.simd.values import Index, Lanes, Mask, Number, Plane, Value, Whole, full, index, transposed, vector, word
+from hoof_env.simd.values import (
+    Index,
+    Lanes,
+    Mask,
+    Number,
+    Plane,
+    Value,
+    Whole,
+    full,
+    index,
+    transposed,
+    vector,
+    word,
+)
 
 LINE = 64
 """Size of a cache line, and of the widest vector [bytes]."""
@@ -106,7 +119,8 @@ class Field:
 
 
 class Record:
-    """Record of the caller: fields that are known when the kernel is traced, and others, read when it runs."""
+    """Record of the caller: fields that are known when the kernel is traced, and others, read when it
+    runs."""
 
     def __init__(self, place: Any, kind: np.dtype[Any], known: Mapping[str, Any]) -> None:
         self._place = place
@@ -116,7 +130,7 @@ class Record:
     def __getattr__(self, name: str) -> Any:
         if name in self._known:
             return self._known[name]
-        fields = self._kind.fields or {}
+        fields: Mapping[str, Any] = self._kind.fields or {}
         if name not in fields:
             raise AttributeError(f"no field {name!r}; there are {', '.join(fields)}")
         kind, start = fields[name][:2]
@@ -152,7 +166,9 @@ class Held(int):
     columns: range
 
     def __reduce__(self) -> NoReturn:
-        raise TypeError("addresses hold in one process only: expected the arrays to be copied, and held again")
+        raise TypeError(
+            "addresses hold in one process only: expected the arrays to be copied, and held again"
+        )
 
     def __deepcopy__(self, memo: Any) -> NoReturn:
         self.__reduce__()
@@ -186,7 +202,9 @@ class Arrays:
             array = kept[name] = arrays[name]
             dtype = kind.kind if isinstance(kind, RecordType) else np.dtype(kind)
             if array.dtype != dtype or not array.flags.c_contiguous or array.ndim > AXES:
-                raise TypeError(f"{name}: expected a contiguous array of {dtype}, got {array.dtype}, {array.flags}")
+                raise TypeError(
+                    f"{name}: expected a contiguous array of {dtype}, got {array.dtype}, {array.flags}"
+                )
             first = self.slots[name]
             numbers[first] = array.ctypes.data
             numbers[first + 1 : first + 1 + array.ndim] = array.shape
@@ -237,7 +255,8 @@ class Given:
 
 
 class Rows:
-    """Memory on the stack with n doubles a row, named by a layout. Of a machine that computes at once it is a list
+    """Memory on the stack with n doubles a row, named by a layout. Of a machine that computes at once it is
+    a list
     of arrays, of which a store replaces an entry: arrays themselves do not change."""
 
     __slots__ = ("_empty", "_first", "_layout", "_n", "_place")
@@ -253,7 +272,7 @@ class Rows:
     @property
     def lanes(self) -> int:
         """Number of lanes."""
-        return self._n  # type: ignore[no-any-return]
+        return self._n
 
     # where a row is
 
@@ -384,9 +403,7 @@ def rows_of(values: list[Any], count: int, layout: Any) -> Any:
     return Rows(values, count, layout)
 
 
-def columns(
-    matrix: Matrix, lanes: int, layout: Any, column: Whole, row: Whole = 0, stride: Whole = 1
-) -> Any:
+def columns(matrix: Matrix, lanes: int, layout: Any, column: Whole, row: Whole = 0, stride: Whole = 1) -> Any:
     """Return columns of a matrix of two axes by the names of a layout.
 
     Args:
@@ -421,7 +438,8 @@ def full_like(like: Any, value: Number) -> Lanes:
 
 
 def apply_to_rows(rows: Any, count: int, function: Any, width: int) -> None:
-    """Set each of the first rows, which have no names, to a function of it. Rows of one lane are taken `width` at
+    """Set each of the first rows, which have no names, to a function of it. Rows of one lane are taken
+    `width` at
     a time: `count` is a multiple of it, and there is memory for as many."""
     if rows._n == 1 and not CURRENT.machine.runs_now:
         rows = Rows(rows._place, width, None)
@@ -438,7 +456,8 @@ def store_vectors(rows: Any, vectors: tuple[Plane, ...]) -> None:
 
 
 def gather_eight(pointer: Pointer, first: Lanes) -> tuple[Lanes, ...]:
-    """Return pointer[first] to pointer[first + 7] in every lane; `first` is a double that holds a whole number."""
+    """Return pointer[first] to pointer[first + 7] in every lane; `first` is a double that holds a whole
+    number."""
     machine, n = CURRENT.machine, first.n
     if machine.runs_now:
         return tuple(Lanes(x, n) for x in machine.table_rows(pointer.x, machine.whole_of(first.x), 8))

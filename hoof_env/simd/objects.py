@@ -1,7 +1,7 @@
 """Machine code of kernels in files: plain objects of the processor, in a folder of the user's.
 
-A file's name is the digest of all that its code follows from, so that no file is ever out of date. A file begins
-with the digest of its content. What others could write is not read, because it is run.
+A file's name is the digest of all that its code follows from, so that no file is ever out of date. A file
+begins with the digest of its content. What others could write is not read, because it is run.
 """
 
 from __future__ import annotations
@@ -28,7 +28,8 @@ DIGEST = hashlib.sha256().digest_size
 
 
 def folder() -> Path:
-    """Return the folder of the files: that of the environment variable, else one in the user's cache folder."""
+    """Return the folder of the files: that of the environment variable, else one in the user's cache
+    folder."""
     if given := os.environ.get(FOLDER):
         return Path(given)
     home = Path(os.path.expanduser("~"))
@@ -60,7 +61,8 @@ def read(name: str) -> bytes | None:
 
 
 def write(name: str, content: bytes) -> None:
-    """Keep a content in a file, at once or not at all; without a folder that can be written it is not kept."""
+    """Keep a content in a file, at once or not at all; without a folder that can be written it is not
+    kept."""
     path = folder() / name
     try:
         path.parent.mkdir(parents=True, exist_ok=True, mode=0o700)

@@ -1,5 +1,5 @@
-"""Plain functions from outside this package inside kernels: checks of what they are and return, and error messages
-for their authors."""
+"""Plain functions from outside this package inside kernels: checks of what they are and return, and error
+messages for their authors."""
 
 from __future__ import annotations
 
@@ -111,7 +111,8 @@ def _kind(x: Any) -> str:
 
 
 def check_function(name: str, function: Any, arguments: int) -> None:
-    """Raise ParameterError unless something is a plain function of `arguments` arguments that imports nothing."""
+    """Raise ParameterError unless something is a plain function of `arguments` arguments that imports
+    nothing."""
     if not isinstance(function, FunctionType) or function.__code__.co_flags & 0x0C:  # *args, **kwargs
         raise ParameterError(f"{name}: expected a plain function of {arguments} arguments, got {function!r}")
     code = function.__code__

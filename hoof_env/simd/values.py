@@ -3,7 +3,8 @@
 The machine that runs (`machines.CURRENT`) carries the operations out: a `Writer` writes instructions while a
 kernel is traced, `Eager` computes with NumPy at once. Ordinary numbers are computed at once on either.
 
-A product that enters a sum is not rounded: `a * b + c` on lanes is one fused operation. The expression decides
+A product that enters a sum is not rounded: `a * b + c` on lanes is one fused operation. The expression
+decides
 this: a value remembers the factors of which it is the product, and `rounded` makes it forget them.
 """
 
@@ -11,9 +12,10 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator
-from typing import Any, NoReturn, TypeVar, overload
+from typing import Any, NoReturn, Protocol, TypeVar, overload
 
 import numpy as np
+from numpy.typing import NDArray
 
 from hoof_env.simd.machines import CURRENT
 
@@ -39,15 +41,17 @@ class Value:
         )
 
     def __iter__(self) -> Iterator[Any]:
-        raise TraceError(f"a loop over {self.kind}: a value of a kernel has no elements that Python could reach")
+        raise TraceError(
+            f"a loop over {self.kind}: a value of a kernel has no elements that Python could reach"
+        )
 
     def __len__(self) -> int:
         raise TraceError(f"len() of {self.kind}: a value of a kernel has no elements that Python could reach")
 
     def _no_number(self) -> NoReturn:
         raise TraceError(
-            f"float(), int() or a function of `math` of {self.kind}, which is known only when the kernel runs: write"
-            " NumPy's function, such as np.exp or np.sqrt"
+            f"float(), int() or a function of `math` of {self.kind}, which is known only when the kernel runs:"
+            " write NumPy's function, such as np.exp or np.sqrt"
         )
 
     def __float__(self) -> float:
@@ -456,21 +460,32 @@ def _power(base: Any, power: Any) -> Any:
 def rounded(value: V) -> V:
     """Return a value, or a tuple of values, that enters sums rounded."""
     made: Any = value
-    if isinstance(value, Lanes):
-        made = Lanes(value.x, value.n) if value.factors else value
-    elif isinstance(value, Plane):
-        made = Plane(rounded(value.a), rounded(value.b))
-    elif type(value) is tuple:
-        made = tuple(map(rounded, value))
-    elif isinstance(value, tuple) and any(isinstance(part, (Lanes, Plane)) for part in value):
-        made = type(value)(*map(rounded, value))
-    return made  # type: ignore[no-any-return]
+    if isinstance(made, Lanes):
+        made = Lanes(made.x, made.n) if made.factors else made
+    elif isinstance(made, Plane):
+        made = Plane(rounded(made.a), rounded(made.b))
+    elif type(made) is tuple:
+        made = tuple(map(rounded, made))
+    elif isinstance(made, tuple) and any(isinstance(part, (Lanes, Plane)) for part in made):
+        made = type(made)(*map(rounded, made))
+    return made
 
 
 # Functions. Ordinary numbers, and arrays of NumPy, are computed at once, whatever the machine.
 
 
-def _real_function(name: str, at_once: Any) -> Any:
+class RealFunction(Protocol):
+    """Function of a number, of lanes, or of an array."""
+
+    @overload
+    def __call__(self, x: float) -> float: ...
+    @overload
+    def __call__(self, x: Lanes | Index) -> Lanes: ...
+    @overload
+    def __call__(self, x: NDArray[Any]) -> NDArray[Any]: ...
+
+
+def _real_function(name: str, at_once: Any) -> RealFunction:
     def function(x: Any) -> Any:
         if isinstance(x, Index):
             x = x.to_real()
@@ -513,14 +528,22 @@ def perpendicular(z: Plane) -> Plane:
 
 def dot(z: Plane, w: Plane) -> Lanes:
     """Return the scalar product of planar vectors."""
-    return _sum("+", product(z.a, w.a), product(z.b, w.b))  # type: ignore[no-any-return]
+    found: Lanes = _sum("+", product(z.a, w.a), product(z.b, w.b))
+    return found
 
 
 def cross(z: Plane, w: Plane) -> Lanes:
     """Return z x w, positive if w is to the left of z."""
-    return _sum("-", product(z.a, w.b), product(z.b, w.a))  # type: ignore[no-any-return]
+    found: Lanes = _sum("-", product(z.a, w.b), product(z.b, w.a))
+    return found
 
 
+@overload
+def where(condition: Truth, yes: Plane, no: Plane) -> Plane: ...
+@overload
+def where(condition: Truth, yes: Number, no: Number) -> Lanes: ...
+@overload
+def where(condition: NDArray[Any], yes: Any, no: Any) -> Any: ...
 def where(condition: Any, yes: Any, no: Any) -> Any:
     """Return `yes` where the condition holds, else `no`, lane by lane."""
     if isinstance(condition, (bool, np.bool_)):
@@ -539,11 +562,27 @@ def where(condition: Any, yes: Any, no: Any) -> Any:
     return Lanes(chosen, n)
 
 
+@overload
+def maximum(x: float, y: float) -> float: ...  # type: ignore[overload-overlap]
+@overload
+def maximum(x: Number, y: Number) -> Lanes: ...
+@overload
+def maximum(x: NDArray[Any], y: Any) -> NDArray[Any]: ...
+@overload
+def maximum(x: Any, y: NDArray[Any]) -> NDArray[Any]: ...
 def maximum(x: Any, y: Any) -> Any:
     """Return the larger number of two; NaN if either is, as NumPy does."""
     return _chosen(">", x, y)
 
 
+@overload
+def minimum(x: float, y: float) -> float: ...  # type: ignore[overload-overlap]
+@overload
+def minimum(x: Number, y: Number) -> Lanes: ...
+@overload
+def minimum(x: NDArray[Any], y: Any) -> NDArray[Any]: ...
+@overload
+def minimum(x: Any, y: NDArray[Any]) -> NDArray[Any]: ...
 def minimum(x: Any, y: Any) -> Any:
     """Return the smaller number of two; NaN if either is, as NumPy does."""
     return _chosen("<", x, y)
@@ -594,8 +633,8 @@ def lane_sum(start: Any, x: Any) -> Any:
 
 
 def steady(x: V) -> V:
-    """Return x, which does not change with small changes of what it was computed from: a number that was rounded
-    by adding a large constant. A machine that rearranges or differentiates must leave it alone."""
+    """Return x, which does not change with small changes of what it was computed from: a number that was
+    rounded by adding a large constant. A machine that rearranges or differentiates must leave it alone."""
     if isinstance(x, Lanes):
         return Lanes(CURRENT.machine.steady(x.x), x.n, x.factors)  # type: ignore[return-value]
     return x
@@ -674,8 +713,8 @@ def _full_like(like: Any, value: Any) -> Any:
 
 
 LIBRARY = (
-    "exp", "exp2", "expm1", "log", "log2", "log10", "log1p", "sin", "cos", "tan", "sinh", "cosh", "tanh", "hypot",
-    "cbrt", "fmod",
+    "exp", "exp2", "expm1", "log", "log2", "log10", "log1p", "sin", "cos", "tan", "sinh", "cosh", "tanh",
+    "hypot", "cbrt", "fmod",
 )  # fmt: skip
 """Functions of NumPy that the C library has by the same name."""
 
