@@ -57,8 +57,8 @@ def _steady(function: Callable[..., Any], arguments: tuple[Any, ...]) -> Any:
     result = function(*arguments)
     if first != (machine.slots[slots:], machine.lines[lines:]):
         raise TraceError(
-            f"{function.__qualname__} does something else at each call: a kernel is made of one call, so random"
-            " numbers, clocks and counters would stay as they were then"
+            f"{function.__qualname__} does something else at each call: a kernel is made of one call, so"
+            " random numbers, clocks and counters would stay as they were then"
         )
     return result
 
@@ -122,8 +122,8 @@ def check_function(name: str, function: Any, arguments: int) -> None:
         raise ParameterError(f"{name}: expected a function of {arguments} arguments, got one of ({given})")
     for line in _imports(code):
         raise ParameterError(
-            f"{name}: `import` in {function.__name__} ({code.co_filename}, line {line}): expected it at the top of"
-            " the file, for a function becomes a kernel by one call"
+            f"{name}: `import` in {function.__name__} ({code.co_filename}, line {line}): expected it at the"
+            " top of the file, for a function becomes a kernel by one call"
         )
 
 

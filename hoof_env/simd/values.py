@@ -35,8 +35,8 @@ class Value:
 
     def __bool__(self) -> bool:
         raise TraceError(
-            f"`if`, `while`, `and`, `or`, `not`, min() or max() of {self.kind}, which is known only when the kernel"
-            " runs: write np.where(condition, yes, no), `&`, `|` and `~` of comparisons in parentheses,"
+            f"`if`, `while`, `and`, `or`, `not`, min() or max() of {self.kind}, which is known only when the"
+            " kernel runs: write np.where(condition, yes, no), `&`, `|` and `~` of comparisons in parentheses,"
             " np.minimum and np.maximum"
         )
 
@@ -50,7 +50,7 @@ class Value:
 
     def _no_number(self) -> NoReturn:
         raise TraceError(
-            f"float(), int() or a function of `math` of {self.kind}, which is known only when the kernel runs:"
+            f"float(), int() or a function of `math` of {self.kind}, which is known when the kernel runs:"
             " write NumPy's function, such as np.exp or np.sqrt"
         )
 
@@ -297,6 +297,9 @@ class Index(Value):
         return self if isinstance(other, int) and other == 1 else self._with("mul", self, other)
 
     __rmul__ = __mul__
+
+    def __neg__(self) -> Any:
+        return self._with("sub", 0, self)
 
     def __mod__(self, other: int) -> Any:
         """Return the rest of a number that is not negative."""
