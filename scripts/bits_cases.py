@@ -30,7 +30,7 @@ LEG, FIXED, HORSE = "hoof_env/HorseLeg-v0", "hoof_env/HorseLegFixed-v0", "hoof_e
 
 OWN_TASK = """
 import hoof_env
-from hoof_env.simd import absolute, maximum, sqrt, where
+from hoof_env.simd import absolute, maximum, minimum, sqrt, where
 from hoof_env.simd.math import root_power
 
 def friction(step, weight):
@@ -41,9 +41,8 @@ def roughness(step, weight):
     return -weight * sqrt(absolute(step.trunk.report.acceleration.imag))
 
 def sway(step, weight):
-    if step.failed:
-        return 0.0
-    return weight * min(abs(step.trunk.report.velocity.imag), 1.0)
+    speed = minimum(absolute(step.trunk.report.velocity.imag), 1.0)
+    return where(step.failed > 0.0, 0.0, weight * speed)
 
 def turf(penetration, rate, inverse_approach_speed, ground):
     spring = ground.stiffness * root_power(penetration, 12) * (1.0 + penetration / 0.05)
@@ -55,7 +54,7 @@ hoof_env.register(
     terms=[
         hoof_env.Term("friction", 0.5, "1/kJ", "power of friction", friction),
         hoof_env.Term("roughness", 0.01, "-", "vertical acceleration", roughness),
-        hoof_env.Term("sway", 0.1, "-", "vertical speed", sway, scalar=True),
+        hoof_env.Term("sway", 0.1, "-", "vertical speed", sway),
     ],
     entries=[
         hoof_env.Entry(
@@ -64,7 +63,7 @@ hoof_env.register(
         ),
         hoof_env.Entry(
             "episode time", "watch", "s", lambda scene: scene.episode.time,
-            hoof_env.Scale("/ 10", lambda x, scene: 0.1 * x), scalar=True,
+            hoof_env.Scale("/ 10", lambda x, scene: 0.1 * x),
         ),
     ],
     contact_law=turf,
