@@ -418,7 +418,9 @@ class Advance:
         is_start: True for a kernel that starts the environments with the result `RESET_REQUESTED`.
     """
 
-    def __init__(self, given: Given, kind: EngineKind, arrangement: Arrangement, is_start: bool = False) -> None:
+    def __init__(
+        self, given: Given, kind: EngineKind, arrangement: Arrangement, is_start: bool = False
+    ) -> None:
         self.kind = kind
         self.arrangement = arrangement
         self.is_start = is_start

@@ -191,7 +191,9 @@ class EngineMotion(EngineMemory):
         """Return the present arrays as arguments of a kernel, a block of columns for each."""
         arrays = self.arrays
         before = self._kernels.get("held arrays", ())
-        if len(before) != len(arrays) or any(one is not other for one, other in zip(before, arrays, strict=True)):
+        if len(before) != len(arrays) or any(
+            one is not other for one, other in zip(before, arrays, strict=True)
+        ):
             named = dict(zip(ARRAYS, arrays, strict=True))
             self._kernels["held"] = [kernel.parameters[0].hold(named, block) for block in self.blocks]
             self._kernels["held arrays"] = arrays

@@ -173,7 +173,6 @@ def gait_parameter_at(leg, k, elapsed):  # type: ignore[no-untyped-def]
     rate = leg.state.gait_rate[k]
     acceleration = leg.gait_acceleration[k]
 
-
     def moved():  # type: ignore[no-untyped-def]
         return (
             value + elapsed * (rate + 0.5 * elapsed * acceleration),
