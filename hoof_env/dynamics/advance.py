@@ -285,7 +285,7 @@ def load(trunk, legs, leg_count, account, memory, leg_memory, form):
         clear_limits(trunk)
     for i in loop(leg_count):
         read_leg(block_at(legs, i), leg_memory(i), form)
-    for k in range(form.account_size):
+    for k in range(form.account.size):
         account[k] = 0.0
 
 
@@ -309,7 +309,7 @@ def store_legs(trunk, legs, leg_count, good, leg_memory, form):
 
 def store_reactions(forces, leg_count, reactions, n, lanes, lanes_are_legs, form):
     """Store the joint reactions of all legs, an array of shape (legs, numbers, columns)."""
-    size = form.reactions_size
+    size = form.reactions.size
     width = reactions.shape[2]
     rows = Matrix(reactions.first, (0, width))
     for i in range(leg_count):
@@ -321,8 +321,8 @@ def store_reactions(forces, leg_count, reactions, n, lanes, lanes_are_legs, form
 
 def read_shapes(shapes, leg_count, constants, lanes, lanes_are_legs, form):
     """Load the constants of all legs, which all environments share."""
-    stride = form.constants_size if lanes_are_legs else 0
-    for k in range(leg_count * form.constants_size):
+    stride = form.constants.size if lanes_are_legs else 0
+    for k in range(leg_count * form.constants.size):
         shapes[k] = read(constants.first, k, stride, lanes)
 
 
@@ -346,9 +346,9 @@ def store_trunk(trunk, account, memory, good, keeps_account, form):  # type: ign
 
     @when(keeps_account)
     def _() -> None:
-        for k in range(form.account_size):
+        for k in range(form.account.size):
             account[k] = account[k] + memory.account[k]
-        store(memory.account, account, form.account_size, good)
+        store(memory.account, account, form.account.size, good)
 
 
 @dataclass(frozen=True)

@@ -9,12 +9,12 @@ the speed and the bits of these.
 
 from __future__ import annotations
 
-from typing import Annotated, Any, NamedTuple
+from typing import Annotated, NamedTuple
 
 from hoof_env.dynamics.leg_constants import PAPER_STRUCTURE, Structure
 from hoof_env.gait import parameter_names
 from hoof_env.leg.profile import Functions, Slopes
-from hoof_env.simd.layout import Block, Layout, Row, Size, Vector
+from hoof_env.simd.layout import AnyLayout, Block, Layout, Row, Size, Vector
 
 MAX_STATE = 1e9
 """Largest angle [rad] and place [m] of a state, where rounding is 6e-7 (6e-10 at 1e6); also the largest rate
@@ -28,8 +28,8 @@ LIMITS = Size("limits", 0)
 
 
 class Features(NamedTuple):
-    """Options of an engine beyond the paper's rigid leg. They are constants when its kernels are compiled: an
-    option that is off costs neither time nor memory.
+    """Options of an engine beyond the paper's rigid leg. They are constants of its kernels: an option that is
+    off costs neither time nor memory.
 
     Attributes:
         harmonics: order of the swing law, 1 to `gait.MOST_HARMONICS`.
@@ -52,15 +52,16 @@ class Features(NamedTuple):
         """Number of gait parameters of a leg."""
         return 2 + 2 * self.harmonics
 
-    def of(self, layout: Any) -> Any:
+    def of(self, layout: type[AnyLayout]) -> type[AnyLayout]:
         """Return a layout of this module in the sizes of engines with these features."""
         # springs: normal and tangential; limits: lowest and highest pitch and height, and the clearance
-        return layout.sized(
+        sized: type[AnyLayout] = layout.sized(
             gait=self.gait_size,
             spring=2 * self.springs,
             limited=int(self.has_limits),
             limits=5 * self.has_limits,
         )
+        return sized
 
 
 PLAIN = Features()

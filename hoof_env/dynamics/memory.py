@@ -135,10 +135,10 @@ def new_memory(scene: Mechanics, num_envs: int, columns: int, reacts: bool) -> M
     """Allocate the memory of an engine; states are NaN until reset."""
     legs = len(scene.limbs)
     form = engine_layout(scene.features)
-    constants = np.zeros((legs, form.constants_size))
+    constants = np.zeros((legs, form.constants.size))
     if reacts or scene.features.has_limits:
         constants = np.array([leg_constants(limb.geometry) for limb in scene.limbs])
-    reactions = np.zeros((legs, form.reactions_size, columns if reacts else 0))
+    reactions = np.zeros((legs, form.reactions.size, columns if reacts else 0))
     data = copy_of(np.zeros((form.trunk_rows + legs * form.leg_rows, columns)))
     whole = memory_of(data, columns, constants, reactions, scene.features)
     whole.trunk[:] = np.nan

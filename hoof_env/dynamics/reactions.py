@@ -36,10 +36,11 @@ class Reactions(Layout):
     hip: Row  # moment on the leg's frame by the trunk, about O [N m]
 
 
-def reactions_layout(structure: Structure) -> Any:
+def reactions_layout(structure: Structure) -> type[Reactions]:
     """Return the layout of the reactions of legs with a structure."""
-    mechanism = structure.mechanism
-    return Reactions.sized(joint_rows=2 * len(mechanism.joints), welds=len(mechanism.welds))
+    joints, welds = structure.mechanism.joints, structure.mechanism.welds
+    sized: type[Reactions] = Reactions.sized(joint_rows=2 * len(joints), welds=len(welds))
+    return sized
 
 
 # -- motion ------------------------------------------------------------------------------------
