@@ -12,14 +12,15 @@ from hoof_env.dynamics.layout import (
     LegMemory,
     LegRows,
     LegState,
+    Reactions,
     Strides,
     StrideSums,
     TrunkMemory,
     TrunkRows,
     TrunkState,
+    reactions_layout,
 )
 from hoof_env.dynamics.leg_constants import LegConstants, constants_layout
-from hoof_env.dynamics.reactions import Reactions, reactions_layout
 
 
 class EngineLayout(NamedTuple):

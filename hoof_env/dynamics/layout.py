@@ -26,6 +26,10 @@ SPRING = Size("spring", 0)
 LIMITED = Size("limited", 0)
 LIMITS = Size("limits", 0)
 
+# and with those of the paper's structure
+JOINT_ROWS = Size("joint_rows", 2 * len(PAPER_STRUCTURE.mechanism.joints))
+WELDS = Size("welds", len(PAPER_STRUCTURE.mechanism.welds))
+
 
 class Features(NamedTuple):
     """Options of an engine beyond the paper's rigid leg. They are constants of its kernels: an option that is
@@ -392,6 +396,22 @@ class LegMemory(Layout):
     command: Annotated[Block, GAIT]
     report: LegReport
     settings: LegSettings
+
+
+class Reactions(Layout):
+    """Joint forces and moments of a leg."""
+
+    joints: Annotated[Block, JOINT_ROWS]  # force of each joint, as in `Mechanism.joints`: x and y [N]
+    lock: Annotated[Block, WELDS]  # moment on the first body of each weld by the second [N m]
+    driver: Row  # moment on the crank by the leg's frame [N m]
+    hip: Row  # moment on the leg's frame by the trunk, about O [N m]
+
+
+def reactions_layout(structure: Structure) -> type[Reactions]:
+    """Return the layout of the reactions of legs with a structure."""
+    joints, welds = structure.mechanism.joints, structure.mechanism.welds
+    sized: type[Reactions] = Reactions.sized(joint_rows=2 * len(joints), welds=len(welds))
+    return sized
 
 
 # Names in records, states and infos

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from hoof_env.constants import GRAVITY
 from hoof_env.dynamics import layout
-from hoof_env.dynamics.advance import LANES, MODEL
+from hoof_env.dynamics.advance import LANES
 from hoof_env.dynamics.form import engine_layout
 from hoof_env.dynamics.layout import (
     MAX_STATE,
@@ -23,6 +23,7 @@ from hoof_env.dynamics.layout import (
     TrunkState,
 )
 from hoof_env.dynamics.leg_constants import PAPER_STRUCTURE, leg_constants, structure_of
+from hoof_env.dynamics.model import MODEL
 from hoof_env.dynamics.parts import (
     FREE,
     RAIL,
