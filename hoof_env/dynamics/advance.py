@@ -108,9 +108,7 @@ def find_result(
         total = lane_sum(full_like(trunk, 0.0), total)
         stuck = lane_sum(full_like(trunk, 0.0), stuck)
     failure = where(stuck > 0.0, DEAD_POINT, NOT_FINITE)
-    ending = where(trunk.fallen > 0.0, FALLEN, OK)
-    if form.has_limits:
-        ending = where(trunk.fallen > 0.0, FALLEN, trunk.violated_limit[0])
+    ending = where(trunk.fallen > 0.0, FALLEN, trunk.violated_limit[0] if form.has_limits else OK)
     # total - total is 0 if total is finite, else NaN
     return where((total - total != 0.0) | (stuck > 0.0), failure, ending)
 
@@ -282,9 +280,7 @@ class Advance:
     def _look(self, turn: Whole, h: Lanes | float, steps: Whole) -> None:
         """Do what belongs to a whole step: remember contacts, count strides, find reactions, check limits."""
         trunk, model = self.trunk, self.model
-        mechanism = self.kind.features.structure.mechanism
-        # counted from the end, so that limits are always checked at the last step
-        left = steps * model.stages - turn
+        structure = self.kind.features.structure
         for i in loop(self.leg_count):
             leg = block_at(self.legs, i)
             remember_contacts(leg)
@@ -292,14 +288,17 @@ class Advance:
                 when(turn > 0)(partial(count_stride, trunk, leg, model.form, h))
             if self.kind.reacts:
                 constants, forces = block_at(self.constants, i), block_at(self.forces, i)
-                find = partial(find_reactions, self.kind.features.structure, trunk, leg, constants, forces)
+                find = partial(find_reactions, structure, trunk, leg, constants, forces)
                 when((turn > 0) | (steps == 0))(find)
         if model.form.has_limits:
+            # counted from the end, so that limits are always checked at the last step
+            left = steps * model.stages - turn
 
             @when((turn > 0) & (left % (CHECK_EVERY * model.stages) == 0))
             def _() -> None:
                 for i in loop(self.leg_count):
-                    check_joints(mechanism, trunk, block_at(self.legs, i), block_at(self.constants, i), model)
+                    leg, constants = block_at(self.legs, i), block_at(self.constants, i)
+                    check_joints(structure.mechanism, trunk, leg, constants, model)
                 check_trunk(trunk, model)
 
     def _move(self, stage: Cell, elapsed: Cell, h: Lanes | float, keeps_account: Truth) -> None:
