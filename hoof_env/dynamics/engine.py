@@ -90,7 +90,7 @@ class TrunkEngine(EngineMotion):
 
     Raises:
         ParameterError: a value is out of range or of the wrong type; or, at the first reset, the contact law
-            cannot be compiled.
+            cannot be part of a kernel.
         GeometryError: a leg has no place for its links at any crank angle.
 
     Warns:

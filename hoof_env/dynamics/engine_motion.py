@@ -166,7 +166,7 @@ class EngineMotion(EngineMemory):
             raise user_error("contact_law", error) from None
 
     def compile(self) -> None:
-        """Compile or load the kernel that starts environments.
+        """Trace and compile the kernel that starts environments, or load it.
 
         Raises:
             ParameterError: the law of contact cannot be part of a kernel.
