@@ -1,7 +1,7 @@
 """Numbers side by side: values of kernels that work on many environments, or many legs, in one
 instruction."""
 
-from hoof_env.simd.control import Cell, cond, loop, one_of, when
+from hoof_env.simd.control import Cell, cond, loop, one_of, rolled, when
 from hoof_env.simd.memory import (
     Matrix,
     Pointer,
@@ -78,6 +78,7 @@ __all__ = [
     "perpendicular",
     "quarter_turns",
     "read",
+    "rolled",
     "rounded",
     "sqrt",
     "steady",
