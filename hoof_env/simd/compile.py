@@ -45,14 +45,14 @@ class CompilerError(HoofEnvError):
     """LLVM refused a kernel, which is an error of this package."""
 
 
-def _host() -> tuple[str, str]:
+def host() -> tuple[str, str]:
     """Return LLVM's names of the processor and its features."""
     given = os.environ.get(PROCESSOR)
     return (given, "") if given else (llvm.get_host_cpu_name(), llvm.get_host_cpu_features().flatten())
 
 
 def _new_target() -> Any:
-    cpu, features = _host()
+    cpu, features = host()
     target = llvm.Target.from_triple(llvm.get_process_triple())
     return target.create_target_machine(
         cpu=cpu, features=features, opt=LEVEL, reloc="pic", codemodel="small", jit=True
@@ -60,7 +60,7 @@ def _new_target() -> Any:
 
 
 @cache
-def _target() -> Any:
+def target() -> Any:
     """Return LLVM's machine for this processor, started at the first call."""
     llvm.initialize_native_target()
     llvm.initialize_native_asmprinter()
@@ -71,33 +71,36 @@ def _target() -> Any:
 def _identity() -> str:
     """Return all that machine code depends on besides its text."""
     version = ".".join(map(str, llvm.llvm_version_info))
-    return " ".join((llvm.get_process_triple(), *_host(), version, str(LEVEL)))
+    return " ".join((llvm.get_process_triple(), *host(), version, str(LEVEL)))
 
 
-def compiled(text: str) -> bytes:
-    """Return the object of a module.
+def optimised(text: str) -> Any:
+    """Return the module of a text for this processor, after LLVM's passes.
 
     Raises:
         CompilerError: LLVM refuses the text.
     """
-    target = _target()
+    machine = target()
     try:
         module = llvm.parse_assembly(text)
         module.verify()
-        module.triple, module.data_layout = target.triple, str(target.target_data)
-        tuning = llvm.create_pipeline_tuning_options(speed_level=LEVEL)
-        tuning.loop_vectorization = tuning.slp_vectorization = False
-        passes = llvm.create_pass_builder(target, tuning)
-        passes.getModulePassManager().run(module, passes)
-        return bytes(target.emit_object(module))
     except RuntimeError as error:
         words = str(error).strip().splitlines()
         hint = ""
         if "dominate" in str(error):
-            hint = (
-                "; a value that was made inside `when`, `cond` or `loop` is used outside: keep it in a `Cell`"
-            )
+            hint = "; a value that was made inside `when`, `cond` or `loop` is used outside: keep it in a `Cell`"
         raise CompilerError(f"LLVM refuses a kernel{hint}: {words[0] if words else error!r}") from error
+    module.triple, module.data_layout = machine.triple, str(machine.target_data)
+    tuning = llvm.create_pipeline_tuning_options(speed_level=LEVEL)
+    tuning.loop_vectorization = tuning.slp_vectorization = False
+    passes = llvm.create_pass_builder(machine, tuning)
+    passes.getModulePassManager().run(module, passes)
+    return module
+
+
+def compiled(text: str) -> bytes:
+    """Return the object of a module, machine code of this processor."""
+    return bytes(target().emit_object(optimised(text)))
 
 
 class Code:
@@ -131,7 +134,7 @@ if hasattr(os, "register_at_fork"):  # another thread may have it when a process
 def code_of(text: str, name: str) -> Code:
     """Return the machine code of a module: loaded before, read from a file, or compiled."""
     with _LOCK:
-        _target()
+        target()
         digest = hashlib.sha256(f"{_identity()}\n{text}".encode()).hexdigest()
         code = _LOADED.get(digest)
         if code is None:

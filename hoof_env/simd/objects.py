@@ -46,7 +46,7 @@ def read(name: str) -> bytes | None:
     """Return the content of a file; None if there is none that can be trusted."""
     path = folder() / name
     try:
-        if not _is_own(path):
+        if not _are_own(path.parent, path):
             return None
         found = path.read_bytes()
     except OSError:
@@ -66,7 +66,7 @@ def write(name: str, content: bytes) -> None:
     path = folder() / name
     try:
         path.parent.mkdir(parents=True, exist_ok=True, mode=0o700)
-        if not _is_own(path.parent):
+        if not _are_own(path.parent):
             return
         with tempfile.NamedTemporaryFile(dir=path.parent, delete=False) as new:
             new.write(hashlib.sha256(content).digest() + content)
@@ -79,11 +79,11 @@ def write(name: str, content: bytes) -> None:
         return  # a read-only or full disk: each process compiles for itself
 
 
-def _is_own(path: Path) -> bool:
-    """Return True if nobody but this user can change a file, and those beside it."""
+def _are_own(*places: Path) -> bool:
+    """Return True if nobody but this user can change a folder and a file in it."""
     if not hasattr(os, "geteuid"):
         return True  # the folders of Windows' users are their own
-    for place in {path, path.parent}:
+    for place in places:
         try:
             status = place.stat()
         except FileNotFoundError:
