@@ -1,5 +1,5 @@
-"""What `change_settings`, curricula, `randomize` and reset options change is data: kernels are traced for kinds alone,
-such as a terrain or none, and 200 changes trace nothing more and keep memory level."""
+"""What `change_settings`, curricula, `randomize` and reset options change is data: kernels are traced for
+kinds alone, such as a terrain or none, and 200 changes trace nothing more and keep memory level."""
 
 import resource
 
