@@ -199,7 +199,9 @@ class Arrays:
         numbers = np.zeros(self.begin + 2, np.int64)
         kept = {}
         for name, kind in self.types.items():
-            array = kept[name] = arrays[name]
+            if not isinstance(array := arrays.get(name), np.ndarray):
+                raise TypeError(f"{name}: expected an array, got {array!r}")
+            kept[name] = array
             dtype = kind.kind if isinstance(kind, RecordType) else np.dtype(kind)
             if array.dtype != dtype or not array.flags.c_contiguous or array.ndim > AXES:
                 raise TypeError(
@@ -396,11 +398,6 @@ def new_rows(layout: Any, lanes: int, count: int = 1) -> Any:
     if CURRENT.machine.runs_now:
         return Rows([None] * size, lanes, layout)
     return Rows(CURRENT.machine.slot("double", size * max(lanes, 1)), lanes, layout)
-
-
-def rows_of(values: list[Any], count: int, layout: Any) -> Any:
-    """Return a list of arrays, one for each row, as rows of a machine that computes at once."""
-    return Rows(values, count, layout)
 
 
 def columns(matrix: Matrix, lanes: int, layout: Any, column: Whole, row: Whole = 0, stride: Whole = 1) -> Any:

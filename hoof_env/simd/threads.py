@@ -14,6 +14,7 @@ from itertools import pairwise, starmap
 from typing import Any
 
 from hoof_env.errors import ParameterError, count
+from hoof_env.simd.compile import is_on_numpy
 
 MOST_THREADS = 1024
 """Largest number of threads."""
@@ -72,7 +73,7 @@ def run_together(kernel: Any, calls: Sequence[tuple[Any, ...]], num_threads: int
     at Ctrl-C.
     """
     # a kernel that is not compiled yet is compiled by this thread
-    if num_threads == 1 or len(calls) == 1 or kernel.call is None:
+    if num_threads == 1 or len(calls) == 1 or kernel.call is None or is_on_numpy():
         return [kernel(*call) for call in calls]
     # `list` and `starmap` take a call and make it without bytecode between, so that no other thread takes it
     waiting = starmap(kernel, iter(calls))
