@@ -101,7 +101,7 @@ def test_what_is_missing_or_wrong_is_one_line_before_anything_is_touched(
 
 def test_a_wrong_word_is_refused(setup, installs, capsys):
     assert setup.main("--help") == 1
-    assert "expected demo or all, got '--help'" in capsys.readouterr().err
+    assert "expected demo or all or dependencies, got '--help'" in capsys.readouterr().err
     assert not installs
 
 
@@ -385,6 +385,19 @@ def test_what_the_tests_need_is_added_to_the_demos(setup, installs):
     assert [setup.main(purpose) for purpose in ("demo", "demo", "all", "demo", "all")] == [0] * 5
     assert installs == ["demo anew", "all more"]
     assert set(setup.requirements("demo")) < set(setup.requirements("all"))
+
+
+def test_dependencies_alone_are_installed_without_the_checkout(setup, without_torch, monkeypatch, capsys):
+    monkeypatch.setenv("INSTALLER", "pip")
+    project = setup.ROOT / "pyproject.toml"
+    for _ in range(2):  # nothing is done twice
+        assert setup.main("dependencies") == 0
+        assert sorted(without_torch.done) == sorted(
+            tomllib.loads(project.read_text())["project"]["dependencies"]
+        )
+    project.write_text('[project]\ndependencies = ["numpy", "torch>=2.5"]\n')
+    assert setup.main("dependencies") == 1
+    assert "PyTorch cannot be had" in capsys.readouterr().err
 
 
 def test_interrupted_setup_is_made_anew(setup, installs, monkeypatch, capsys):

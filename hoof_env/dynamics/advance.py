@@ -45,6 +45,7 @@ from hoof_env.simd import (
     new_rows,
     one_of,
     read,
+    rolled,
     when,
     where,
 )
@@ -191,17 +192,19 @@ def read_leg(leg, memory, form):  # type: ignore[no-untyped-def]
 def find_result(trunk, legs, leg_count, lanes_are_legs, form):  # type: ignore[no-untyped-def]
     """Return how the environments ended, numbers of `parts.Result`. A number too large to be squared counts
     as not finite."""
-    total = full_like(trunk, 0.0)
+    of_trunk = full_like(trunk, 0.0)
     stuck = trunk.at_dead_point
     for k in range(form.trunk_state):
-        total = total + trunk.state[k] * trunk.state[k]
-    for i in range(leg_count):
+        of_trunk = of_trunk + trunk.state[k] * trunk.state[k]
+    of_all = Cell(of_trunk)
+    for i in loop(leg_count):
         leg = block_at(legs, i)
         # a sum for each leg: in one long sum each addition would wait for the one before
         leg_total = leg.theta_acceleration * leg.theta_acceleration
         for k in range(form.leg_state):
             leg_total = leg_total + leg.state[k] * leg.state[k]
-        total = total + leg_total
+        of_all.value = of_all.value + leg_total
+    total = of_all.value
     if lanes_are_legs:
         total = lane_sum(full_like(trunk, 0.0), total)
         stuck = lane_sum(full_like(trunk, 0.0), stuck)
@@ -298,7 +301,7 @@ def start_motion(trunk, legs, leg_count, model, starts):  # type: ignore[no-unty
 
 def store_legs(trunk, legs, leg_count, good, leg_memory, form):
     """Store reports, and where `good` holds what changes of the legs."""
-    for i in range(leg_count):
+    for i in loop(leg_count):
         leg = block_at(legs, i)
         memory = leg_memory(i)
         report_leg(trunk, leg, memory.report, form)
@@ -312,7 +315,7 @@ def store_reactions(forces, leg_count, reactions, n, lanes, lanes_are_legs, form
     size = form.reactions_size
     width = reactions.shape[2]
     rows = Matrix(reactions.first, (0, width))
-    for i in range(leg_count):
+    for i in loop(leg_count):
         out = columns(rows, lanes, form.reactions, n, i * size, size * width if lanes_are_legs else 1)
         leg_forces = block_at(forces, i)
         for k in range(size):
@@ -425,12 +428,13 @@ class Advance:
         self.form = form = engine_layout(kind.features)
         lanes = arrangement.lanes
         lanes_are_legs = arrangement.lanes_are_legs
-        self.leg_count = 1 if lanes_are_legs else kind.legs
+        legs = 1 if lanes_are_legs else kind.legs
+        self.leg_count = legs if legs == 1 else rolled(legs)
         self.trunk = new_rows(form.trunk, lanes)
-        self.legs = new_rows(form.leg, lanes, self.leg_count)
+        self.legs = new_rows(form.leg, lanes, legs)
         self.account = new_rows(form.account, lanes)
-        self.shapes = new_rows(form.constants, lanes, self.leg_count)
-        self.forces = new_rows(form.reactions, lanes, self.leg_count)
+        self.shapes = new_rows(form.constants, lanes, legs)
+        self.forces = new_rows(form.reactions, lanes, legs)
         self.data = given.data
         self.reactions = given.reactions
         law = law_of(kind.contact_law)
@@ -438,7 +442,7 @@ class Advance:
         structure = kind.features.structure
         self.joints = Joints(reactions_of(structure), joint_check_of(structure))
         if kind.reacts or form.has_limits:
-            read_shapes(self.shapes, self.leg_count, given.constants, lanes, lanes_are_legs, form)
+            read_shapes(self.shapes, legs, given.constants, lanes, lanes_are_legs, form)
 
     def __call__(self, n: Whole, h: Number, steps: Whole, keeps_account: Truth) -> None:
         """Advance environment n and, side by side, its neighbours by `steps` of `h` [s]."""

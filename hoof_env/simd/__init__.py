@@ -2,7 +2,7 @@
 instruction."""
 
 from hoof_env.simd.compile import on_numpy
-from hoof_env.simd.control import Cell, cond, loop, one_of, when
+from hoof_env.simd.control import Cell, cond, loop, one_of, rolled, when
 from hoof_env.simd.memory import (
     Matrix,
     Pointer,
@@ -80,6 +80,7 @@ __all__ = [
     "perpendicular",
     "quarter_turns",
     "read",
+    "rolled",
     "rounded",
     "sqrt",
     "steady",

@@ -117,15 +117,22 @@ def loop(begin: Whole, end: Whole | None = None, step: Whole = 1) -> Iterator[An
     machine.begin(after)
 
 
+def rolled(count: int) -> Whole:
+    """Return a count whose `loop` is traced once, not turn by turn: a body of many instructions is short then."""
+    return count if CURRENT.machine.runs_now else Index(str(count))
+
+
 class Cell:
-    """Variable of a kernel that changes inside `loop` or `when`: an ordinary number, or a whole one if it
+    """Variable of a kernel that changes inside `loop` or `when`: lanes, an ordinary number, or a whole one if it
     begins as one."""
 
     def __init__(self, value: Any) -> None:
-        self._kind = "i64" if isinstance(value, (int, Index)) else "double"
+        is_whole = isinstance(value, (int, Index))
+        self._kind = "i64" if is_whole else "double"
+        self._n = getattr(value, "n", 0)
         self._runs_now = CURRENT.machine.runs_now
         if not self._runs_now:
-            self._slot = CURRENT.machine.slot(self._kind)
+            self._slot = CURRENT.machine.slot(wide(self._kind, self._n))
         self.value = value
 
     @property
@@ -133,16 +140,16 @@ class Cell:
         """The present value."""
         if self._runs_now:
             return self._value
-        x = CURRENT.machine.load(self._slot, self._kind)
-        return Lanes(x, 0) if self._kind == "double" else Index(x)
+        x = CURRENT.machine.load(self._slot, self._kind, self._n)
+        return Lanes(x, self._n) if self._kind == "double" else Index(x)
 
     @value.setter
     def value(self, value: Any) -> None:
         if self._runs_now:
             self._value = value
             return
-        x = full(value, 0).x if self._kind == "double" else word(value)
-        CURRENT.machine.store(self._slot, x, self._kind)
+        x = full(value, self._n).x if self._kind == "double" else word(value)
+        CURRENT.machine.store(self._slot, x, self._kind, self._n)
 
 
 def one_of(values: Any, k: Whole) -> Any:
