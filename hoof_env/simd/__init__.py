@@ -1,6 +1,7 @@
 """Numbers side by side: values of kernels that work on many environments, or many legs, in one
 instruction."""
 
+from hoof_env.simd.compile import on_numpy
 from hoof_env.simd.control import Cell, cond, loop, one_of, rolled, when
 from hoof_env.simd.memory import (
     Matrix,
@@ -74,6 +75,7 @@ __all__ = [
     "maximum",
     "minimum",
     "new_rows",
+    "on_numpy",
     "one_of",
     "perpendicular",
     "quarter_turns",

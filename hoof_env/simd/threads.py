@@ -14,7 +14,7 @@ from itertools import pairwise, starmap
 from typing import Any
 
 from hoof_env.errors import ParameterError, count
-from hoof_env.simd.compile import Kernel
+from hoof_env.simd.compile import Kernel, is_on_numpy
 
 MOST_THREADS = 1024
 """Largest number of threads."""
@@ -72,11 +72,11 @@ def run_together(kernel: Any, calls: Sequence[tuple[Any, ...]], num_threads: int
     The calling thread is one of the threads. All calls have ended when this returns, and when it raises, as
     at Ctrl-C.
     """
+    if num_threads == 1 or len(calls) == 1 or is_on_numpy():
+        return [kernel(*call) for call in calls]
     # one thread compiles a kernel, not each of them
     if isinstance(kernel, Kernel) and kernel.call is None:
         kernel.compile()
-    if num_threads == 1 or len(calls) == 1:
-        return [kernel(*call) for call in calls]
     # `list` and `starmap` take a call and make it without bytecode between, so that no other thread takes it
     waiting = starmap(kernel, iter(calls))
     with _interrupts_wait():
