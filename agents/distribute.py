@@ -51,7 +51,7 @@ class Cluster:
     """of the cluster that is made where no address is given; otherwise all"""
     runtime_env: tuple[str, ...] = ()
     """more for Ray's runtime_env on a cluster: key=value ..., or one JSON object, as
-    '{"pip": ["numba", "stable-baselines3"]}'"""
+    '{"pip": ["gymnasium", "stable-baselines3"]}'"""
     retries: int = 3
     """of each trial after its worker died or failed"""
     out: str = "runs/distribute"

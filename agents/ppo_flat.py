@@ -5,7 +5,7 @@
 
 Read `FlatPPO` first: it plays a rollout, estimates the advantages of its actions, improves the networks. It
 is Stable-Baselines3's PPO with networks of tanh and without what they do not need; training loop, buffer,
-policy and files are that library's. The kernels of networks and gradient are in agents/perceptrons.py.
+policy and files are that library's. Networks and gradient are in agents/perceptrons.py.
 
 Three things differ. Rewards are scaled by all returns up to the end of the rollout, not of the step. Among
 the `locals` of a step a callback finds `new_obs`, `rewards`, `dones`, `infos` and `clipped_actions`, but no
@@ -14,8 +14,8 @@ values. Of the losses those of policy and value are logged.
 
 from __future__ import annotations
 
-import copy
 from collections.abc import Iterator
+from itertools import pairwise
 from typing import Any, ClassVar
 
 import numpy as np
@@ -28,8 +28,7 @@ from stable_baselines3.common.policies import ActorCriticPolicy
 from stable_baselines3.common.vec_env import VecNormalize
 from torch import nn
 
-from agents.perceptrons import ACTIONS, ADVANTAGE, CHUNK, Floats, Weights, compiled_gradient
-from hoof_env._collector import paused
+from agents.perceptrons import ADVANTAGE, CHUNK, Floats, Loss, Part, Weights
 from hoof_env.errors import ParameterError
 from hoof_env.policies.delayed_adam import DelayedAdam
 from hoof_env.simd.threads import check_threads, limit_threads, run_together
@@ -174,29 +173,19 @@ class FlatPPO(OnPolicyAlgorithm):
     def _setup_model(self) -> None:
         super()._setup_model()
         self.weights = Weights.of(self.policy)
+        self.gradient = Gradient(self)
         if self.moments is None:  # else it was loaded
             self.moments = np.zeros((2, self.weights.vector.size), np.float32)
 
     def _excluded_save_params(self) -> list[str]:
-        return [*super()._excluded_save_params(), "weights"]
+        return [*super()._excluded_save_params(), "weights", "gradient"]
 
     def _setup_learn(self, total_timesteps: int, callback: Any = None, *args: Any, **kwargs: Any) -> Any:
-        self._load_kernels()
         before = self._last_obs
         setup = super()._setup_learn(total_timesteps, callback, *args, **kwargs)
         if self._last_obs is not before:  # the environments were reset
             self.scale.restart()
         return setup
-
-    @paused()
-    def _load_kernels(self) -> None:
-        """Have the kernels compiled, or loaded, before a training's clock starts; nothing is learned."""
-        inputs = self.weights.actor.matrices[0].shape[1]
-        observations = np.zeros((2, inputs), np.float32)
-        steps = np.zeros((2, ACTIONS + self.weights.log_std.size), np.float32)
-        self.weights.actor(observations)
-        self.weights.critic(observations)
-        Gradient(self, 0.2).compute(observations, steps, np.arange(2))
 
     def collect_rollouts(
         self, env: Any, callback: BaseCallback, rollout_buffer: Any, n_rollout_steps: int
@@ -261,12 +250,11 @@ class FlatPPO(OnPolicyAlgorithm):
         observations = buffer.observations.reshape(len(steps), -1)
         rate = self.lr_schedule(progress)
         clip_range = self.clip_range(progress) if callable(self.clip_range) else self.clip_range
-        gradient = Gradient(self, clip_range)
         losses = []
         for _ in range(self.n_epochs):
             for chosen in self.batches(len(steps)):
-                losses.append(gradient.compute(observations, steps, chosen))
-                self.descend(gradient.vector, rate)
+                losses.append(self.gradient.compute(observations, steps, chosen, clip_range))
+                self.descend(self.gradient.vector, rate)
         policy_loss, value_loss = np.mean(losses, 0)
         self.logger.record("train/policy_gradient_loss", float(policy_loss))
         self.logger.record("train/value_loss", float(value_loss))
@@ -295,52 +283,46 @@ class FlatPPO(OnPolicyAlgorithm):
 
 
 class Gradient:
-    """Gradient of the loss over a batch.
+    """Gradient of the loss over a batch; its arrays stay from one to the next.
 
     Attributes:
         vector: the gradient, in the order of the weights' vector.
     """
 
-    def __init__(self, model: FlatPPO, clip_range: float) -> None:
+    def __init__(self, model: FlatPPO) -> None:
         self.model = model
-        self.clip_range = clip_range
-        self.parts: dict[tuple[int, int], tuple[Any, ...]] = {}  # rooms, by chunk and its size
+        self.parts: dict[tuple[int, int], Part] = {}  # by chunk and its size
 
-    def compute(self, observations: Floats, steps: Floats, chosen: NDArray[np.int64]) -> Floats:
+    def compute(
+        self, observations: Floats, steps: Floats, chosen: NDArray[np.int64], clip_range: float
+    ) -> tuple[float, ...]:
         """Compute the gradient for the chosen rows; return the losses of policy and value."""
         model = self.model
-        log_std = self.model.weights.log_std
+        count = len(chosen)
         advantages = steps[chosen, ADVANTAGE]
-        scale = np.array([advantages.mean(), advantages.std(ddof=1) + 1e-8], np.float32)
-        numbers = (self.clip_range, model.vf_coef, model.ent_coef, len(chosen))
-        constants = [np.float32(number) for number in numbers]
+        mean = np.add.reduce(advantages) / count
+        advantages -= mean
+        deviation = np.sqrt(np.dot(advantages, advantages) / (count - 1)) + 1e-8
+        numbers = (clip_range, model.vf_coef, model.ent_coef, mean, deviation)
+        loss = Loss(count, *map(float, numbers))
         # The number of chunks depends on the batch alone, never on threads
-        chunks = np.array_split(chosen, -(-len(chosen) // CHUNK))
-        parts = [self.part(k, len(rows)) for k, rows in enumerate(chunks)]
+        number = -(-count // CHUNK)
+        ends = [count * k // number for k in range(number + 1)]
+        parts = [self.part(k, end - begin) for k, (begin, end) in enumerate(pairwise(ends))]
         calls = [
-            (observations, steps, rows, scale, *room, (log_std, derivatives.log_std), *constants, losses)
-            for rows, (derivatives, room, losses) in zip(chunks, parts, strict=True)
+            (part, observations, steps, chosen[begin:end], loss)
+            for part, (begin, end) in zip(parts, pairwise(ends), strict=True)
         ]
         threads = limit_threads(model.num_threads or torch.get_num_threads())
-        run_together(compiled_gradient, calls, threads)
+        run_together(Part.compute, calls, threads)
         # In the order of the chunks, whichever thread was first: the same bits on any number of threads
-        self.vector = np.sum([derivatives.vector for derivatives, _, _ in parts], 0)
-        return np.sum([losses for *_, losses in parts], 0)
+        self.vector = parts[0].vector
+        for part in parts[1:]:
+            self.vector += part.vector
+        return tuple(map(sum, zip(*(part.losses for part in parts), strict=True)))
 
-    def part(self, number: int, rows: int) -> tuple[Any, ...]:
-        """Return the arrays of a chunk of a batch: derivatives, intermediate results, losses."""
+    def part(self, number: int, rows: int) -> Part:
+        """Return the room for a chunk of a batch."""
         if (number, rows) not in self.parts:
-            model = self.model
-            # A copy of the policy has the layout of its derivatives
-            derivatives = Weights.of(copy.deepcopy(self.model.policy))
-            widths = model.weights.actor.matrices[0].shape[1], ACTIONS + model.weights.log_std.size
-            room: list[Any] = [np.zeros((rows, width), np.float32) for width in widths]
-            room += [
-                (net.matrices, net.biases, net.room(rows), net.room(rows), by.matrices, by.biases)
-                for net, by in (
-                    (model.weights.actor, derivatives.actor),
-                    (model.weights.critic, derivatives.critic),
-                )
-            ]
-            self.parts[number, rows] = derivatives, room, np.zeros(2, np.float32)
+            self.parts[number, rows] = Part(self.model.policy, self.model.weights, rows)
         return self.parts[number, rows]

@@ -209,7 +209,7 @@ def trained(pending: Sequence[Job], workers: int) -> Iterator[list[dict[str, Any
     if workers == 1:
         yield from map(train, pending)
         return
-    # A fresh process for each training: torch and numba keep nothing of the last one
+    # A fresh process for each training, which keeps nothing of the last one: kernels, caches of torch
     with multiprocessing.get_context("spawn").Pool(workers, maxtasksperchild=1) as pool:
         yield from pool.imap_unordered(train, pending)
 

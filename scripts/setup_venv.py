@@ -1,7 +1,8 @@
 """Make .venv and install into it what `make demo` or `make test` needs; `make` runs this before either.
 
-    python scripts/setup_venv.py demo     what the demo needs
-    python scripts/setup_venv.py          all that a checkout can use
+    python scripts/setup_venv.py demo           what the demo needs
+    python scripts/setup_venv.py                all that a checkout can use
+    python scripts/setup_venv.py dependencies   what the package needs, without the package itself
 
 One line for each step, and one line that says why when something is missing. Where PyTorch has no wheel for
 this Python, the demo stops; for the rest all else is installed, and `make test` leaves out what needs it.
@@ -29,6 +30,8 @@ ROOT = Path(__file__).resolve().parent.parent
 OLDEST, NEWEST = (3, 11), (3, 14)
 EXTRAS = {"demo": ("train", "render", "video", "plot")}
 EXTRAS["all"] = (*EXTRAS["demo"], "export", "view", "identify", "tune", "onnx", "docs", "dev")
+BARE = "dependencies"  # nothing is built or installed of the checkout; scripts/environments.py asks for it
+EXTRAS[BARE] = ()
 TOOLS = {
     "pip": ("pip", "install", "--disable-pip-version-check", "--no-input"),
     "uv": ("uv", "pip", "install", "--python", ".venv/bin/python"),
@@ -200,7 +203,8 @@ def install(purpose: str, anew: bool) -> str:
     tool = installer()
     asked, done = requirements(purpose), purpose
     try:
-        install_torch(tool)
+        if any(map(needs_torch, asked)):
+            install_torch(tool)
     except NoWheel as missing:
         if purpose != "all":
             if not anew:  # nothing has changed: what was installed before still serves
@@ -210,7 +214,8 @@ def install(purpose: str, anew: bool) -> str:
         print(f"  left out: {', '.join(NEED_TORCH)}; the tests that need them will say so", flush=True)
         asked, done = [one for one in asked if not needs_torch(one)], NO_TORCH
     packages(tool, "all other packages", *ONLY_WHEELS, *asked)
-    packages(tool, "this checkout", "--no-deps", "--no-build-isolation", "--editable", ".")
+    if purpose != BARE:
+        packages(tool, "this checkout", "--no-deps", "--no-build-isolation", "--editable", ".")
     return done
 
 
@@ -262,13 +267,14 @@ def torch_from_the_usual_index(tool: str, title: str) -> None:
 
 
 def requirements(purpose: str):
-    """What pyproject.toml asks for, to build this checkout too."""
+    """What pyproject.toml asks for, to build this checkout too, where it is to be installed."""
     import tomllib
 
     asked = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
     project = asked["project"]
     extras = [project["optional-dependencies"][extra] for extra in EXTRAS[purpose]]
-    return sum(extras, asked["build-system"]["requires"] + project["dependencies"])
+    to_build = [] if purpose == BARE else asked["build-system"]["requires"]
+    return sum(extras, to_build + project["dependencies"])
 
 
 def packages(tool: str, title: str, *arguments: str, **environment: str) -> None:

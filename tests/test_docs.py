@@ -127,7 +127,14 @@ def test_the_rooms_of_contributing_are_those_of_the_house():
 def test_every_call_of_posix_is_in_the_table_of_contributing():
     """What the table lists is searched for in the code, and where it is found must be told."""
     rows = (ROOT / "CONTRIBUTING.md").read_text(encoding="utf-8").partition("| call |")[2].splitlines()
-    for call in ("os.sched_getaffinity", "os.kill", "os.fork", "os.killpg", "fcntl.flock"):
+    for call in (
+        "os.sched_getaffinity",
+        "os.kill",
+        "os.fork",
+        "os.killpg",
+        "fcntl.flock",
+        "resource.getrusage",
+    ):
         files = {
             name(path)
             for folder in ("agents", "benchmarks", "hoof_env", "scripts")

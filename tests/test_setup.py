@@ -101,7 +101,7 @@ def test_what_is_missing_or_wrong_is_one_line_before_anything_is_touched(
 
 def test_a_wrong_word_is_refused(setup, installs, capsys):
     assert setup.main("--help") == 1
-    assert "expected demo or all, got '--help'" in capsys.readouterr().err
+    assert "expected demo or all or dependencies, got '--help'" in capsys.readouterr().err
     assert not installs
 
 
@@ -226,7 +226,7 @@ def test_without_a_wheel_of_pytorch_the_tests_get_all_else_and_a_line_says_so(
     assert setup.main() == 0
     assert "left out: torch, stable-baselines3, sb3-contrib; the tests that" in capsys.readouterr().out
     installed = {re.split("[>=;]", one)[0] for one in without_torch.done}
-    assert installed > {"numpy", "numba", "gymnasium", "pytest", "scipy", "mypy", "--editable"}
+    assert installed > {"numpy", "llvmlite", "gymnasium", "pytest", "scipy", "mypy", "--editable"}
     assert not installed & set(setup.NEED_TORCH)
     count = len(without_torch.done)
     assert setup.main() == 0  # nothing is tried again
@@ -387,6 +387,19 @@ def test_what_the_tests_need_is_added_to_the_demos(setup, installs):
     assert set(setup.requirements("demo")) < set(setup.requirements("all"))
 
 
+def test_dependencies_alone_are_installed_without_the_checkout(setup, without_torch, monkeypatch, capsys):
+    monkeypatch.setenv("INSTALLER", "pip")
+    project = setup.ROOT / "pyproject.toml"
+    for _ in range(2):  # nothing is done twice
+        assert setup.main("dependencies") == 0
+        assert sorted(without_torch.done) == sorted(
+            tomllib.loads(project.read_text())["project"]["dependencies"]
+        )
+    project.write_text('[project]\ndependencies = ["numpy", "torch>=2.5"]\n')
+    assert setup.main("dependencies") == 1
+    assert "PyTorch cannot be had" in capsys.readouterr().err
+
+
 def test_interrupted_setup_is_made_anew(setup, installs, monkeypatch, capsys):
     def interrupted(purpose, anew):
         setup.venv("").mkdir()
@@ -411,7 +424,7 @@ def test_hashes_are_of_the_versions_that_are_locked(setup):
     hashed = {f"{one['name']}=={one['version']}" for one in packages}
     assert len(hashed) == len(packages)
     assert hashed <= locked
-    assert {name.split("==")[0] for name in hashed} > {"numpy", "numba", "pillow", "stable-baselines3"}
+    assert {name.split("==")[0] for name in hashed} > {"numpy", "llvmlite", "pillow", "stable-baselines3"}
     assert not [name for name in hashed if name.startswith("torch==")]
     for one in packages:
         assert all(re.fullmatch("[0-9a-f]{64}", wheel["hashes"]["sha256"]) for wheel in one["wheels"]), one

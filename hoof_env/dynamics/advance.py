@@ -44,6 +44,7 @@ from hoof_env.simd import (
     new_rows,
     one_of,
     read,
+    rolled,
     when,
     where,
 )
@@ -89,21 +90,23 @@ def read_leg(leg: LegRows, memory: LegMemory, form: EngineLayout) -> None:
 
 
 def find_result(
-    trunk: TrunkRows, legs: LegRows, leg_count: int, lanes_are_legs: bool, form: EngineLayout
+    trunk: TrunkRows, legs: LegRows, leg_count: Whole, lanes_are_legs: bool, form: EngineLayout
 ) -> Lanes:
     """Return how the environments ended, numbers of `parts.Result`. A number too large to be squared counts
     as not finite."""
-    total = full_like(trunk, 0.0)
+    of_trunk = full_like(trunk, 0.0)
     stuck = trunk.at_dead_point
     for k in range(form.trunk_state):
-        total = total + trunk.state[k] * trunk.state[k]
-    for i in range(leg_count):
+        of_trunk = of_trunk + trunk.state[k] * trunk.state[k]
+    of_all = Cell(of_trunk)
+    for i in loop(leg_count):
         leg = block_at(legs, i)
         # a sum for each leg: in one long sum each addition would wait for the one before
         leg_total = leg.theta_acceleration * leg.theta_acceleration
         for k in range(form.leg_state):
             leg_total = leg_total + leg.state[k] * leg.state[k]
-        total = total + leg_total
+        of_all.value = of_all.value + leg_total
+    total: Lanes = of_all.value
     if lanes_are_legs:
         total = lane_sum(full_like(trunk, 0.0), total)
         stuck = lane_sum(full_like(trunk, 0.0), stuck)
@@ -202,25 +205,26 @@ class Advance:
         self.is_start = is_start
         self.form = form = engine_layout(kind.features)
         lanes = arrangement.lanes
-        self.leg_count = 1 if arrangement.lanes_are_legs else kind.legs
+        legs = 1 if arrangement.lanes_are_legs else kind.legs
+        self.leg_count: Whole = legs if legs == 1 else rolled(legs)
         self.trunk = new_rows(form.trunk, lanes)
-        self.legs = new_rows(form.leg, lanes, self.leg_count)
+        self.legs = new_rows(form.leg, lanes, legs)
         self.account = new_rows(form.account, lanes)
-        self.constants = new_rows(form.constants, lanes, self.leg_count)
-        self.forces = new_rows(form.reactions, lanes, self.leg_count)
+        self.constants = new_rows(form.constants, lanes, legs)
+        self.forces = new_rows(form.reactions, lanes, legs)
         self.data: Matrix = given.data
         self.reactions: Matrix = given.reactions
         self.model = unpack_model(
             given.model, given.tables, given.ground, arrangement.lanes_are_legs, kind.contact_law, form
         )
         if kind.reacts or form.has_limits:
-            self._read_constants(given.constants)
+            self._read_constants(given.constants, legs)
 
-    def _read_constants(self, constants: Matrix) -> None:
+    def _read_constants(self, constants: Matrix, legs: int) -> None:
         """Load the constants of all legs, which all environments share."""
         size = self.form.constants.size
         stride = size if self.arrangement.lanes_are_legs else 0
-        for k in range(self.leg_count * size):
+        for k in range(legs * size):
             self.constants[k] = read(constants.first, k, stride, self.arrangement.lanes)
 
     def __call__(self, n: Whole, h: Lanes | float, steps: Whole, keeps_account: Truth) -> None:
@@ -348,7 +352,7 @@ class Advance:
     def _store_legs(self, leg_memory: Callable[[Whole], LegMemory], good: Truth) -> None:
         """Store reports, and where `good` holds what changes of the legs."""
         form = self.form
-        for i in range(self.leg_count):
+        for i in loop(self.leg_count):
             leg = block_at(self.legs, i)
             memory = leg_memory(i)
             report_leg(self.trunk, leg, memory.report, form)
@@ -362,7 +366,7 @@ class Advance:
         width = self.reactions.shape[2]
         rows = Matrix(self.reactions.first, (0, width))
         stride = size * width if self.arrangement.lanes_are_legs else 1
-        for i in range(self.leg_count):
+        for i in loop(self.leg_count):
             out = columns(rows, self.arrangement.lanes, self.form.reactions, n, i * size, stride)
             forces = block_at(self.forces, i)
             for k in range(size):

@@ -166,7 +166,7 @@ class TrunkEngine(EngineMotion):
         self._memory = memory.new_memory(self, self.num_envs, columns, self.reacts)
         self._model = memory.new_model(self, self.filters, self.counts_strides)
         self._arrangement = ONE_BY_ONE[len(self.limbs)] if self.runs_scalar else SIDE_BY_SIDE
-        self._kernels = {}
+        self._calls = None
 
     def __repr__(self) -> str:
         legs = f"{len(self.limbs)} leg{'s' * (len(self.limbs) > 1)}"
@@ -177,7 +177,7 @@ class TrunkEngine(EngineMotion):
         """Return the attributes of a copy, which has memory of its own even if it is shallow."""
         m = self._memory
         # kernels are left out: the copy finds them, perhaps in another process
-        parts = {**vars(self), "_kernels": {}}
+        parts = {**vars(self), "_calls": None}
         return {
             **parts,
             "_memory": (m.data, self.num_envs, m.constants, m.reactions.copy(), m.features),

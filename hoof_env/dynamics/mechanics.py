@@ -30,6 +30,7 @@ from hoof_env.simd import (
     Lanes,
     Number,
     Plane,
+    Whole,
     absolute,
     block_at,
     cond,
@@ -59,7 +60,7 @@ def add(total: Sum, x: Sum, lanes_are_legs: bool) -> Sum:
     return total + rounded(x)
 
 
-def evaluate(trunk: TrunkRows, legs: LegRows, leg_count: int, model: Model, elapsed: Number) -> None:
+def evaluate(trunk: TrunkRows, legs: LegRows, leg_count: Whole, model: Model, elapsed: Number) -> None:
     """Compute all forces and accelerations at the present stage, `elapsed` [s] after the step's start."""
     if model.kind != FIXED:
         clear_trunk(trunk, model.kind)
@@ -241,7 +242,7 @@ def gather_leg(trunk: TrunkRows, leg: LegRows, kind: int, lanes_are_legs: bool) 
     trunk.relative_momentum = add(trunk.relative_momentum, drift, lanes_are_legs)
 
 
-def gather_legs(trunk: TrunkRows, legs: LegRows, leg_count: int, model: Model) -> None:
+def gather_legs(trunk: TrunkRows, legs: LegRows, leg_count: Whole, model: Model) -> None:
     """Compute the legs' functions and frames at the present state, and their sums about the trunk's centre of
     mass (E6): what the momentum of all bodies needs, without forces."""
     clear_trunk(trunk, model.kind)

@@ -38,6 +38,7 @@ from hoof_env.simd import (
     Lanes,
     Number,
     Plane,
+    Whole,
     absolute,
     block_at,
     dot,
@@ -89,7 +90,7 @@ def find_drives(trunk: TrunkRows, leg: LegRows) -> None:
 
 
 def keep_account(
-    trunk: TrunkRows, legs: LegRows, leg_count: int, model: Model, account: Account, weight: Number
+    trunk: TrunkRows, legs: LegRows, leg_count: Whole, model: Model, account: Account, weight: Number
 ) -> None:
     """Add the present stage's powers and forces, times `weight` [s], to an `Account`."""
     velocity = trunk.velocity

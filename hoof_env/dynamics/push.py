@@ -17,12 +17,12 @@ from hoof_env.dynamics.mechanics import (
 )
 from hoof_env.dynamics.model import Model, unpack_model
 from hoof_env.dynamics.stepping import begin_step
-from hoof_env.simd import Plane, block_at, columns, full_like, loop, new_rows, vector
+from hoof_env.simd import Plane, Whole, block_at, columns, full_like, loop, new_rows, vector
 from hoof_env.simd.compile import Kernel
 from hoof_env.simd.memory import Arrays, Given
 
 
-def push_cranks(trunk: TrunkRows, legs: LegRows, leg_count: int, model: Model, impulse: Plane) -> None:
+def push_cranks(trunk: TrunkRows, legs: LegRows, leg_count: Whole, model: Model, impulse: Plane) -> None:
     """Add to the speeds of motors' cranks what an `impulse` [N s] on the trunk's centre of mass changes at
     once: (E8) and (E9) with impulses for forces, and jumps of speeds for accelerations."""
     gather_legs(trunk, legs, leg_count, model)

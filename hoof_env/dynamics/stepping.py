@@ -21,7 +21,7 @@ from hoof_env.dynamics.mechanics import MOVING
 from hoof_env.dynamics.model import Model
 from hoof_env.dynamics.parts import FIXED, FREE
 from hoof_env.gait import INNER, SPEED
-from hoof_env.simd import Lanes, Number, block_at, loop, when, where
+from hoof_env.simd import Lanes, Number, Whole, block_at, loop, when, where
 from hoof_env.simd.layout import Layout
 from hoof_env.simd.math import clip
 
@@ -44,7 +44,7 @@ def advance_rows(kind: int, to: Layout, start: Layout, factor: Number, slope: La
         to[k] = start[k] + factor * slope[k]
 
 
-def begin_step(trunk: TrunkRows, legs: LegRows, leg_count: int, model: Model) -> None:
+def begin_step(trunk: TrunkRows, legs: LegRows, leg_count: Whole, model: Model) -> None:
     """Set the first stage to the state itself, and the filters' accelerations for the whole step."""
     if model.kind != FIXED:
         for k in range(MOVING):
@@ -64,7 +64,7 @@ def begin_step(trunk: TrunkRows, legs: LegRows, leg_count: int, model: Model) ->
             clear_springs(leg, model.form.springs)
 
 
-def weigh_stage(trunk: TrunkRows, legs: LegRows, leg_count: int, model: Model, weight: Number) -> None:
+def weigh_stage(trunk: TrunkRows, legs: LegRows, leg_count: Whole, model: Model, weight: Number) -> None:
     """Add the derivatives at the present stage to their means, if the scheme averages: otherwise the last
     stage's derivatives are those of the step."""
     if not model.averages:
@@ -93,7 +93,7 @@ def prescribed(leg: LegRows, elapsed: Number) -> tuple[Lanes, Lanes]:
     return theta, value + elapsed * (rate + 0.5 * elapsed * acceleration)
 
 
-def next_stage(trunk: TrunkRows, legs: LegRows, leg_count: int, model: Model, elapsed: Number) -> None:
+def next_stage(trunk: TrunkRows, legs: LegRows, leg_count: Whole, model: Model, elapsed: Number) -> None:
     """Move `elapsed` [s] from the step's start with the derivatives of the present stage."""
     if model.kind != FIXED:
         advance_rows(model.kind, trunk.stage, trunk.state.moving, elapsed, trunk.rates)
@@ -114,7 +114,7 @@ def use_new_rates(trunk: TrunkRows, h: Number) -> None:
     rates.pitch_rate = rates.pitch_rate + h * trunk.pitch_acceleration
 
 
-def end_step(trunk: TrunkRows, legs: LegRows, leg_count: int, model: Model, h: Number) -> None:
+def end_step(trunk: TrunkRows, legs: LegRows, leg_count: Whole, model: Model, h: Number) -> None:
     """Advance the state by a step; the filters advance exactly."""
     if model.kind != FIXED:
         if model.new_rates:

@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from hoof_env.errors import ParameterError, check_number
-from hoof_env.simd import Lanes, Matrix, Number, floor, gather_eight, maximum, minimum
+from hoof_env.simd import Lanes, Matrix, Number, floor, gather_eight, minimum, where
 
 MOST_KNOTS = 1_000_000
 """Largest number of knots."""
@@ -280,8 +280,8 @@ def surface(
     """Return the ground at `x` [m]: height [m], normal x and y [-], factors of stiffness
     and friction [-]. Heights and factors are NaN where x is not finite."""
     place = (x - origin) * per_metre
-    # this order of the arguments sends NaN to cell 0
-    cell = floor(minimum(maximum(0.0, place), cells.shape[0] - 1.0))
+    # not `maximum`, since NaN must be in a cell, too
+    cell = floor(minimum(where(place > 0.0, place, 0.0), cells.shape[0] - 1.0))
     # far beyond the ends `part` is large, but the level cells there have no rises
     part = place - cell
     height, rise, normal_x, normal_y, stiffness, firmer, friction, rougher = gather_eight(

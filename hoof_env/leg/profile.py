@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 from hoof_env.errors import GeometryError, count, one_of
 from hoof_env.leg.assembly import centres, solve
 from hoof_env.leg.geometry import Geometry
-from hoof_env.simd import floor, maximum, minimum, steady
+from hoof_env.simd import floor, minimum, steady, where
 from hoof_env.simd.layout import Layout, Row, Vector
 from hoof_env.simd.machines import CURRENT
 from hoof_env.simd.math import ROUNDER
@@ -318,7 +318,8 @@ def locate(leg: LegRows, cells: Lanes | float) -> None:
     angle = leg.theta
     cell = steady(angle * (cells / TURN) + ROUNDER) - ROUNDER
     # Cell 0 begins before its turn does: its row is there again at the end of the table.
-    row = minimum(cells, maximum(0.0, cell - cells * floor(angle * (1 / TURN))))
+    row = cell - cells * floor(angle * (1 / TURN))
+    row = minimum(cells, where(row > 0.0, row, 0.0))  # not `maximum`: NaN is in cell 0
     leg.row_begin = (row + leg.settings.first_row) * ROW + WHOLE
     leg.cell_angle = angle - cell * (TURN / cells)
 

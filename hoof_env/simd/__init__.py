@@ -1,7 +1,8 @@
 """Numbers side by side: values of kernels that work on many environments, or many legs, in one
 instruction."""
 
-from hoof_env.simd.control import Cell, cond, loop, one_of, when
+from hoof_env.simd.compile import on_numpy
+from hoof_env.simd.control import Cell, cond, loop, one_of, rolled, when
 from hoof_env.simd.memory import (
     Matrix,
     Pointer,
@@ -74,10 +75,12 @@ __all__ = [
     "maximum",
     "minimum",
     "new_rows",
+    "on_numpy",
     "one_of",
     "perpendicular",
     "quarter_turns",
     "read",
+    "rolled",
     "rounded",
     "sqrt",
     "steady",

@@ -14,7 +14,8 @@ import hashlib
 import os
 import threading
 from collections import deque
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from functools import cache
 from typing import Any, get_type_hints
 from weakref import WeakValueDictionary
@@ -24,8 +25,8 @@ import numpy as np
 
 from hoof_env.errors import HoofEnvError
 from hoof_env.simd import objects
-from hoof_env.simd.machines import CURRENT, Eager, Place, Writer, running_on
-from hoof_env.simd.memory import AXES, Arrays, Given, Held, Matrix, Pointer
+from hoof_env.simd.machines import Eager, Place, Writer, running_on
+from hoof_env.simd.memory import AXES, Arrays, Given, Matrix, Pointer
 from hoof_env.simd.values import Index, Lanes, Mask, Number, Whole, word
 
 LEVEL = 2
@@ -45,14 +46,14 @@ class CompilerError(HoofEnvError):
     """LLVM refused a kernel, which is an error of this package."""
 
 
-def _host() -> tuple[str, str]:
+def host() -> tuple[str, str]:
     """Return LLVM's names of the processor and its features."""
     given = os.environ.get(PROCESSOR)
     return (given, "") if given else (llvm.get_host_cpu_name(), llvm.get_host_cpu_features().flatten())
 
 
 def _new_target() -> Any:
-    cpu, features = _host()
+    cpu, features = host()
     target = llvm.Target.from_triple(llvm.get_process_triple())
     return target.create_target_machine(
         cpu=cpu, features=features, opt=LEVEL, reloc="pic", codemodel="small", jit=True
@@ -60,7 +61,7 @@ def _new_target() -> Any:
 
 
 @cache
-def _target() -> Any:
+def target() -> Any:
     """Return LLVM's machine for this processor, started at the first call."""
     llvm.initialize_native_target()
     llvm.initialize_native_asmprinter()
@@ -71,33 +72,36 @@ def _target() -> Any:
 def _identity() -> str:
     """Return all that machine code depends on besides its text."""
     version = ".".join(map(str, llvm.llvm_version_info))
-    return " ".join((llvm.get_process_triple(), *_host(), version, str(LEVEL)))
+    return " ".join((llvm.get_process_triple(), *host(), version, str(LEVEL)))
 
 
-def compiled(text: str) -> bytes:
-    """Return the object of a module.
+def optimised(text: str) -> Any:
+    """Return the module of a text for this processor, after LLVM's passes.
 
     Raises:
         CompilerError: LLVM refuses the text.
     """
-    target = _target()
+    machine = target()
     try:
         module = llvm.parse_assembly(text)
         module.verify()
-        module.triple, module.data_layout = target.triple, str(target.target_data)
-        tuning = llvm.create_pipeline_tuning_options(speed_level=LEVEL)
-        tuning.loop_vectorization = tuning.slp_vectorization = False
-        passes = llvm.create_pass_builder(target, tuning)
-        passes.getModulePassManager().run(module, passes)
-        return bytes(target.emit_object(module))
     except RuntimeError as error:
         words = str(error).strip().splitlines()
         hint = ""
         if "dominate" in str(error):
-            hint = (
-                "; a value that was made inside `when`, `cond` or `loop` is used outside: keep it in a `Cell`"
-            )
+            hint = "; a value that was made inside `when`, `cond` or `loop` is used outside: keep it in a `Cell`"
         raise CompilerError(f"LLVM refuses a kernel{hint}: {words[0] if words else error!r}") from error
+    module.triple, module.data_layout = machine.triple, str(machine.target_data)
+    tuning = llvm.create_pipeline_tuning_options(speed_level=LEVEL)
+    tuning.loop_vectorization = tuning.slp_vectorization = False
+    passes = llvm.create_pass_builder(machine, tuning)
+    passes.getModulePassManager().run(module, passes)
+    return module
+
+
+def compiled(text: str) -> bytes:
+    """Return the object of a module, machine code of this processor."""
+    return bytes(target().emit_object(optimised(text)))
 
 
 class Code:
@@ -131,7 +135,7 @@ if hasattr(os, "register_at_fork"):  # another thread may have it when a process
 def code_of(text: str, name: str) -> Code:
     """Return the machine code of a module: loaded before, read from a file, or compiled."""
     with _LOCK:
-        _target()
+        target()
         digest = hashlib.sha256(f"{_identity()}\n{text}".encode()).hexdigest()
         code = _LOADED.get(digest)
         if code is None:
@@ -179,15 +183,21 @@ class Kernel:
         self.call: Any = None
 
     def __call__(self, *arguments: Any) -> Any:
+        if _BLOCKS and _HERE.machine:
+            return _run(self.function, self.parameters, arguments, _HERE.machine)
         if self.call is None:
             self.compile()
+        if Matrix not in self.parameters:
+            return self.call(*arguments)
         given: list[Any] = []
         for kind, argument in zip(self.parameters, arguments, strict=True):
             given += _array(argument) if kind is Matrix else [argument]
         return self.call(*given)
 
     def compile(self) -> None:
-        """Trace the kernel, and find its machine code."""
+        """Trace the kernel and find its machine code, unless that was done before."""
+        if self.call is not None:
+            return
         text, result = traced(self.function, self.parameters)
         kinds: list[Any] = []
         for kind in self.parameters:
@@ -195,7 +205,11 @@ class Kernel:
         code = code_of(text, self.name)
         make: Any = ctypes.CFUNCTYPE if self.threads else ctypes.PYFUNCTYPE
         call = make(result, *kinds)(code.address)
-        call.code = code  # the function lives as long as the machine code
+        call.code = code  # the machine code lives as long as the function
+        call.source = self.function, self.parameters
+        with _LOCK:
+            _CALLS[id(call)] = call
+            _watch()
         self.call = call
 
     def run_now(self, *arguments: Any, exact: bool = True) -> Any:
@@ -257,17 +271,94 @@ def run_now(kernel: Kernel, *arguments: Any, exact: bool = True) -> Any:
         arguments: as for a call of it.
         exact: see `machines.Eager`.
     """
-    with running_on(Eager(exact)), np.errstate(all="ignore"):
+    return _run(kernel.function, kernel.parameters, arguments, Eager(exact))
+
+
+def _run(
+    function: Callable[..., Any], parameters: Sequence[Parameter], arguments: Sequence[Any], machine: Any
+) -> Any:
+    """Run the function of a kernel on a machine that computes at once; return what machine code would."""
+    with running_on(machine), np.errstate(all="ignore"):
         given: list[Any] = []
-        for kind, argument in zip(kernel.parameters, arguments, strict=True):
+        for kind, argument in zip(parameters, arguments, strict=True):
             if isinstance(kind, Arrays):
-                assert isinstance(argument, Held)
                 given.append(Given(kind, argument))
             elif kind is Matrix:
+                _array(argument)
                 given.append(Matrix(Pointer(Place(argument.reshape(-1))), argument.shape))
             else:
-                given.append(kind(argument))
-        return kernel.function(*given)
+                given.append(Lanes(float(argument), 0) if kind is float else int(argument))
+        result = function(*given)
+        if isinstance(result, Lanes):
+            return float(result.x)
+        return int(result.x) if isinstance(result, Mask) else result
+
+
+# A block in which kernels run on NumPy. A caller may have kept a kernel's `call`, to save what a check
+# costs; so the functions of ctypes change their class while there is such a block, and only then.
+
+
+class _Here(threading.local):
+    machine: Any = None
+
+
+_HERE = _Here()
+_CALLS: WeakValueDictionary[int, Any] = WeakValueDictionary()
+_BLOCKS: list[Any] = []
+
+
+@contextmanager
+def on_numpy(exact: bool = True) -> Iterator[None]:
+    """Let every kernel that this thread calls in the block run on NumPy, where a debugger can follow: slower
+    by ten thousand times, with the same bits. Threads that share the environments of a call wait meanwhile.
+
+    Args:
+        exact: False for products that are rounded before they enter a sum: twice as fast, other last digits.
+    """
+    before, machine = _HERE.machine, Eager(exact)
+    with _LOCK:
+        _BLOCKS.append(machine)
+        _watch()
+    _HERE.machine = machine
+    try:
+        yield
+    finally:
+        _HERE.machine = before
+        with _LOCK:
+            _BLOCKS.remove(machine)
+            _watch()
+
+
+def is_on_numpy() -> bool:
+    """Return True in a block of `on_numpy`."""
+    return _HERE.machine is not None
+
+
+def _watch() -> None:
+    """Let the functions of all kernels ask where they run, or no longer, as there are blocks."""
+    for call in list(_CALLS.values()):
+        kind: Any = type(call)
+        plain = getattr(kind, "plain", kind)
+        call.__class__ = _watched(plain) if _BLOCKS else plain
+
+
+@cache
+def _watched(kind: Any) -> Any:
+    """Return a class of ctypes' functions that ask where they run."""
+
+    class Watched(kind):
+        __slots__ = ()
+        source: tuple[Any, Any]
+        _flags_, _restype_, _argtypes_ = kind._flags_, kind._restype_, kind._argtypes_
+        plain = kind
+
+        def __call__(self, *arguments: Any) -> Any:
+            function, parameters = self.source
+            if _HERE.machine is None or Matrix in parameters:  # of which only the address is known here
+                return super().__call__(*arguments)
+            return _run(function, parameters, arguments, _HERE.machine)
+
+    return Watched
 
 
 def kernel(function: Callable[..., Any]) -> Kernel:
@@ -277,8 +368,3 @@ def kernel(function: Callable[..., Any]) -> Kernel:
     hints = get_type_hints(function)
     names = function.__code__.co_varnames[: function.__code__.co_argcount]
     return Kernel(function, [kinds[hints[name]] for name in names])
-
-
-def is_traced() -> bool:
-    """Return True while a kernel is traced, and not run on NumPy."""
-    return not CURRENT.machine.runs_now

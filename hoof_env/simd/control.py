@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterator
 from typing import Any
 
 from hoof_env.simd.machines import CURRENT, wide
-from hoof_env.simd.values import Index, Lanes, Mask, Plane, Truth, Whole, full, word
+from hoof_env.simd.values import Index, Lanes, Mask, Plane, Truth, Whole, full, rounded, word
 
 
 class Always:
@@ -35,11 +35,11 @@ def when(condition: Truth) -> Callable[[Callable[[], None]], None]:
 
 def cond(condition: Truth, then: Callable[[], Any], otherwise: Any) -> Any:
     """Return what `then` returns where a condition holds that all lanes share, else `otherwise`: a value or a
-    tuple of values, or a function that returns them."""
+    tuple of values, or a function that returns them. The result enters sums rounded."""
     if _is_known(condition):
         if isinstance(getattr(condition, "x", None), Always) or condition:
-            return then()
-        return otherwise() if callable(otherwise) else otherwise
+            return rounded(then())
+        return rounded(otherwise() if callable(otherwise) else otherwise)
     machine = CURRENT.machine
     x = condition.x  # type: ignore[union-attr]
     yes, no, end = (machine.label(name) for name in ("then", "else", "end"))
@@ -117,15 +117,23 @@ def loop(begin: Whole, end: Whole | None = None, step: Whole = 1) -> Iterator[An
     machine.begin(after)
 
 
+def rolled(count: int) -> Whole:
+    """Return a count whose `loop` is traced once, not turn by turn: a body of many instructions is short
+    then."""
+    return count if CURRENT.machine.runs_now else Index(str(count))
+
+
 class Cell:
-    """Variable of a kernel that changes inside `loop` or `when`: an ordinary number, or a whole one if it
-    begins as one."""
+    """Variable of a kernel that changes inside `loop` or `when`: lanes, an ordinary number, or a whole one if
+    it begins as one. What it holds enters sums rounded."""
 
     def __init__(self, value: Any) -> None:
-        self._kind = "i64" if isinstance(value, (int, Index)) else "double"
+        is_whole = isinstance(value, (int, Index))
+        self._kind = "i64" if is_whole else "double"
+        self._n = getattr(value, "n", 0)
         self._runs_now = CURRENT.machine.runs_now
         if not self._runs_now:
-            self._slot = CURRENT.machine.slot(self._kind)
+            self._slot = CURRENT.machine.slot(wide(self._kind, self._n))
         self.value = value
 
     @property
@@ -133,16 +141,16 @@ class Cell:
         """The present value."""
         if self._runs_now:
             return self._value
-        x = CURRENT.machine.load(self._slot, self._kind)
-        return Lanes(x, 0) if self._kind == "double" else Index(x)
+        x = CURRENT.machine.load(self._slot, self._kind, self._n)
+        return Lanes(x, self._n) if self._kind == "double" else Index(x)
 
     @value.setter
     def value(self, value: Any) -> None:
         if self._runs_now:
-            self._value = value
+            self._value = rounded(value)
             return
-        x = full(value, 0).x if self._kind == "double" else word(value)
-        CURRENT.machine.store(self._slot, x, self._kind)
+        x = full(value, self._n).x if self._kind == "double" else word(value)
+        CURRENT.machine.store(self._slot, x, self._kind, self._n)
 
 
 def one_of(values: Any, k: Whole) -> Any:

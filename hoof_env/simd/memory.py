@@ -79,8 +79,7 @@ class Pointer(Value):
         place = machine.at(self.x, word(k), self.item)
         if self.item == "i64":
             return index(machine.load(place, "i64"))
-        x = machine.load_real(place, self.item)
-        return x if machine.runs_now else Lanes(x, 0)
+        return Lanes(machine.load_real(place, self.item), 0)
 
     def __setitem__(self, k: Whole, value: Number) -> None:
         machine = CURRENT.machine
@@ -135,11 +134,8 @@ class Record:
             raise AttributeError(f"no field {name!r}; there are {', '.join(fields)}")
         kind, start = fields[name][:2]
         machine = CURRENT.machine
-        if machine.runs_now:
-            value = self._place.array[name][0]
-            return Field(value.ravel().tolist(), kind.shape) if kind.shape else value.item()
         item = {"f": "double", "i": "i64", "b": "i8"}[kind.base.kind]
-        pointer = Pointer(machine.at(self._place, start, "i8"), item)
+        pointer = Pointer(machine.field(self._place, name, start), item)
         if item == "i8":
             return Mask(machine.load_truth(pointer.x), 0)
         return Field(pointer, kind.shape) if kind.shape else pointer[0]
@@ -199,7 +195,9 @@ class Arrays:
         numbers = np.zeros(self.begin + 2, np.int64)
         kept = {}
         for name, kind in self.types.items():
-            array = kept[name] = arrays[name]
+            if not isinstance(array := arrays.get(name), np.ndarray):
+                raise TypeError(f"{name}: expected an array, got {array!r}")
+            kept[name] = array
             dtype = kind.kind if isinstance(kind, RecordType) else np.dtype(kind)
             if array.dtype != dtype or not array.flags.c_contiguous or array.ndim > AXES:
                 raise TypeError(
@@ -400,11 +398,6 @@ def new_rows(layout: Any, lanes: int, count: int = 1) -> Any:
     if CURRENT.machine.runs_now:
         return Rows([None] * size, lanes, layout)
     return Rows(CURRENT.machine.slot("double", size * max(lanes, 1)), lanes, layout)
-
-
-def rows_of(values: list[Any], count: int, layout: Any) -> Any:
-    """Return a list of arrays, one for each row, as rows of a machine that computes at once."""
-    return Rows(values, count, layout)
 
 
 @overload

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import hashlib
 import os
+import re
 import sys
 import tempfile
 import time
@@ -26,13 +27,19 @@ DAY = 86400.0
 
 DIGEST = hashlib.sha256().digest_size
 
+_NAME = re.compile(r".+-[0-9a-f]{40}\.o(\..+)?")  # and of one that is being written
+_SAID: set[Path] = set()
+
 
 def folder() -> Path:
     """Return the folder of the files: that of the environment variable, else one in the user's cache
     folder."""
     if given := os.environ.get(FOLDER):
         return Path(given)
-    home = Path(os.path.expanduser("~"))
+    try:
+        home = Path.home()
+    except RuntimeError:  # a process without a home, as in a container
+        return Path(tempfile.gettempdir()) / f"hoof-env-{os.geteuid()}"
     if sys.platform == "win32":
         base = Path(os.environ.get("LOCALAPPDATA") or home / "AppData" / "Local")
     elif sys.platform == "darwin":
@@ -46,7 +53,7 @@ def read(name: str) -> bytes | None:
     """Return the content of a file; None if there is none that can be trusted."""
     path = folder() / name
     try:
-        if not _is_own(path):
+        if not (_is_own(path.parent) and _is_own(path)):
             return None
         found = path.read_bytes()
     except OSError:
@@ -68,39 +75,43 @@ def write(name: str, content: bytes) -> None:
         path.parent.mkdir(parents=True, exist_ok=True, mode=0o700)
         if not _is_own(path.parent):
             return
-        with tempfile.NamedTemporaryFile(dir=path.parent, delete=False) as new:
-            new.write(hashlib.sha256(content).digest() + content)
+        number, new = tempfile.mkstemp(dir=path.parent, prefix=f"{name}.")
         try:
-            os.replace(new.name, path)
-        except OSError:
-            os.unlink(new.name)
+            with open(number, "wb") as file:
+                file.write(hashlib.sha256(content).digest() + content)
+            os.replace(new, path)
+        except BaseException:
+            os.unlink(new)
+            raise
         _make_room(path.parent)
     except OSError:
         return  # a read-only or full disk: each process compiles for itself
 
 
-def _is_own(path: Path) -> bool:
-    """Return True if nobody but this user can change a file, and those beside it."""
+def _is_own(place: Path) -> bool:
+    """Return True if a file or folder belongs to this user, or to root, and nobody else can change it."""
     if not hasattr(os, "geteuid"):
         return True  # the folders of Windows' users are their own
-    for place in {path, path.parent}:
-        try:
-            status = place.stat()
-        except FileNotFoundError:
-            return False
-        if status.st_uid != os.geteuid() or status.st_mode & 0o022:
-            warnings.warn(
-                f"hoof-env: {place} belongs to others, or others may write there: machine code in it is not"
-                f" used, and kernels are compiled in each process; let {FOLDER} name a folder of your own",
-                stacklevel=2,
-            )
-            return False
-    return True
+    try:
+        status = place.stat()
+    except FileNotFoundError:
+        return False
+    if status.st_uid in (os.geteuid(), 0) and not status.st_mode & 0o022:
+        return True
+    if place not in _SAID:
+        _SAID.add(place)
+        warnings.warn(
+            f"hoof-env: {place} belongs to others, or others may write there: machine code in it is not"
+            f" used, and kernels are compiled in each process; run `chmod go-w {place}` if it is yours, or"
+            f" let {FOLDER} name a folder of your own",
+            stacklevel=2,
+        )
+    return False
 
 
 def _make_room(place: Path) -> None:
-    """Remove the least recently used half of too many files."""
-    files = [entry for entry in os.scandir(place) if entry.is_file()]
+    """Remove the least recently used half of too many files; others in the folder stay."""
+    files = [entry for entry in os.scandir(place) if _NAME.fullmatch(entry.name)]
     if len(files) <= MOST_FILES:
         return
     used = sorted(files, key=lambda entry: entry.stat().st_mtime)

@@ -14,6 +14,7 @@ from itertools import pairwise, starmap
 from typing import Any
 
 from hoof_env.errors import ParameterError, count
+from hoof_env.simd.compile import Kernel, is_on_numpy
 
 MOST_THREADS = 1024
 """Largest number of threads."""
@@ -65,15 +66,17 @@ if hasattr(os, "register_at_fork"):  # a child has none of its parent's threads
 
 
 def run_together(kernel: Any, calls: Sequence[tuple[Any, ...]], num_threads: int) -> list[Any]:
-    """Call a kernel with each of these arguments, `num_threads` calls at once; return the results, in any
-    order.
+    """Call a kernel, or another function that lets threads run at once, with each of these arguments,
+    `num_threads` calls at once; return the results, in any order.
 
     The calling thread is one of the threads. All calls have ended when this returns, and when it raises, as
     at Ctrl-C.
     """
-    # a kernel that is not compiled yet is compiled by this thread
-    if num_threads == 1 or len(calls) == 1 or kernel.call is None:
+    if num_threads == 1 or len(calls) == 1 or is_on_numpy():
         return [kernel(*call) for call in calls]
+    # one thread compiles a kernel, not each of them
+    if isinstance(kernel, Kernel) and kernel.call is None:
+        kernel.compile()
     # `list` and `starmap` take a call and make it without bytecode between, so that no other thread takes it
     waiting = starmap(kernel, iter(calls))
     with _interrupts_wait():

@@ -36,8 +36,8 @@ class Value:
     def __bool__(self) -> bool:
         raise TraceError(
             f"`if`, `while`, `and`, `or`, `not`, min() or max() of {self.kind}, which is known only when"
-            " the kernel runs: write np.where(condition, yes, no), `&`, `|` and `~` of comparisons in parentheses,"
-            " np.minimum and np.maximum"
+            " the kernel runs: write np.where(condition, yes, no), `&`, `|` and `~` of comparisons in"
+            " parentheses, np.minimum and np.maximum"
         )
 
     def __iter__(self) -> Iterator[Any]:

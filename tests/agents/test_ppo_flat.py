@@ -10,13 +10,12 @@ from stable_baselines3 import PPO
 from stable_baselines3.common.utils import LinearSchedule
 from stable_baselines3.common.vec_env import DummyVecEnv
 
-from agents.perceptrons import CHUNK, tanh
-from agents.ppo_flat import FlatPPO, Gradient, Scale
+from agents.perceptrons import ACTIONS, ADVANTAGE, CHUNK, LOG_PROB
+from agents.ppo_flat import FlatPPO, Scale
 from agents.train import Args, train
 from agents.watch import DivergedError
 from hoof_env.policies.find import find_saved
 from hoof_env.simd import threads
-from hoof_env.simd.compile import kernel
 
 GAMMA, LAMBDA = 0.9, 0.8
 
@@ -49,19 +48,6 @@ def model(net_arch=(8,), envs=2, ends="truncated", **changes) -> FlatPPO:
     return FlatPPO("MlpPolicy", many, policy_kwargs=kwargs, **{**usual, **changes})
 
 
-def test_tanh():
-    def fill(x, y):
-        for i in range(len(x)):
-            y[i] = tanh(x[i])
-
-    x = np.linspace(-30, 30, 10_001, dtype=np.float32)
-    y = np.empty_like(x)
-    kernel(fill)(x, y)
-    np.testing.assert_allclose(y, np.tanh(x.astype(float)), atol=8e-6)
-    kernel(fill)(np.float32([1e6, -np.inf, np.nan]), far := np.empty(3, np.float32))
-    np.testing.assert_array_equal(far, [1.0, -1.0, np.nan])
-
-
 @pytest.mark.parametrize("count", [2, 64, CHUNK, CHUNK + 1, 2 * CHUNK + 500])
 @pytest.mark.parametrize("net_arch", [(), (8,), (64, 64), (5, 7, 3)])
 def test_the_gradient_is_that_of_torch_and_stable_baselines(net_arch, count):
@@ -77,8 +63,8 @@ def test_the_gradient_is_that_of_torch_and_stable_baselines(net_arch, count):
     chosen = generator.permutation(3 * count)[:count]
     half = 0.5 * np.log(2 * np.pi)  # each action's, which ours leaves out of both probabilities
     steps = np.column_stack([old + half, advantages, targets, actions]).astype(np.float32)
-    gradient = Gradient(one, one.clip_range)
-    policy_loss, value_loss = gradient.compute(observations, steps, chosen)
+    gradient = one.gradient
+    policy_loss, value_loss = gradient.compute(observations, steps, chosen, one.clip_range)
 
     x, a, b, adv, v = (torch.tensor(row[chosen]) for row in (observations, actions, old, advantages, targets))
     values, log_prob, entropy = one.policy.evaluate_actions(x, a)
@@ -90,6 +76,32 @@ def test_the_gradient_is_that_of_torch_and_stable_baselines(net_arch, count):
     assert policy_loss == pytest.approx(of_policy.item(), abs=2e-5)
     assert value_loss == pytest.approx(of_value.item(), rel=2e-5)
     np.testing.assert_allclose(gradient.vector, expected, atol=2e-5 * np.abs(expected).max())
+
+
+def test_nothing_of_the_last_batch_stays():
+    """The arrays do."""
+    generator = np.random.default_rng(0)
+    one = model((8, 8), batch_size=2 * CHUNK + 500)
+    observations, steps = (generator.normal(size=(5000, n)).astype(np.float32) for n in (2, ACTIONS + 1))
+    first, second = generator.permutation(5000).reshape(2, -1)
+    expected = one.gradient.compute(observations, steps, first, 0.2), one.gradient.vector.copy()
+    one.gradient.compute(observations, steps, second, 0.2)
+    found = one.gradient.compute(observations, steps, first, 0.2), one.gradient.vector
+    assert found[0] == expected[0]
+    np.testing.assert_array_equal(found[1], expected[1])
+
+
+@pytest.mark.filterwarnings("error")
+def test_a_ratio_beyond_all_numbers_counts_as_the_clipped_one():
+    one = model(vf_coef=0.0)
+    steps = np.zeros((2, ACTIONS + 1), np.float32)
+    steps[:, LOG_PROB] = -1e3  # of an action that was next to impossible
+    steps[:, ADVANTAGE] = 1.0, -1.0
+    steps[1, LOG_PROB] = 0.0
+    steps[1, ACTIONS] = 1e3  # and one that is so now
+    policy_loss, _ = one.gradient.compute(np.zeros((2, 2), np.float32), steps, np.arange(2), 0.2)
+    assert policy_loss == pytest.approx(-(1.2 - 0.8) / 2 * np.sqrt(0.5), rel=1e-5)
+    np.testing.assert_array_equal(one.gradient.vector, 0.0)
 
 
 def test_steps_are_those_of_adam():

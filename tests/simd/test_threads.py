@@ -53,6 +53,11 @@ def test_what_calls_return_comes_of_several_threads():
     assert 2 <= len(slow.callers) <= 3
 
 
+def test_a_plain_function_is_called_by_several_threads():
+    both = threading.Barrier(2, timeout=30)
+    assert len(set(run_together(lambda _: both.wait(), [(1,), (2,)], 2))) == 2
+
+
 def test_many_calls_are_each_made_once():
     slow = Slow()
     for _ in range(200):
