@@ -76,7 +76,7 @@ class TrunkEngine(EngineMotion):
         strides: true to count stances, peak forces and work; `strides` has them.
         limits: where the motion should end, see `parts.Result`. An engine with limits, if only `Limits()`,
             takes legs of other sizes in `vary`, and its `strides` have horizontal impulses.
-        contact_law: law of the normal force instead of the ground's, see `hoof.law_of`.
+        contact_law: law of the normal force instead of the ground's, see `hoof.contact_force`.
 
     Attributes:
         runs_scalar: true if environments are run one by one in one thread, not side by side.
@@ -90,7 +90,7 @@ class TrunkEngine(EngineMotion):
 
     Raises:
         ParameterError: a value is out of range or of the wrong type; or, at the first reset, the contact law
-            cannot be compiled.
+            cannot be part of a kernel.
         GeometryError: a leg has no place for its links at any crank angle.
 
     Warns:

@@ -9,9 +9,10 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from hoof_env.dynamics import engine_states, layout, memory
-from hoof_env.dynamics.advance import ARRAYS, Arrangement, EngineKind, engine_kernel, static_of
+from hoof_env.dynamics.advance import ARRAYS, Arrangement, EngineKind, engine_kernel
 from hoof_env.dynamics.engine_memory import EngineMemory
 from hoof_env.dynamics.limits import CHECK_EVERY
+from hoof_env.dynamics.model import static_of
 from hoof_env.dynamics.names import NamedColumns
 from hoof_env.dynamics.parts import broken
 from hoof_env.errors import NotStartedError, count
@@ -167,7 +168,7 @@ class EngineMotion(EngineMemory):
             raise user_error("contact_law", error) from None
 
     def compile(self) -> None:
-        """Compile or load the kernel that starts environments.
+        """Trace and compile the kernel that starts environments, or load it.
 
         Raises:
             ParameterError: the law of contact cannot be part of a kernel.

@@ -7,9 +7,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from hoof_env.dynamics.advance import EngineKind, static_of
+from hoof_env.dynamics.advance import EngineKind
 from hoof_env.dynamics.engine import TrunkEngine
 from hoof_env.dynamics.form import engine_layout
+from hoof_env.dynamics.model import static_of
 from hoof_env.envs.batch_build import find_entries
 from hoof_env.envs.conditions import under_each
 from hoof_env.envs.infos import InfoLayout

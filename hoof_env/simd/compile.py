@@ -89,7 +89,9 @@ def optimised(text: str) -> Any:
         words = str(error).strip().splitlines()
         hint = ""
         if "dominate" in str(error):
-            hint = "; a value that was made inside `when`, `cond` or `loop` is used outside: keep it in a `Cell`"
+            hint = (
+                "; a value that was made inside `when`, `cond` or `loop` is used outside: keep it in a `Cell`"
+            )
         raise CompilerError(f"LLVM refuses a kernel{hint}: {words[0] if words else error!r}") from error
     module.triple, module.data_layout = machine.triple, str(machine.target_data)
     tuning = llvm.create_pipeline_tuning_options(speed_level=LEVEL)

@@ -8,12 +8,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from typing import Any, NoReturn
+from typing import Any, NoReturn, overload
 
 import numpy as np
 from numpy.typing import NDArray
 
-from hoof_env.simd.layout import Named, Row, Vector
+from hoof_env.simd.layout import AnyLayout, Block, Named, Row, Vector
 from hoof_env.simd.machines import CURRENT, Place
 from hoof_env.simd.values import (
     Index,
@@ -387,6 +387,10 @@ def write(x: Lanes, pointer: Pointer, start: Whole, stride: Whole) -> None:
             machine.store_real(place, machine.pick(x.x, lane, n), item)
 
 
+@overload
+def new_rows(layout: None, lanes: int, count: int = 1) -> Block: ...
+@overload
+def new_rows(layout: type[AnyLayout], lanes: int, count: int = 1) -> AnyLayout: ...
 def new_rows(layout: Any, lanes: int, count: int = 1) -> Any:
     """Return memory on the stack of the kernel, `count` times the rows of a layout, or `count` rows without
     names if that is None."""
@@ -396,6 +400,14 @@ def new_rows(layout: Any, lanes: int, count: int = 1) -> Any:
     return Rows(CURRENT.machine.slot("double", size * max(lanes, 1)), lanes, layout)
 
 
+@overload
+def columns(
+    matrix: Matrix, lanes: int, layout: None, column: Whole, row: Whole = 0, stride: Whole = 1
+) -> Block: ...
+@overload
+def columns(
+    matrix: Matrix, lanes: int, layout: type[AnyLayout], column: Whole, row: Whole = 0, stride: Whole = 1
+) -> AnyLayout: ...
 def columns(matrix: Matrix, lanes: int, layout: Any, column: Whole, row: Whole = 0, stride: Whole = 1) -> Any:
     """Return columns of a matrix of two axes by the names of a layout.
 
@@ -412,17 +424,21 @@ def columns(matrix: Matrix, lanes: int, layout: Any, column: Whole, row: Whole =
     return Columns(place, lanes, layout, width, stride)
 
 
-def block_at(rows: Any, number: Whole) -> Any:
-    """Return the rows of the `number`-th of several equal layouts, the first of which is `rows`."""
+def block_at(first: AnyLayout, number: Whole) -> AnyLayout:
+    """Return the rows of the `number`-th of several equal layouts, of which the first is given."""
     if isinstance(number, int) and number == 0:
-        return rows
-    return rows._part(number * rows._layout.size, rows._layout)
+        return first
+    rows: Any = first
+    part: AnyLayout = rows._part(number * rows._layout.size, rows._layout)
+    return part
 
 
-def load_rows(to: Any, start: Any) -> None:
+def load_rows(to: AnyLayout, start: AnyLayout) -> None:
     """Read columns into rows of the same layout."""
-    for k in range(to._layout.size):
-        to._write(k, start._read(k))
+    rows: Any = to
+    read_from: Any = start
+    for k in range(rows._layout.size):
+        rows._write(k, read_from._read(k))
 
 
 def full_like(like: Any, value: Number) -> Lanes:
