@@ -21,7 +21,7 @@ from hoof_env.simd import (
     where,
 )
 from hoof_env.simd.math import clip, root_power
-from hoof_env.simd.user_functions import foreign, function_name, number_of
+from hoof_env.simd.user_functions import foreign, function_name, inputs
 
 
 def level_ground(leg):  # type: ignore[no-untyped-def]
@@ -242,6 +242,7 @@ def contact_force(ground, stiffness_scale, penetration, rate, inverse_speed, eig
     return normal_force(spring, ground.chi, ground.dashpot, rate, inverse_speed), spring  # Eq. 14
 
 
+@inputs
 class GroundHere(NamedTuple):
     """Parameters of the ground under a hoof point, for a law of contact."""
 
@@ -261,12 +262,11 @@ def law_of(contact_law: Callable[..., Any] | None) -> Any:
     """
     if contact_law is None:
         return contact_force
-    force = foreign(contact_law)
-    number = number_of(f"the contact law {function_name(contact_law)}")
+    force = foreign(f"the contact law {function_name(contact_law)}", contact_law)
 
     def push(ground, stiffness_scale, penetration, rate, inverse_speed, eighths):  # type: ignore[no-untyped-def]
         here = GroundHere(ground.stiffness * stiffness_scale, eighths, ground.chi, ground.dashpot)
-        pushed = maximum(number(force(penetration, rate, inverse_speed, here)), 0.0)
+        pushed = maximum(force(penetration, rate, inverse_speed, here), 0.0)
         return pushed, 0.0 * pushed
 
     return push

@@ -94,7 +94,11 @@ class BatchKernels:
             EngineKind(self.engine.features, self.task.contact_law, static_of(self.engine.arrays[1])),
             known_of(self.task_record),
         )
-        self.kernels = step_kernels(kind, is_scalar)
+        # found once for each kind: those with a function from outside are made anew, which takes time
+        chosen = vars(self).setdefault("_chosen", {})
+        if (kind, is_scalar) not in chosen:
+            chosen[kind, is_scalar] = step_kernels(kind, is_scalar)
+        self.kernels = chosen[kind, is_scalar]
         self.kernel = self._step_paper if self.paper else self.kernels.step
 
     def find(self) -> None:

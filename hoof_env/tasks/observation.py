@@ -14,8 +14,8 @@ from hoof_env.gait import LIMITS, FilterSettings
 from hoof_env.ground.terrain import surface
 from hoof_env.simd import where
 from hoof_env.simd.math import cos_sin
-from hoof_env.simd.user_functions import check_function
-from hoof_env.tasks.own_parts import Constant, check_arguments, check_parts
+from hoof_env.simd.user_functions import check_function, inputs
+from hoof_env.tasks.own_parts import Constant, check_arguments, check_parts, without_scalar
 
 LOW, HIGH = (np.array([limit[i] for limit in LIMITS.values()]) for i in (0, 1))
 MIDDLE = (LOW + HIGH) / 2
@@ -25,6 +25,7 @@ HALF_RANGE = (HIGH - LOW) / 2
 AHEAD = (0.25, 0.5, 0.75, 1.0)  # places at which the height of the ground is observed, forward of O [m]
 
 
+@inputs
 class ObservationInputs(NamedTuple):
     """Arguments of the entries' functions.
 
@@ -66,6 +67,7 @@ class Scale:
             check_function(f"scale {self.text!r}: apply", self.apply, 2)
 
 
+@without_scalar
 @dataclass(frozen=True)
 class Entry:
     """Entry of the observation.
@@ -74,9 +76,8 @@ class Entry:
         name: name of the quantity.
         group: group by which the setting `observation` chooses it.
         unit: unit of the number before it is scaled.
-        measure: function of `ObservationInputs` that returns the number; compiled like `reward.Term.compute`.
+        measure: function of `ObservationInputs` that returns the number; see `reward.Term.compute`.
         scale: scaling of the number.
-        scalar: True if `measure` and the scale are functions of ordinary numbers, see `reward.Term`.
         constants: further arguments of `measure`, which the setting `constants` changes.
 
     Raises:
@@ -89,7 +90,6 @@ class Entry:
     unit: str
     measure: Callable[..., Any]
     scale: Scale
-    scalar: bool = False
     constants: Sequence[Constant] = ()
 
     def __post_init__(self) -> None:

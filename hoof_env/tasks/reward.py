@@ -14,9 +14,11 @@ import numpy as np
 
 from hoof_env.errors import ParameterError, check_choice, check_number
 from hoof_env.simd import absolute, maximum, minimum, where
-from hoof_env.tasks.own_parts import Constant, Kept, check_arguments, check_parts
+from hoof_env.simd.user_functions import inputs
+from hoof_env.tasks.own_parts import Constant, Kept, check_arguments, check_parts, without_scalar
 
 
+@inputs
 class Outcome(NamedTuple):
     """Outcome of a control step, the argument of the terms. Where the engine failed, `failed` is 1 and what
     the step added is 0.
@@ -118,6 +120,7 @@ OBJECTIVES = ("progress", "peak force", "energy")
 PROGRESS, PEAK_FORCE, ENERGY = OBJECTIVES
 
 
+@without_scalar
 @dataclass(frozen=True)
 class Term:
     """Term of the reward.
@@ -127,10 +130,8 @@ class Term:
         weight: default weight.
         unit: unit of the weight.
         meaning: quantity that is weighted, for the manual page.
-        compute: function of an `Outcome` and the weight, compiled for one environment and for eight side by
-            side: + - * /, comparisons, and the functions of `hoof_env.simd`; `where` instead of `if`.
-        scalar: True if `compute` is a function of ordinary numbers, which may use `if` and `math`; it is
-            called for one environment after the other, which takes longer.
+        compute: plain function of an `Outcome` and the weight that returns the term, in Python's operators and
+            NumPy's functions, with np.where instead of `if`; see docs/own_task.md.
         constants: further arguments of `compute`, which the setting `constants` changes.
         keeps: numbers that the term keeps in an episode: `compute` reads and sets them, as
             `step.episode.own.<term>.<name>`; entries read them, too.
@@ -149,7 +150,6 @@ class Term:
     unit: str
     meaning: str
     compute: Callable[..., Any]
-    scalar: bool = False
     objective: str | None = None
     constants: Sequence[Constant] = ()
     keeps: Sequence[Kept] = ()
