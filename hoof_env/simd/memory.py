@@ -359,6 +359,9 @@ class Rows:
         if not self._empty:
             self._write(k if self._size is None else _place(k, self._size), value)
 
+    def __delitem__(self, k: Any) -> NoReturn:
+        refuse_write("a row")
+
     def _check_open(self, name: str) -> None:
         if self._open != ():
             refuse_write(name if name.startswith("[") else repr(name))
