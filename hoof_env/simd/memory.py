@@ -385,9 +385,8 @@ class Rows:
         if self._open != ():
             is_named = self._open is not None and self._open[0] == name
             object.__setattr__(part, "_open", self._open[1:] if is_named else None)
-            if part._size:
-                room = self._layout.size - self._layout.fields[name].start
-                object.__setattr__(part, "_legs", room // part._size)
+            room = self._layout.size - self._layout.fields[name].start
+            object.__setattr__(part, "_legs", room // max(part._size or 1, 1) if part._open != () else 1)
         return part
 
     def __delattr__(self, name: str) -> NoReturn:
