@@ -357,8 +357,8 @@ def test_legs_that_there_are_not():
         return block_at(block_at(scene.leg, 1), 2).report.crank_torque
 
     for base, function, words in (("horse", fifth, "no element 4: there are 4"), ("leg", last, "no element 1")):
-        register(BAD, base=base, entries=[Entry("mine", "mine", "N m", function, PLAIN)])
-        assert words in message(gym.make, BAD)
+        register(f"own/Bad_{base}-v0", base=base, entries=[Entry("mine", "mine", "N m", function, PLAIN)])
+        assert words in message(gym.make, f"own/Bad_{base}-v0")
 
 
 # Every front door
