@@ -14,7 +14,7 @@ from hoof_env.envs.batch_build import find_entries
 from hoof_env.envs.conditions import under_each
 from hoof_env.envs.infos import InfoLayout
 from hoof_env.envs.scene import ALL_ARRAYS, TaskKind, functions_of, is_from_outside, known_of
-from hoof_env.envs.step import NOT_A_NUMBER, StepKernels, step_kernels
+from hoof_env.envs.step import NOT_A_NUMBER, step_kernels
 from hoof_env.errors import ParameterError
 from hoof_env.simd.compile import Kernel
 from hoof_env.simd.layout import views

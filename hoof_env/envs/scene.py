@@ -76,9 +76,7 @@ class TaskKind:
     @cached_property
     def layouts(self) -> Memories:
         """Layouts of the memory of a step."""
-        return memories_of(
-            self.body.episode, len(self.terms), self.engine.features, self.body.legs, self.own
-        )
+        return memories_of(self.body.episode, len(self.terms), self.engine.features, self.body.legs, self.own)
 
     @cached_property
     def slots(self) -> Slots:

@@ -339,7 +339,7 @@ class Rows:
     def __len__(self) -> int:
         if self._size is None:
             raise TypeError("these rows have no length")
-        return self._size  # type: ignore[no-any-return]
+        return int(self._size)
 
     def __bool__(self) -> bool:
         if self._open != ():

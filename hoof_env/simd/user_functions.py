@@ -197,7 +197,9 @@ def _place(error: Exception) -> str:
     """Return function and line of the user's file."""
     if isinstance(error, _Unsteady):
         return ""
-    frames = [frame for frame in traceback.extract_tb(error.__traceback__) if not _is_in(frame.filename, OURS)]
+    frames = [
+        frame for frame in traceback.extract_tb(error.__traceback__) if not _is_in(frame.filename, OURS)
+    ]
     users = [frame for frame in frames if not _is_in(frame.filename, LIBRARIES)] or frames
     return f", in {users[-1].name} ({users[-1].filename}, line {users[-1].lineno})" if users else ""
 
@@ -275,7 +277,7 @@ def _variables(function: FunctionType) -> Iterator[tuple[str, Any]]:
     yield from vars(function).items()
 
 
-def check_imports(name: str, function: FunctionType, error: type[ParameterError] = ParameterError) -> None:
+def check_imports(name: str, function: Any, error: type[ParameterError] = ParameterError) -> None:
     """Raise ParameterError, or the given kind of it, if a function or a helper of it imports something."""
     for each, _ in _reached(function):
         for line in _imports(each.__code__):

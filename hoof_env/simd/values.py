@@ -266,22 +266,20 @@ class Mask(Value):
         one, other = (part.to_real() if isinstance(part, Mask) else part for part in (one, other))
         return _sum(sign, one, other)
 
-    def __add__(self, other: Number) -> Lanes:
-        return self._sum("+", self, other)  # type: ignore[no-any-return]
+    def __add__(self, other: Any) -> Any:
+        return self._sum("+", self, other)
 
-    def __radd__(self, other: Number) -> Lanes:
-        return self._sum("+", other, self)  # type: ignore[no-any-return]
+    def __radd__(self, other: Any) -> Any:
+        return self._sum("+", other, self)
 
-    def __sub__(self, other: Number) -> Lanes:
-        return self._sum("-", self, other) if not isinstance(other, Mask) else NotImplemented
+    def __sub__(self, other: Any) -> Any:
+        return NotImplemented if isinstance(other, Mask) else self._sum("-", self, other)
 
-    def __rsub__(self, other: Number) -> Lanes:
-        return self._sum("-", other, self)  # type: ignore[no-any-return]
+    def __rsub__(self, other: Any) -> Any:
+        return self._sum("-", other, self)
 
-    def __mul__(self, other: Number) -> Lanes:
-        if isinstance(other, (bool, Mask)):
-            return self & other  # type: ignore[return-value]
-        return product(self.to_real(), other)  # type: ignore[no-any-return]
+    def __mul__(self, other: Any) -> Any:
+        return self & other if isinstance(other, (bool, Mask)) else product(self.to_real(), other)
 
     __rmul__ = __mul__
 
@@ -357,14 +355,16 @@ class Plane(Value):
         return self
 
     def __abs__(self) -> Lanes:
-        return absolute(self)  # type: ignore[call-overload,no-any-return]
+        return absolute(self)  # type: ignore[call-overload]
 
     def conjugate(self) -> Plane:
         """Return the mirror image at the x axis."""
         return Plane(self.a, -self.b)
 
     def __eq__(self, other: Any) -> Any:
-        return (self.a == other.a) & (self.b == other.b) if isinstance(other, Plane) else _no_match(self, other)
+        return (
+            (self.a == other.a) & (self.b == other.b) if isinstance(other, Plane) else _no_match(self, other)
+        )
 
     def __ne__(self, other: Any) -> Any:
         return ~(self == other)
@@ -689,7 +689,7 @@ def where(condition: Any, yes: Any, no: Any) -> Any:
         if isinstance(yes, Plane) and isinstance(no, Plane):
             return Plane(where(condition, yes.a, no.a), where(condition, yes.b, no.b))
     if isinstance(yes, (Mask, bool, np.bool_)) and isinstance(no, (Mask, bool, np.bool_)):
-        return (condition & yes) | (~condition & no)
+        return (condition._with("and", yes)) | ((~condition)._with("and", no))
     yes, no = (part.to_real() if isinstance(part, Mask) else _single(part) for part in (yes, no))
     if not (is_real(yes) and is_real(no)):
         raise TraceError(f"where() of {kind_of(no if is_real(yes) else yes)}: expected two numbers")

@@ -6,6 +6,7 @@ import copy
 import gc
 import pickle
 import re
+import runpy
 import subprocess
 import sys
 import textwrap
@@ -343,7 +344,8 @@ def test_the_page_shows_the_examples():
     assert len("".join(shown).split()) > 0.6 * len(first.split())
     rest = [block for block in blocks if block not in first]
     assert len([block for block in rest if block in second]) == 3
-    (curricula,) = (block for block in rest if block not in second)
+    on_arrays, curricula = sorted((block for block in rest if block not in second), key=len)
+    exec(compile(on_arrays, "own_task.md", "exec"), runpy.run_path(str(folder / "own_task.py")))
     known = {}
     exec(compile(curricula, "own_task.md", "exec"), known)
     assert known["envs"].call("settings")[1].target_speed == [3.0, 3.5]

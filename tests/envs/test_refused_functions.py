@@ -56,8 +56,14 @@ def registration(kind, function, keeps=()):
     if kind == "entry":
         return {"entries": [Entry("mine", "mine", "-", function, PLAIN)]}
     if kind == "scale":
-        return {"entries": [Entry("mine", "mine", "-", lambda scene: scene.episode.time, Scale("odd", function))]}
-    return {"action_map": ActionMap("mine", {"a": "-"}, function)} if kind == "map" else {"contact_law": function}
+        return {
+            "entries": [Entry("mine", "mine", "-", lambda scene: scene.episode.time, Scale("odd", function))]
+        }
+    return (
+        {"action_map": ActionMap("mine", {"a": "-"}, function)}
+        if kind == "map"
+        else {"contact_law": function}
+    )
 
 
 CASES = [
@@ -356,7 +362,10 @@ def test_legs_that_there_are_not():
     def last(scene):
         return block_at(block_at(scene.leg, 1), 2).report.crank_torque
 
-    for base, function, words in (("horse", fifth, "no element 4: there are 4"), ("leg", last, "no element 1")):
+    for base, function, words in (
+        ("horse", fifth, "no element 4: there are 4"),
+        ("leg", last, "no element 1"),
+    ):
         register(f"own/Bad_{base}-v0", base=base, entries=[Entry("mine", "mine", "N m", function, PLAIN)])
         assert words in message(gym.make, f"own/Bad_{base}-v0")
 
@@ -372,7 +381,10 @@ def test_every_front_door_refuses_and_the_next_make_works():
     function, place = defined("term", "return 1.0 if step.progress > 0.0 else 0.0 #!")
     register(BAD, **registration("term", function))
     doors = [gym.make, lambda id: gym.make_vec(id, num_envs=9), lambda id: hoof_env.HorseLegEnv(task=id)]
-    doors += [lambda id: gym.make(id, action_delay=0.5), lambda id: gym.make_vec(id, 2, autoreset_mode="SAME_STEP")]
+    doors += [
+        lambda id: gym.make(id, action_delay=0.5),
+        lambda id: gym.make_vec(id, 2, autoreset_mode="SAME_STEP"),
+    ]
     for make in doors:
         found = message(make, BAD)
         assert found.startswith(f"{BAD}: term 'mine': `if`")

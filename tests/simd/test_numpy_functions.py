@@ -89,7 +89,7 @@ EXACT = {
     ">=": lambda x, y: number(x >= y),
     "==": lambda x, y: number(x == y),
     "!=": lambda x, y: number(x != y),
-    "number < x": lambda x, y: number(0.5 < x),
+    "number < x": lambda x, y: number(0.5 < x),  # noqa: SIM300
     "np.less": lambda x, y: number(np.less(x, y)),
     "np.less_equal": lambda x, y: number(np.less_equal(x, y)),
     "np.greater": lambda x, y: number(np.greater(x, y)),
