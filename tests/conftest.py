@@ -17,9 +17,9 @@ from filelock import FileLock
 
 import hoof_env
 from hoof_env._collector import paused
-from hoof_env.simd.compile import QUIET
 
-os.environ.setdefault(QUIET, "1")
+
+
 os.environ["SDL_VIDEODRIVER"] = "dummy"
 for library in ("OMP", "OPENBLAS", "MKL"):
     os.environ.setdefault(f"{library}_NUM_THREADS", "1")

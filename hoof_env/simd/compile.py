@@ -75,13 +75,12 @@ def _identity() -> str:
     return " ".join((llvm.get_process_triple(), *_host(), version, str(LEVEL)))
 
 
-def compiled(text: str) -> bytes:
-    """Return the object of a module.
+def optimised(text: str, target: Any) -> Any:
+    """Return LLVM's module of a text, optimised for one of LLVM's target machines.
 
     Raises:
         CompilerError: LLVM refuses the text.
     """
-    target = _target()
     try:
         module = llvm.parse_assembly(text)
         module.verify()
@@ -90,7 +89,6 @@ def compiled(text: str) -> bytes:
         tuning.loop_vectorization = tuning.slp_vectorization = False
         passes = llvm.create_pass_builder(target, tuning)
         passes.getModulePassManager().run(module, passes)
-        return bytes(target.emit_object(module))
     except RuntimeError as error:
         words = str(error).strip().splitlines()
         hint = ""
@@ -99,6 +97,12 @@ def compiled(text: str) -> bytes:
                 "; a value that was made inside `when`, `cond` or `loop` is used outside: keep it in a `Cell`"
             )
         raise CompilerError(f"LLVM refuses a kernel{hint}: {words[0] if words else error!r}") from error
+    return module
+
+
+def compiled(text: str, target: Any) -> bytes:
+    """Return the object of a module for one of LLVM's target machines."""
+    return bytes(target.emit_object(optimised(text, target)))
 
 
 class Code:
@@ -132,14 +136,14 @@ if hasattr(os, "register_at_fork"):  # another thread may have it when a process
 def code_of(text: str, name: str) -> Code:
     """Return the machine code of a module: loaded before, read from a file, or compiled."""
     with _LOCK:
-        _target()
+        target = _target()
         digest = hashlib.sha256(f"{_identity()}\n{text}".encode()).hexdigest()
         code = _LOADED.get(digest)
         if code is None:
             file = f"{name}-{digest[:40]}.o"
             content = objects.read(file)
             if content is None:
-                content = compiled(text)
+                content = compiled(text, target)
                 COMPILED.append(name)
                 objects.write(file, content)
             code = _LOADED[digest] = Code(content)
