@@ -18,8 +18,6 @@ from filelock import FileLock
 import hoof_env
 from hoof_env._collector import paused
 
-
-
 os.environ["SDL_VIDEODRIVER"] = "dummy"
 for library in ("OMP", "OPENBLAS", "MKL"):
     os.environ.setdefault(f"{library}_NUM_THREADS", "1")

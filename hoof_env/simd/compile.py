@@ -96,7 +96,7 @@ def optimised(text: str, target: Any) -> Any:
             hint = (
                 "; a value that was made inside `when`, `cond` or `loop` is used outside: keep it in a `Cell`"
             )
-        raise CompilerError(f"LLVM refuses a kernel{hint}: {words[0] if words else error!r}") from error
+        raise CompilerError(f"LLVM refuses a kernel{hint}: {' '.join(words[:3])}") from error
     return module
 
 

@@ -75,6 +75,8 @@ class Value:
             given = f"np.{ufunc.__name__}" + ("" if method == "__call__" else f".{method}")
             extra = f" with {', '.join(named)}" if named else ""
             raise TraceError(f"{given}{extra} of {self.kind}: kernels have {_names(UFUNCS)}")
+        if any(isinstance(value, np.ndarray) for value in inputs):
+            raise TraceError(f"an array of NumPy with {self.kind} of a kernel: expected numbers")
         return function(*inputs)
 
     def __array_function__(self, function: Any, types: Any, inputs: Any, named: Any) -> Any:
@@ -375,8 +377,6 @@ def payload(value: Any, n: int) -> Any:
         return CURRENT.machine.single(value.x) if value.n else CURRENT.machine.spread(value.x, n)
     if isinstance(value, Index):
         return CURRENT.machine.spread(value.to_real().x, n)
-    if isinstance(value, np.ndarray):
-        raise TraceError("an array of NumPy with a value of a kernel: expected a number")
     return CURRENT.machine.number(float(value), n)
 
 

@@ -30,7 +30,7 @@ LANES = [0, 1, 8]
 
 
 def both(made, *arguments):
-    """The result of a kernel, and arrays that it changed; by machine code, of which NumPy has the same bits."""
+    """The result of a kernel by machine code; on NumPy it has the same, and changes arrays alike."""
     copies = [x.copy() if isinstance(x, np.ndarray) else x for x in arguments]
     found, on_numpy = made(*arguments), made.run_now(*copies)
     assert found == on_numpy or (found != found and on_numpy != on_numpy)
@@ -97,7 +97,7 @@ def test_known_bounds_and_conditions_are_those_of_python():
     @kernel
     def known(x: Number) -> Number:
         total = Cell(0.0)
-        turns = [k for k in loop(2, 8, 3)]
+        turns = list(loop(2, 8, 3))
         assert turns == [2, 5]
         for k in loop(4):
             if k > 1:
@@ -227,7 +227,7 @@ def test_a_value_that_leaves_its_branch_is_refused_in_words():
         when(x > 0.0)(lambda: kept.append(x * 2.0))
         return kept[0]
 
-    with pytest.raises(CompilerError, match="made inside `when`, `cond` or `loop` is used outside.*Cell"):
+    with pytest.raises(CompilerError, match=r"made inside `when`, `cond` or `loop` is used outside.*Cell"):
         leaving(1.0)
 
 
@@ -246,7 +246,7 @@ def test_a_value_that_leaves_its_loop_is_refused_or_is_of_the_last_turn():
         for k in loop(count):
 
             @when(k > 1)
-            def _() -> None:
+            def _(k=k) -> None:
                 nonlocal last
                 last = x + k
 

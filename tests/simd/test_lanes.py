@@ -151,7 +151,13 @@ def test_what_is_rounded_or_came_through_memory_enters_a_sum_so(close, count):
         row = new_rows(None, count, 1)
         row[0] = a * b
         z = rounded(vector(a, c) * b)
-        return [rounded(a * b) + c, row[0] + c, (z + vector(c, b)).real, -(a * b) + c, where(a > 0, a * b, b) + c]
+        return [
+            rounded(a * b) + c,
+            row[0] + c,
+            (z + vector(c, b)).real,
+            -(a * b) + c,
+            where(a > 0, a * b, b) + c,
+        ]
 
     a, b, c = exact(*close[:3])
     products = [Fraction(float(x * y)) for x, y in zip(a, b, strict=True)]
@@ -277,5 +283,5 @@ def test_lanes_of_different_counts_do_not_mix():
     def mix(x: Matrix) -> None:
         write(read(x.first, 0, 1, 4) + read(x.first, 0, 1, 8), x.first, 0, 1)
 
-    with pytest.raises(TraceError, match="4 lanes with 8|8 lanes with 4"):
+    with pytest.raises(TraceError, match=r"4 lanes with 8|8 lanes with 4"):
         mix(np.zeros(8))

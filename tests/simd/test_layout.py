@@ -24,7 +24,6 @@ class Thing(Layout):
     heel: Point
 
 
-
 def test_positions_follow_from_the_declaration():
     assert (Thing.size, Point.size) == (10, 3)
     assert Thing.names[:5] == ("mass", "numbers_0", "numbers_1", "numbers_2", "toe_place_x")
@@ -164,7 +163,12 @@ def test_rows_without_names_have_numbers_only():
 def test_a_layout_takes_more_fields_behind_its_own():
     wider = extended(Thing, "own", {"drift": {"wind": Row, "rain": Vector}, "last": {"x": Row}})
     assert wider.names[: Thing.size] == Thing.names
-    assert wider.names[Thing.size :] == ("own_drift_wind", "own_drift_rain_x", "own_drift_rain_y", "own_last_x")
+    assert wider.names[Thing.size :] == (
+        "own_drift_wind",
+        "own_drift_rain_x",
+        "own_drift_rain_y",
+        "own_last_x",
+    )
 
     @kernel
     def fill(data: Matrix) -> None:

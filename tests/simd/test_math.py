@@ -130,7 +130,8 @@ def test_a_lane_has_the_bits_that_it_has_alone(name):
     side_by_side[name].run_now(x[:96], few)
     np.testing.assert_array_equal(few, out[:96])
     plain = {
-        "cosine": np.cos, "sine": np.sin, "tanh": np.tanh, "exponential": lambda x: np.exp(np.maximum(x, -40)),
+        "cosine": np.cos, "sine": np.sin, "tanh": np.tanh,
+        "exponential": lambda x: np.exp(np.maximum(x, -40)),
     }.get(name) or (lambda x: np.maximum(x, 0.0) ** (int(name.split()[1]) / 8))  # fmt: skip
     with np.errstate(invalid="ignore"):
         np.testing.assert_allclose(out[5:], plain(x[5:]), rtol=1e-13, atol=1e-13)

@@ -13,7 +13,10 @@ from hoof_env.simd import Number, Whole, columns, loop, read, where, write
 from hoof_env.simd.compile import Kernel
 from hoof_env.simd.memory import LARGE, LINE, Arrays, RecordType, aligned
 
-RECORD = np.dtype([("count", "i8"), ("factor", "f8"), ("flags", "?"), ("grid", "f8", (2, 3)), ("ways", "i8", (2,))], align=True)  # fmt: skip
+RECORD = np.dtype(
+    [("count", "i8"), ("factor", "f8"), ("flags", "?"), ("grid", "f8", (2, 3)), ("ways", "i8", (2,))],
+    align=True,
+)
 
 ARRAYS = Arrays(
     {"x": "f8", "out": "f4", "which": "i8", "record": RecordType(RECORD, {"count": 2, "known": (1.5, 2.5)})}

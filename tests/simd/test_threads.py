@@ -96,8 +96,8 @@ def test_an_interrupt_at_any_line_loses_no_call():
     """Wherever in the function it comes, as far as Python can be traced; then all is as before."""
     handler = signal.getsignal(signal.SIGINT)
     lines = 0
-    for where in range(1000):
-        slow, left = Slow(0.001), [where]
+    for line in range(1000):
+        slow, left = Slow(0.001), [line]
 
         def trace(frame, event, argument, left=left):
             if frame.f_code.co_filename == threading.__file__:
