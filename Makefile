@@ -6,7 +6,7 @@
 #   TORCH_INDEX=URL     where Linux takes PyTorch from; empty for pip's own index, which has the CUDA build
 
 .DEFAULT_GOAL := help
-.PHONY: help setup setup-demo demo test kernels test-slow test-peers test-oldest test-lab test-ecosystem bench baselines docs test-site test-links lint clean
+.PHONY: help setup setup-demo demo test test-slow test-peers test-oldest test-lab test-ecosystem bench baselines docs test-site test-links lint clean
 
 PY := .venv/bin/python
 PYTHONS := $(or $(PYTHON),$(PY) python3 python3.14 python3.13 python3.12 python3.11)
@@ -49,15 +49,11 @@ setup setup-demo:
 demo: setup-demo
 	@$(PY) -m agents.demo
 
-# Compiling and mypy take one processor each, so both go on at once. A file's tests stay in one process: the
-# others would make its fixtures again; `LONGEST` of tests/conftest.py begin, and xdist keeps that order. A
+# A file's tests stay in one process: the others would make its fixtures again; `LONGEST` of tests/conftest.py begin, and xdist keeps that order. A
 # process that is lost stays lost: a new one would begin with the test that killed the last.
 test: setup
-	@$(MAKE) --no-print-directory -j2 lint kernels
+	@$(MAKE) --no-print-directory lint
 	@echo 'pytest' && $(PY) -m pytest -q -n auto --dist loadfile --no-loadscope-reorder --max-worker-restart=0
-
-kernels: setup
-	@echo 'kernels' && $(PY) -m tests.kernels
 
 test-slow: setup
 	@echo 'pytest -m slow' && $(PY) -m pytest -q $(LONG) -m slow
@@ -72,7 +68,7 @@ test-oldest: setup
 	@$(PY) -m uv venv -q -p $(PY) .oldest/venv
 	@$(PY) -m uv pip install -q --python .oldest/venv/bin/python --only-binary :all: --resolution lowest-direct -r pyproject.toml --extra render --extra plot --extra export
 	@$(PY) -m uv pip install -q --python .oldest/venv/bin/python --no-deps .oldest/dist/*.whl
-	@NUMBA_CACHE_DIR=.oldest/cache .oldest/venv/bin/python examples/smoke.py
+	@HOOF_ENV_CACHE_DIR=.oldest/cache .oldest/venv/bin/python examples/smoke.py
 
 # Minari and OpenSim would change the versions of .venv. Tests skip where a library is missing: imported first.
 test-lab: setup

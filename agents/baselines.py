@@ -114,7 +114,7 @@ def start(one: Run, folder: Path) -> subprocess.Popen[bytes]:
     # The log needs the folder before the training makes it
     (folder / one.name).mkdir(parents=True, exist_ok=True)
     # One thread each: several trainings share the cores
-    threads = dict.fromkeys(("OMP_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS"), "1")
+    threads = dict.fromkeys(("OMP_NUM_THREADS", "MKL_NUM_THREADS"), "1")
     with (folder / one.name / "log.txt").open("ab") as log:
         return subprocess.Popen(
             [sys.executable, "-m", "agents.baselines_run", *one.command(folder)],

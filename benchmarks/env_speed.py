@@ -49,7 +49,7 @@ INTRO = """\
 Written by `python -m benchmarks.env_speed`, part of `make bench`. One process, one thread, {rounds}
 interleaved rounds of wall time: median (quartiles; extremes). A step is 20 substeps; HorseLegFixed takes
 200, so it has no bars. A horse takes random actions of a tenth of the size, so that it does not fall. Bits:
-of the widest vectors in the code that numba compiles; the others are as they come."""
+of the widest vectors in the code of kernels; the others are as they come."""
 
 
 def measure(rounds: int, steps: int) -> dict[str, Any]:

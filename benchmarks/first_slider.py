@@ -41,7 +41,7 @@ def main() -> None:
         subprocess.run([binaries / "python", "-m", "pip", "install", "-q", f"{wheel}[view]"], check=True)
         tell("installed")
         environment = {name: value for name, value in os.environ.items() if name != "PYTHONPATH"}
-        environment["NUMBA_CACHE_DIR"] = str(place / "kernels")
+        environment["HOOF_ENV_CACHE_DIR"] = str(place / "kernels")
         command = [str(binaries / "hoof-env"), "view", "--no-open", "--port", "0"]
         with subprocess.Popen(
             command, cwd=place, env=environment, stdout=subprocess.PIPE, text=True

@@ -25,7 +25,7 @@ INTRO = """\
 # How fast it was, run by run
 
 Written by `make bench`, which adds rows and replaces none. A ratio is the median of interleaved rounds with
-its quartiles; bits are of the widest vectors that numba compiled. The last run of each width in full:"""
+its quartiles; bits are of the widest vectors in the code of kernels. The last run of each width in full:"""
 
 Row = tuple[str, str, Mapping[str, float] | None, float | None]
 """Case, the case that it is compared with, the ratio's spread if it was measured, and the bar if there is

@@ -1,4 +1,4 @@
-"""Description of the machine of a benchmark, and of the code that numba compiled for it."""
+"""Description of the machine of a benchmark, and of the machine code of kernels on it."""
 
 from __future__ import annotations
 
@@ -11,15 +11,13 @@ from functools import cache
 from importlib import metadata
 from pathlib import Path
 
-import numba
-import numpy as np
-from numba.core.registry import cpu_target
+import llvmlite.binding as llvm
 
 from agents.runs import processor
-from hoof_env.simd import read, rows, write
-from hoof_env.simd.memory import address, doubles
+from hoof_env.simd import Matrix, read, write
+from hoof_env.simd.compile import host, optimised, target, traced
 
-PACKAGES = ("hoof-env", "numba", "llvmlite", "numpy", "mujoco", "exudyn")
+PACKAGES = ("hoof-env", "llvmlite", "numpy", "mujoco", "exudyn")
 
 
 def machine() -> dict[str, str]:
@@ -36,24 +34,20 @@ def machine() -> dict[str, str]:
 
 
 def compiled_for() -> str:
-    """Return LLVM's name of the processor that numba compiles for; `NUMBA_CPU_NAME` can name another."""
-    return str(cpu_target.target_context.codegen().magic_tuple()[1])
+    """Return LLVM's name of the processor that kernels are compiled for; `HOOF_ENV_CPU` can name another."""
+    return host()[0]
 
 
 @cache
 def vector_bits() -> int:
-    """Return the bits of the widest vectors in the code that numba makes here, read off the sum of eight
-    lanes."""
+    """Return the bits of the widest vectors in the code of kernels here, read off the sum of eight lanes."""
 
-    @numba.njit
-    def add(x):  # type: ignore[no-untyped-def]
-        row = rows(doubles(8), 8, None)
-        one = read(row, address(x), 0, 1)
-        write(one + one, address(x), 0, 1)
+    def add(x: Matrix) -> None:
+        one = read(x.first, 0, 1, 8)
+        write(one + one, x.first, 0, 1)
 
-    add(np.zeros(8))
-    # Names of registers tell the width: numba may be told another processor than this one
-    code = "".join(add.inspect_asm().values())
+    # names of registers tell the width: `HOOF_ENV_CPU` may name another processor than this one
+    code = target().emit_assembly(optimised(traced(add, [Matrix])[0]))
     if registers := re.findall(r"%([xyz])mm", code):  # registers of x86
         return {"x": 128, "y": 256, "z": 512}[max(registers)]
     return 128 if re.search(r"\bv\d+\.2d", code) else 64

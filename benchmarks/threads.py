@@ -21,7 +21,6 @@ from pathlib import Path
 from typing import Any
 from unittest.mock import patch
 
-import numba
 import numpy as np
 
 from benchmarks.history import RESULTS, write
@@ -30,6 +29,8 @@ from benchmarks.rounds import bar_text, describe, interleave, spread
 from hoof_env._output import markdown_table
 from hoof_env.dynamics.advance import LANES
 from hoof_env.envs.vector import HorseLegVectorEnv
+from hoof_env.simd import Whole
+from hoof_env.simd.compile import Kernel
 from hoof_env.simd.threads import available, run_together
 
 LEGS = 1024
@@ -106,7 +107,7 @@ class Processes:
     """Worker processes that share the legs equally."""
 
     def __init__(self, count: int) -> None:
-        # A forked process would inherit numba's threads
+        # a forked process would inherit threads
         context = multiprocessing.get_context("spawn")
         self.pipes = []
         for _ in range(count):
@@ -137,13 +138,14 @@ class Processes:
 def call_cost(calls: int) -> float:
     """Return the time [s] of each additional call to a thread, of a kernel that does nothing."""
 
-    @numba.njit(nogil=True)
-    def nothing(x):  # type: ignore[no-untyped-def]
-        return x
+    def nothing(x: Whole) -> None:
+        """Do nothing."""
+
+    kernel = Kernel(nothing, [int], threads=True)
 
     def timed(count: int) -> float:
         begin = time.perf_counter()
-        run_together(nothing, [(1,)] * count, count)
+        run_together(kernel, [(1,)] * count, count)
         return time.perf_counter() - begin
 
     timed(1), timed(calls)  # compiled, and threads started

@@ -1,6 +1,6 @@
 """hoof-env: a Gymnasium environment for learned gait control of a horse's leg.
 
-Importing the package registers its environments and nothing more: numba, pygame and the rest load when
+Importing the package registers its environments and nothing more: llvmlite, pygame and the rest load when
 needed.
 """
 

@@ -214,20 +214,9 @@ def mjcf(
     _say(f"{out}: {_size(out)}{made}")
 
 
-def compile() -> None:
-    """Compile the kernels of all environments now, for an image of a container or before workers begin.
-
-    They are kept in the folder NUMBA_CACHE_DIR. Environments with a hoof_stiffness, an engine with four
-    legs and `reproduce` have further kernels, which are compiled at the first use.
-    """
-    from hoof_env.envs.compile_ahead import compile_kernels
-
-    compile_kernels(_say)
-
-
 COMMANDS: dict[str, Callable[..., None]] = {
     command.__name__: command
-    for command in (reproduce, render, view, export, compare, average, manual, mjcf, compile)
+    for command in (reproduce, render, view, export, compare, average, manual, mjcf)
 } | {"evaluate": evaluate, "list": list_ids, "demo": demo}
 """Functions by sub-command, in the order of the help."""
 

@@ -29,7 +29,7 @@ def processor() -> float:
 
 def timed(title: str, command: list[str], folder: Path) -> None:
     """Run a command and print its line of the table."""
-    env = {key: value for key, value in os.environ.items() if key not in ("PYTHONPATH", "NUMBA_CACHE_DIR")}
+    env = {key: value for key, value in os.environ.items() if key not in ("PYTHONPATH", "HOOF_ENV_CACHE_DIR")}
     began, used = time.monotonic(), processor()
     done = subprocess.run(
         command, cwd=folder, env=env, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True

@@ -1,5 +1,4 @@
-"""For all tests: compiling says nothing, whose lines some tests would count, windows are drawn unseen, and
-nobody computes in threads: there is a process on each processor, and threads that wait for others spin.
+"""For all tests: windows are drawn unseen, and nobody computes in threads: there is a process on each processor, and threads that wait for others spin.
 
 Where PyTorch cannot be had, what needs it is left out, and a line at the end says so."""
 
@@ -57,7 +56,6 @@ LONGEST = (
     "ecosystem/test_wrappers.py",
     "test_docs.py",
     "ecosystem/test_suite.py",
-    "simd/test_trusted_files.py",
 )
 """Files that take longest, the longest first. They begin: one that began last would keep one processor busy
 while the others have nothing left to do."""

@@ -176,7 +176,8 @@ class StepLength(Mechanics):
         for limb, profile in zip(self.limbs, self.profiles, strict=True):
             value, slope = map(by_name, _samples(profile))
             lower = np.minimum(value["toe_y"], value["heel_y"])
-            low = lower <= np.median(lower)
+            half = len(lower) // 2  # not `np.median`, which imports NumPy's masked arrays
+            low = lower <= np.sort(lower)[[(len(lower) - 1) // 2, half]].mean()
             x, y = (float(np.max(self._mobility(limb, value, slope, axis)[low])) for axis in "xy")
             # on a slope the normal may point in any direction
             slides, sinks = (x, y) if is_level else (max(x, y), max(x, y))

@@ -7,7 +7,7 @@ from typing import Any
 from hoof_env.dynamics.advance import LANES
 from hoof_env.envs.frames_kernel import publish
 from hoof_env.envs.scene import Scene, functions_of, is_from_outside
-from hoof_env.simd import Lanes, Whole, apply_to_rows, full_like, new_rows, when, where, write
+from hoof_env.simd import Lanes, Whole, apply_to_rows, full_like, loop, new_rows, rolled, when, where, write
 from hoof_env.simd.math import clip, tanh
 from hoof_env.simd.noise import uniform
 from hoof_env.simd.user_functions import foreign, number_of
@@ -47,10 +47,10 @@ def add_noise(scene: Scene, numbers: Any, n: Whole, ahead: int) -> None:
     key = full_like(numbers, episode.noise_key)
     now = full_like(numbers, episode.steps + float(ahead))
     strength = full_like(numbers, episode.strength)
-    for slot in range(scene.kind.slots.count):
+    for slot in loop(rolled(scene.kind.slots.count)):
 
         @when(task.noise[slot] + task.bias[slot] > 0.0)
-        def _(slot: int = slot) -> None:
+        def _(slot: Whole = slot) -> None:
             # a bias is the noise of a time that never comes
             error = task.noise[slot] * uniform(key, now, slot)
             error = error + task.bias[slot] * uniform(key, -1.0, slot)

@@ -189,6 +189,8 @@ class ConstrainedLeg:
         self._system[:size, :size] = np.diag(np.column_stack([masses, masses, inertias]).ravel())  # Eqs. 4, 5
         self._weight = np.zeros(size)
         self._weight[1::3] = -masses * GRAVITY  # Eq. 7
+        # the constraints at the end of the last substep, and qdd if no ground force was in it
+        self._present: tuple[Closure, Vector | None] | None = None
         self.state = ConstrainedState(
             Body(),
             Motion(),
@@ -248,6 +250,7 @@ class ConstrainedLeg:
             raise ParameterError(f"trace: expected rows of new_trace, got an array of {trace.dtype}")
         numbers = command.tolist()
         before = self.state.copy()
+        self._present = None  # that of another command, or of another state
         result = Result.OK
         try:
             with np.errstate(all="ignore"):  # a diverging integration is a result, not a warning
@@ -288,6 +291,9 @@ class ConstrainedLeg:
         command_filters(state.filters, command, self._settings)
 
         def acceleration(elapsed: float, q: Vector, qd: Vector) -> Vector:
+            if elapsed == 0.0 and self._present is not None:
+                closure, qdd = self._present
+                return self._solve(closure)[0] if qdd is None else qdd
             # Ground forces stay out: they do not change qdd, and a contact must not latch at a stage.
             motion = replace(state.motion)
             filters = [replace(one) for one in state.filters]
@@ -316,7 +322,9 @@ class ConstrainedLeg:
         for contact, place, rate in zip(state.contacts, at.tolist(), velocity.tolist(), strict=False):
             touch(contact, trunk + mirror(place, travel), mirror(rate, travel), self._ground)
         closure = self.closure()
-        _, multipliers = self._solve(closure, self._ground_load())
+        load = self._ground_load()
+        qdd, multipliers = self._solve(closure, load)
+        self._present = closure, None if load.any() else qdd
         # The drives bring in lambda . Phi_t, so the torques are lambda . dPhi/dtheta and lambda . dPhi/dphi.
         crank = multipliers[-1]
         hip = multipliers @ closure.by_phi
@@ -332,8 +340,8 @@ class ConstrainedLeg:
         row["y"] = self.trunk.height
         row["centre_x"] = row["x"]
         row["centre_y"] = row["y"]
-        for name, angle in zip(MOTION_NAMES, astuple(motion), strict=True):
-            row[name] = angle
+        for name, symbol in zip(MOTION_NAMES, MOTION.names or (), strict=True):
+            row[name] = getattr(motion, symbol)
         for name, one in zip(PARAMETERS, self.state.filters, strict=True):
             row[name] = one.value
             row[f"{name}_rate"] = one.rate

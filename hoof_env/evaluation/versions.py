@@ -6,7 +6,7 @@ import platform
 from contextlib import suppress
 from importlib.metadata import PackageNotFoundError, version
 
-PACKAGES = ("hoof-env", "numpy", "gymnasium", "numba", "stable-baselines3", "sb3-contrib", "torch")
+PACKAGES = ("hoof-env", "numpy", "gymnasium", "llvmlite", "stable-baselines3", "sb3-contrib", "torch")
 
 
 def versions() -> dict[str, str]:

@@ -37,7 +37,7 @@ PAGE = Path(__file__).with_name("report.md.in")
 
 # Digits behind the decimal point by unit or by measure of a bar.
 _DIGITS = {"s": 4, "deg": 2, "N": 1, "%": 2, "-": 3, "point": 2, "": 3}
-_PACKAGES = ("gymnasium", "numpy", "numba")
+_PACKAGES = ("gymnasium", "numpy", "llvmlite")
 
 
 def markdown(reproduction: Reproduction, *, command: str, figures: bool) -> str:

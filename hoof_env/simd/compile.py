@@ -46,14 +46,14 @@ class CompilerError(HoofEnvError):
     """LLVM refused a kernel, which is an error of this package."""
 
 
-def _host() -> tuple[str, str]:
+def host() -> tuple[str, str]:
     """Return LLVM's names of the processor and its features."""
     given = os.environ.get(PROCESSOR)
     return (given, "") if given else (llvm.get_host_cpu_name(), llvm.get_host_cpu_features().flatten())
 
 
 def _new_target() -> Any:
-    cpu, features = _host()
+    cpu, features = host()
     target = llvm.Target.from_triple(llvm.get_process_triple())
     return target.create_target_machine(
         cpu=cpu, features=features, opt=LEVEL, reloc="pic", codemodel="small", jit=True
@@ -61,7 +61,7 @@ def _new_target() -> Any:
 
 
 @cache
-def _target() -> Any:
+def target() -> Any:
     """Return LLVM's machine for this processor, started at the first call."""
     llvm.initialize_native_target()
     llvm.initialize_native_asmprinter()
@@ -72,23 +72,20 @@ def _target() -> Any:
 def _identity() -> str:
     """Return all that machine code depends on besides its text."""
     version = ".".join(map(str, llvm.llvm_version_info))
-    return " ".join((llvm.get_process_triple(), *_host(), version, str(LEVEL)))
+    return " ".join((llvm.get_process_triple(), *host(), version, str(LEVEL)))
 
 
-def optimised(text: str, target: Any) -> Any:
-    """Return LLVM's module of a text, optimised for one of LLVM's target machines.
+def optimised(text: str, machine: Any = None) -> Any:
+    """Return the module of a text after LLVM's passes, for this processor or another of LLVM's target
+    machines.
 
     Raises:
         CompilerError: LLVM refuses the text.
     """
+    machine = machine or target()
     try:
         module = llvm.parse_assembly(text)
         module.verify()
-        module.triple, module.data_layout = target.triple, str(target.target_data)
-        tuning = llvm.create_pipeline_tuning_options(speed_level=LEVEL)
-        tuning.loop_vectorization = tuning.slp_vectorization = False
-        passes = llvm.create_pass_builder(target, tuning)
-        passes.getModulePassManager().run(module, passes)
     except RuntimeError as error:
         words = str(error).strip().splitlines()
         hint = ""
@@ -97,12 +94,18 @@ def optimised(text: str, target: Any) -> Any:
                 "; a value that was made inside `when`, `cond` or `loop` is used outside: keep it in a `Cell`"
             )
         raise CompilerError(f"LLVM refuses a kernel{hint}: {' '.join(words[:3])}") from error
+    module.triple, module.data_layout = machine.triple, str(machine.target_data)
+    tuning = llvm.create_pipeline_tuning_options(speed_level=LEVEL)
+    tuning.loop_vectorization = tuning.slp_vectorization = False
+    passes = llvm.create_pass_builder(machine, tuning)
+    passes.getModulePassManager().run(module, passes)
     return module
 
 
-def compiled(text: str, target: Any) -> bytes:
-    """Return the object of a module for one of LLVM's target machines."""
-    return bytes(target.emit_object(optimised(text, target)))
+def compiled(text: str, machine: Any = None) -> bytes:
+    """Return the object of a module, machine code of this processor or of another machine."""
+    machine = machine or target()
+    return bytes(machine.emit_object(optimised(text, machine)))
 
 
 class Code:
@@ -136,14 +139,14 @@ if hasattr(os, "register_at_fork"):  # another thread may have it when a process
 def code_of(text: str, name: str) -> Code:
     """Return the machine code of a module: loaded before, read from a file, or compiled."""
     with _LOCK:
-        target = _target()
+        target()
         digest = hashlib.sha256(f"{_identity()}\n{text}".encode()).hexdigest()
         code = _LOADED.get(digest)
         if code is None:
             file = f"{name}-{digest[:40]}.o"
             content = objects.read(file)
             if content is None:
-                content = compiled(text, target)
+                content = compiled(text)
                 COMPILED.append(name)
                 objects.write(file, content)
             code = _LOADED[digest] = Code(content)

@@ -6,14 +6,14 @@ from __future__ import annotations
 from typing import Any
 
 from hoof_env.simd.machines import CURRENT
-from hoof_env.simd.values import Lanes, full, rounded, word
+from hoof_env.simd.values import Lanes, Number, Whole, full, rounded, word
 
 GOLDEN = 0x9E3779B97F4A7C15
 _MIXING = ((30, 0xBF58476D1CE4E5B9), (27, 0x94D049BB133111EB), (31, 1))
 _ONE = 0x3FF0000000000000  # bits of the double 1
 
 
-def uniform(key: Lanes, count: Any, number: int) -> Any:
+def uniform(key: Lanes, count: Number, number: Whole) -> Lanes:
     """Return random numbers in [-1, 1), one for each lane, see the package."""
     machine, n = CURRENT.machine, key.n
 
@@ -25,7 +25,8 @@ def uniform(key: Lanes, count: Any, number: int) -> Any:
 
     of_count = mixed(machine.bits(full(count, n).x, n))
     seed = mixed(machine.whole("add", machine.bits(key.x, n), of_count, n))
-    bits = mixed(machine.whole("add", seed, (word(number) + 1) * GOLDEN % 2**64, n))
+    step = machine.index_bits(word((number + 1) * GOLDEN), n)
+    bits = mixed(machine.whole("add", seed, step, n))
     fraction = machine.whole("or", machine.whole("lshr", bits, 12, n), _ONE, n)
     between = Lanes(machine.of_bits(fraction, n), n)
     return rounded(2.0 * between) - 3.0

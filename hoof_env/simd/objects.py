@@ -89,14 +89,14 @@ def write(name: str, content: bytes) -> None:
 
 
 def _is_own(place: Path) -> bool:
-    """Return True if a file or folder belongs to this user and nobody else can change it."""
+    """Return True if a file or folder belongs to this user, or to root, and nobody else can change it."""
     if not hasattr(os, "geteuid"):
         return True  # the folders of Windows' users are their own
     try:
         status = place.stat()
     except FileNotFoundError:
         return False
-    if status.st_uid == os.geteuid() and not status.st_mode & 0o022:
+    if status.st_uid in (os.geteuid(), 0) and not status.st_mode & 0o022:
         return True
     if place not in _SAID:
         _SAID.add(place)

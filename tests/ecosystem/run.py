@@ -118,7 +118,7 @@ def check(
 def _run(command: list[str], folder: Path, seconds: float, log: Path) -> str:
     """Return what ended the command, where that was not its tests; all of its processes are ended with it."""
     paths = os.pathsep.join([str(HERE), *filter(None, [os.environ.get("PYTHONPATH")])])
-    environment = {**os.environ, "PYTHONPATH": paths, "HOOF_ENV_QUIET": "1", "OMP_NUM_THREADS": "1"}
+    environment = {**os.environ, "PYTHONPATH": paths, "OMP_NUM_THREADS": "1"}
     with log.open("w") as file:
         process = subprocess.Popen(
             command, cwd=folder, env=environment, start_new_session=True,

@@ -258,7 +258,7 @@ def test_a_row_without_value_is_outside_its_bar_and_the_worst(cycle):
 
 def test_the_page_names_command_versions_ground_worst_rows_and_identified_geometry(page, reproduction):
     ground = f"K = {reproduction.ground.stiffness:g} N/mⁿ and n = {reproduction.ground.exponent:g} in Eq. 14"
-    for words in ("`hoof-env reproduce --out here`", "numba", "identified, not published", ground):
+    for words in ("`hoof-env reproduce --out here`", "llvmlite", "identified, not published", ground):
         assert words in page
     assert "is the normal force summed over toe and heel throughout" in page
     for row in reproduction.published.rows:

@@ -2,8 +2,7 @@
 
 import llvmlite.binding as llvm
 
-from hoof_env.simd import compile as compile_module
-from hoof_env.simd.compile import LEVEL, compiled, optimised, traced
+from hoof_env.simd.compile import LEVEL, compiled, optimised, target, traced
 
 
 def text_of(kernel):
@@ -13,8 +12,7 @@ def text_of(kernel):
 
 def assembly_of(kernel):
     """Assembly of a kernel for this processor, or for that of HOOF_ENV_CPU."""
-    target = compile_module._target()
-    return target.emit_assembly(optimised(text_of(kernel), target))
+    return target().emit_assembly(optimised(text_of(kernel)))
 
 
 def object_for(kernel, triple, cpu=""):
@@ -22,5 +20,5 @@ def object_for(kernel, triple, cpu=""):
     llvm.initialize_all_targets()
     llvm.initialize_all_asmprinters()
     made = llvm.Target.from_triple(triple)
-    target = made.create_target_machine(cpu=cpu, opt=LEVEL, reloc="pic", codemodel="small", jit=True)
-    return compiled(text_of(kernel), target)
+    machine = made.create_target_machine(cpu=cpu, opt=LEVEL, reloc="pic", codemodel="small", jit=True)
+    return compiled(text_of(kernel), machine)

@@ -188,7 +188,7 @@ def test_a_kernel_without_an_end_is_refused_before_memory_is_gone(monkeypatch):
 
 def test_what_llvm_refuses_says_why():
     with pytest.raises(CompilerError, match=r"LLVM refuses a kernel: .*error: expected type"):
-        compile_module.optimised("define double @kernel( {", compile_module._target())
+        compile_module.optimised("define double @kernel( {")
 
 
 # Machine code in memory
