@@ -224,8 +224,10 @@ class Advance:
         """Load the constants of all legs, which all environments share."""
         size = self.form.constants.size
         stride = size if self.arrangement.lanes_are_legs else 0
-        for k in range(legs * size):
-            self.constants[k] = read(constants.first, k, stride, self.arrangement.lanes)
+        for i in range(legs):
+            of_leg = block_at(self.constants, i)
+            for k in range(size):
+                of_leg[k] = read(constants.first, i * size + k, stride, self.arrangement.lanes)
 
     def __call__(self, n: Whole, h: Lanes | float, steps: Whole, keeps_account: Truth) -> None:
         """Advance environment n and, side by side, its neighbours by `steps` of `h` [s]."""

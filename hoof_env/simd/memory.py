@@ -544,7 +544,7 @@ def block_at(first: AnyLayout, number: Whole) -> AnyLayout:
     if legs is not None or rows._open != ():
         object.__setattr__(part, "_open", rows._open)
         object.__setattr__(part, "_legs", 1 if isinstance(number, Index) else (legs or number + 1) - number)
-    return part  # type: ignore[no-any-return]
+    return part
 
 
 def load_rows(to: AnyLayout, start: AnyLayout) -> None:
