@@ -106,7 +106,7 @@ def find_result(
         for k in range(form.leg_state):
             leg_total = leg_total + leg.state[k] * leg.state[k]
         of_all.value = of_all.value + leg_total
-    total: Lanes = of_all.value
+    total = of_all.value
     if lanes_are_legs:
         total = lane_sum(full_like(trunk, 0.0), total)
         stuck = lane_sum(full_like(trunk, 0.0), stuck)
@@ -224,8 +224,10 @@ class Advance:
         """Load the constants of all legs, which all environments share."""
         size = self.form.constants.size
         stride = size if self.arrangement.lanes_are_legs else 0
-        for k in range(legs * size):
-            self.constants[k] = read(constants.first, k, stride, self.arrangement.lanes)
+        for i in range(legs):
+            of_leg = block_at(self.constants, i)
+            for k in range(size):
+                of_leg[k] = read(constants.first, i * size + k, stride, self.arrangement.lanes)
 
     def __call__(self, n: Whole, h: Lanes | float, steps: Whole, keeps_account: Truth) -> None:
         """Advance environment n and, side by side, its neighbours by `steps` of `h` [s]."""

@@ -26,7 +26,7 @@ from hoof_env.simd import (
     where,
 )
 from hoof_env.simd.math import clip, root_power
-from hoof_env.simd.user_functions import foreign, function_name, number_of
+from hoof_env.simd.user_functions import foreign, function_name, inputs
 
 
 def level_ground(leg: LegRows) -> None:
@@ -263,6 +263,7 @@ def ground_spring(ground: TrunkSettings, stiffness_scale: Lanes, penetration: La
     return ground.stiffness * stiffness_scale * power
 
 
+@inputs
 class GroundHere(NamedTuple):
     """Parameters of the ground under a hoof point, for a law of contact."""
 
@@ -291,9 +292,9 @@ def contact_force(
     if law is None:
         spring = ground_spring(ground, stiffness_scale, penetration, model.eighths)
         return normal_force(spring, ground.chi, ground.dashpot, rate, inverse_speed), spring  # Eq. 14
-    number = number_of(f"the contact law {function_name(law)}")
+    force = foreign(f"the contact law {function_name(law)}", law)
     here = GroundHere(ground.stiffness * stiffness_scale, model.eighths, ground.chi, ground.dashpot)
-    pushed = maximum(number(foreign(law)(penetration, rate, inverse_speed, here)), 0.0)
+    pushed = maximum(force(penetration, rate, inverse_speed, here), 0.0)
     return pushed, 0.0 * pushed
 
 

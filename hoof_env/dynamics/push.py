@@ -29,6 +29,11 @@ def push_cranks(trunk: TrunkRows, legs: LegRows, leg_count: Whole, model: Model,
     move_trunk(trunk, model.kind)
     for i in loop(leg_count):
         leg = block_at(legs, i)
+        # what `meet_ground` would set enters forces only, which do nothing in no time
+        leg.beta_rate = 0.0
+        leg.ground_force = vector(full_like(leg, 0.0), 0.0)
+        leg.ground_moment_theta = 0.0
+        leg.ground_moment_beta = 0.0
         set_up_crank(trunk, leg, True, 0.0)
         load_trunk(trunk, leg, model.kind, True, model.lanes_are_legs)
     # all other forces are finite, and do nothing in no time

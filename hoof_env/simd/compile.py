@@ -75,13 +75,14 @@ def _identity() -> str:
     return " ".join((llvm.get_process_triple(), *host(), version, str(LEVEL)))
 
 
-def optimised(text: str) -> Any:
-    """Return the module of a text for this processor, after LLVM's passes.
+def optimised(text: str, machine: Any = None) -> Any:
+    """Return the module of a text after LLVM's passes, for this processor or another of LLVM's target
+    machines.
 
     Raises:
         CompilerError: LLVM refuses the text.
     """
-    machine = target()
+    machine = machine or target()
     try:
         module = llvm.parse_assembly(text)
         module.verify()
@@ -89,8 +90,10 @@ def optimised(text: str) -> Any:
         words = str(error).strip().splitlines()
         hint = ""
         if "dominate" in str(error):
-            hint = "; a value that was made inside `when`, `cond` or `loop` is used outside: keep it in a `Cell`"
-        raise CompilerError(f"LLVM refuses a kernel{hint}: {words[0] if words else error!r}") from error
+            hint = (
+                "; a value that was made inside `when`, `cond` or `loop` is used outside: keep it in a `Cell`"
+            )
+        raise CompilerError(f"LLVM refuses a kernel{hint}: {' '.join(words[:3])}") from error
     module.triple, module.data_layout = machine.triple, str(machine.target_data)
     tuning = llvm.create_pipeline_tuning_options(speed_level=LEVEL)
     tuning.loop_vectorization = tuning.slp_vectorization = False
@@ -99,9 +102,10 @@ def optimised(text: str) -> Any:
     return module
 
 
-def compiled(text: str) -> bytes:
-    """Return the object of a module, machine code of this processor."""
-    return bytes(target().emit_object(optimised(text)))
+def compiled(text: str, machine: Any = None) -> bytes:
+    """Return the object of a module, machine code of this processor or of another machine."""
+    machine = machine or target()
+    return bytes(machine.emit_object(optimised(text, machine)))
 
 
 class Code:

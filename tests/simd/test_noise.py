@@ -7,32 +7,24 @@ import struct
 import numpy as np
 from scipy import stats
 
-from hoof_env.simd import full_like, read, rows, write
+from hoof_env.simd import Matrix, full, loop, read, write
 from hoof_env.simd.compile import kernel
-from hoof_env.simd.memory import address, doubles
 from hoof_env.simd.noise import uniform
 
 LANES = 8
 
 
-def draw_one(keys, counts, out):
-    memory = rows(doubles(1), 1, None)
-    for row in range(keys.shape[0]):
-        key, count = read(memory, address(keys), row, 1), read(memory, address(counts), row, 1)
-        for k in range(out.shape[1]):
-            write(uniform(key, count, k), address(out), row * out.shape[1] + k, 1)
+def drawing(lanes, width):
+    """A kernel that draws for each key and count `width` numbers, for `lanes` rows at a time."""
 
+    @kernel
+    def draw(keys: Matrix, counts: Matrix, out: Matrix) -> None:
+        for row in loop(0, keys.shape[0], lanes):
+            key, count = read(keys.first, row, 1, lanes), read(counts.first, row, 1, lanes)
+            for k in range(width):
+                write(uniform(key, count, k), out.first, row * width + k, width)
 
-def draw_lanes(keys, counts, out):
-    memory = rows(doubles(LANES), LANES, None)
-    width = out.shape[1]
-    for row in range(0, keys.shape[0], LANES):
-        key, count = read(memory, address(keys), row, 1), read(memory, address(counts), row, 1)
-        for k in range(width):
-            write(uniform(full_like(memory, key), count, k), address(out), row * width + k, width)
-
-
-draw_one, draw_lanes = kernel(draw_one), kernel(draw_lanes)
+    return draw
 
 
 def mixed(z):
@@ -53,9 +45,12 @@ def drawn(n, width, seed=0):
     keys = np.random.default_rng(seed).random(n)
     counts = np.arange(n, dtype=np.float64) // 3
     one, many = np.zeros((n, width)), np.zeros((n, width))
-    draw_one(keys, counts, one)
-    draw_lanes(keys, counts, many)
+    drawing(1, width)(keys, counts, one)
+    drawing(LANES, width)(keys, counts, many)
     assert one.tobytes() == many.tobytes()
+    few = np.zeros((64, width))
+    drawing(LANES, width).run_now(keys[:64], counts[:64], few)
+    assert few.tobytes() == one[:64].tobytes()
     return keys, counts, one
 
 
@@ -75,7 +70,20 @@ def test_they_are_uniform_and_independent_of_their_neighbours():
     # One key over time, as of an episode: not the neighbours of one another.
     times = np.arange(n, dtype=np.float64)
     episode = np.zeros((n, 2))
-    draw_one(np.full(n, 0.37), times, episode)
+    drawing(1, 2)(np.full(n, 0.37), times, episode)
     series = episode[:, 0]
     assert abs(np.corrcoef(series[1:], series[:-1])[0, 1]) < 5 / np.sqrt(n)
     assert stats.kstest(series, "uniform", (-1, 2)).pvalue > 1e-4
+
+
+def test_a_count_may_be_one_for_all_lanes():
+    @kernel
+    def draw(keys: Matrix, count: Matrix, out: Matrix) -> None:
+        shared = read(count.first, 0, 1, 0)
+        key = read(keys.first, 0, 1, LANES)
+        write(uniform(key, shared, 3), out.first, 0, 1)
+        write(uniform(key, full(shared, LANES), 3), out.first, LANES, 1)
+
+    keys, out = np.random.default_rng(5).random(LANES), np.zeros((2, LANES))
+    draw(keys, np.array([7.0]), out)
+    assert out[0].tolist() == out[1].tolist() == [expected(key, 7.0, 3) for key in keys]

@@ -5,13 +5,19 @@ import sys
 import threading
 import time
 
+import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from benchmarks.scenes import engine as scene_engine
+from benchmarks.scenes import scenes
 from hoof_env.errors import ParameterError
-from hoof_env.simd import threads
+from hoof_env.simd import Matrix, columns, loop, read, threads, where, write
+from hoof_env.simd.compile import Kernel, kernel
+from hoof_env.simd.memory import Arrays
 from hoof_env.simd.threads import available, blocks, check_threads, run_together
+from tests.simd.processes import start_python
 
 
 @given(st.integers(1, 5000), st.sampled_from([1, 4, 8]), st.integers(1, 70))
@@ -32,9 +38,7 @@ def test_what_is_no_number_of_threads(given):
 
 
 class Slow:
-    """In the place of a compiled kernel: waits, and says who called."""
-
-    overloads = (None,)
+    """In the place of a kernel: waits, and says who called."""
 
     def __init__(self, seconds=0.0):
         self.seconds, self.ended, self.callers = seconds, [], set()
@@ -92,8 +96,8 @@ def test_an_interrupt_at_any_line_loses_no_call():
     """Wherever in the function it comes, as far as Python can be traced; then all is as before."""
     handler = signal.getsignal(signal.SIGINT)
     lines = 0
-    for where in range(1000):
-        slow, left = Slow(0.001), [where]
+    for line in range(1000):
+        slow, left = Slow(0.001), [line]
 
         def trace(frame, event, argument, left=left):
             if frame.f_code.co_filename == threading.__file__:
@@ -132,11 +136,110 @@ def test_a_slow_call_does_not_hold_up_the_others():
     assert slow.ended == [0, 0, 0, 0, 1]
 
 
-def test_a_kernel_that_is_not_compiled_is_called_by_one_thread():
-    slow = Slow()
-    slow.overloads = ()
-    assert run_together(slow, [(1,), (2,)], 2) == [1, 4]
-    assert slow.callers == {threading.get_ident()}
+def test_a_kernel_that_is_not_compiled_is_compiled_once():
+    traces = []
+
+    def work(given):
+        traces.append(1)
+        for n in loop(given.begin, given.end, 8):
+            columns(given.x, 8, None, n)[0] = columns(given.x, 8, None, n)[0] + 1.0
+
+    arrays = Arrays({"x": "f8"})
+    x = np.arange(64.0).reshape(1, 64)
+    calls = [(arrays.hold({"x": x}, range(k, k + 8)),) for k in range(0, 64, 8)]
+    assert run_together(Kernel(work, [arrays], threads=True), calls, 3) == [None] * 8
+    assert traces == [1]
+    np.testing.assert_array_equal(x[0], 1.0 + np.arange(64))
+
+
+@pytest.mark.parametrize("num_threads", [2, 3, 8])
+def test_any_number_of_threads_gives_the_same_bits(num_threads, monkeypatch):
+    monkeypatch.setattr(threads, "available", lambda: 8)
+    found = {}
+    for count in (1, num_threads):
+        engine = scene_engine(scenes("identified")["leg"], "identified", 200, num_threads=count)
+        assert len(engine.blocks) == (1 if count == 1 else min(25, count * threads.PARTS))
+        engine.advance(steps=40)
+        found[count] = engine._memory.data.tobytes()
+    assert found[1] == found[num_threads]
+
+
+@pytest.mark.skipif(not hasattr(signal, "pthread_kill"), reason="sends signals to threads")
+def test_an_interrupt_of_a_long_call_of_an_engine_ends_it():
+    """In machine code no signal is seen; a long call has parts, between which it is."""
+    code = """
+        import signal, threading, time
+        from benchmarks.scenes import engine, scenes
+        made = engine(scenes("identified")["leg"], "identified", 16, num_threads=2)
+        made.advance(steps=1)
+        stop = lambda: signal.pthread_kill(threading.main_thread().ident, signal.SIGINT)
+        threading.Timer(0.5, stop).start()
+        try:
+            made.advance(steps=10**9)
+        except KeyboardInterrupt:
+            print("ended", len(made.advance(steps=1)))
+    """
+    if available() < 2:
+        code = code.replace(", num_threads=2", "")
+    process = start_python(code)
+    assert process.communicate(timeout=100)[0].strip() == "ended 16"
+
+
+def test_threads_that_trace_and_compile_at_once_do_not_mix_what_they_write():
+    """While others trace, one computes with NumPy's machine, which each thread has for itself."""
+
+    def made(k):
+        def work(x: Matrix) -> None:
+            for n in loop(0, x.shape[0], 8):
+                value = read(x.first, n, 1, 8)
+                for _ in range(60):
+                    value = value * 1.001 + k
+                write(where(value > 0.0, value, -value), x.first, n, 1)
+
+        return work
+
+    errors, found = [], {}
+    gate = threading.Barrier(7)
+
+    def trace(k):
+        try:
+            x = np.arange(8.0) - 3.5
+            gate.wait()
+            for turn in range(4):
+                kernel(made(10.0 * turn + k))(x)
+            found[k] = x
+        except Exception as error:
+            errors.append(error)
+
+    def compute(k):
+        try:
+            gate.wait()
+            for _ in range(20):
+                x = np.arange(8.0) - 3.5
+                for turn in range(4):
+                    kernel(made(10.0 * turn + k)).run_now(x)
+            found["now", k] = x
+        except Exception as error:
+            errors.append(error)
+
+    switch = sys.getswitchinterval()
+    sys.setswitchinterval(1e-5)
+    try:
+        mine = [threading.Thread(target=trace, args=(float(k),)) for k in range(6)]
+        mine.append(threading.Thread(target=compute, args=(3.0,)))
+        for thread in mine:
+            thread.start()
+        for thread in mine:
+            thread.join()
+    finally:
+        sys.setswitchinterval(switch)
+    assert errors == []
+    assert found["now", 3.0].tobytes() == found[3.0].tobytes()
+    for k in range(6):
+        x = np.arange(8.0) - 3.5
+        for turn in range(4):
+            kernel(made(10.0 * turn + k)).run_now(x)
+        assert x.tobytes() == found[float(k)].tobytes()
 
 
 def test_more_threads_than_ever_are_refused(monkeypatch):
