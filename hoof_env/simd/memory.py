@@ -534,7 +534,8 @@ def columns(matrix: Matrix, lanes: int, layout: Any, column: Whole, row: Whole =
     """
     width = matrix.shape[1]
     place = CURRENT.machine.at(matrix.first.x, word(row * width + column), inbounds=False)
-    return Columns(place, lanes, layout, width, stride)
+    made = Columns(place, lanes, layout, width, stride)
+    return locked(made) if matrix.first.is_locked else made
 
 
 def block_at(first: AnyLayout, number: Whole) -> AnyLayout:
@@ -556,6 +557,7 @@ def load_rows(to: AnyLayout, start: AnyLayout) -> None:
     """Read columns into rows of the same layout."""
     rows: Any = to
     read_from: Any = start
+    rows._check_open("rows")
     for k in range(rows._layout.size):
         rows._write(k, read_from._read(k))
 
@@ -569,6 +571,7 @@ def apply_to_rows(rows: Any, count: int, function: Any, width: int) -> None:
     """Set each of the first rows, which have no names, to a function of it. Rows of one lane are taken
     `width` at
     a time: `count` is a multiple of it, and there is memory for as many."""
+    rows._check_open("rows")
     if rows._n == 1 and not CURRENT.machine.runs_now:
         rows = Rows(rows._place, width, None)
         count //= width

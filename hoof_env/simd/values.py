@@ -37,6 +37,9 @@ class Value:
         has = f"it has {', '.join(self.fields)}" if self.fields else "it has none"
         raise AttributeError(f"{self.kind} has no field {name!r}; {has}")
 
+    def __repr__(self) -> str:
+        return f"<{self.kind} that is known when the kernel runs>"
+
     def __bool__(self) -> bool:
         raise TraceError(
             f"`if`, `while`, `and`, `or`, `not`, min() or max() of {self.kind}, which is known only when"
@@ -55,7 +58,8 @@ class Value:
     def _no_number(self) -> NoReturn:
         raise TraceError(
             f"float(), int(), range(), an index or a function of `math` of {self.kind}, which is known only"
-            " when the kernel runs: write NumPy's function, such as np.exp or np.sqrt, and np.where for a choice"
+            " when the kernel runs: write NumPy's function, such as np.exp or np.sqrt, and np.where for a"
+            " choice"
         )
 
     def __float__(self) -> float:

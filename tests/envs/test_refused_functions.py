@@ -37,7 +37,9 @@ def defined(kind, text):
     if f"def compute({ARGUMENTS[kind]})" not in body:
         body = f"def compute({ARGUMENTS[kind]}):\n{textwrap.indent(body, '    ')}"
     file = f"case_{next(FILES)}.py"
-    source = f"import math\nimport random\nimport time\nimport numpy as np\n{body}\n"
+    source = (
+        f"import math\nimport random\nimport time\nimport numpy as np\nfrom hoof_env import simd\n{body}\n"
+    )
     linecache.cache[file] = (len(source), None, source.splitlines(True), file)
     space = {"__name__": "mine"}
     exec(compile(source, file, "exec"), space)
@@ -218,6 +220,8 @@ CASES = [
      "    return weight", "keeps a value in 'kept'"),
     ("term", "class State:\n    x = 0.0\ndef compute(step, weight):\n    State.x = step.progress\n    return weight",
      "keeps a value in 'State'"),
+    ("term", "kept = {'a': []}\ndef compute(step, weight):\n    kept['a'][:] = [(step.leg,)]\n    return weight",
+     "keeps a value in 'kept'"),
     ("term", "all_of = []\ndef compute(step, weight):\n    all_of.append(step.progress)\n    return sum(all_of)",
      "something else at each call"),
     # without end
@@ -247,6 +251,12 @@ CASES = [
     ("entry", "scene.task.height = 0.0 #!", "assignment to 'height'"),
     ("entry", "scene.task.half[0] = 0.0 #!", "item assignment"),
     ("entry", "scene.ground.first[0] = 0.0 #!", "assignment to this array"),
+    ("entry", "(scene.ground.first + 1)[0] = 0.0 #!", "assignment to this array"),
+    ("entry", "from_simd = simd.write\nfrom_simd(scene.episode.time, scene.ground.first, 0, 1) #!", "this array"),
+    ("entry", "simd.columns(scene.ground, 1, None, 0)[0] = 0.0 #!", "assignment to [0]"),
+    ("entry", "simd.load_rows(scene.leg.state, scene.leg.state) #!", "assignment to 'rows'"),
+    ("entry", "simd.store_vectors(scene.leg.state.gait, (scene.trunk.report.place,)) #!", "assignment to [0]"),
+    ("entry", "simd.apply_to_rows(scene.leg.state.gait, 4, np.sqrt, 8) #!", "assignment to 'rows'"),
     ("map", "scene.leg.command[0] = action[0] #!", "assignment to [0]"),
     ("map", "action[0] = 0.0 #!", "item assignment"),
     ("law", "ground.chi = 0.0 #!", "assignment to 'chi'"),
@@ -254,6 +264,7 @@ CASES = [
     ("term", "return weight / 0 * (1 // 0) #!", "ZeroDivisionError: integer division or modulo by zero"),
     ("term", "raise ValueError('no such\\n  gait') #!", "ValueError: no such gait"),
     ("term", "raise KeyError #!", "KeyError"),
+    ("term", "raise Exception('no' * 1000) #!", "Exception: nono | no..."),
     ("term", "return wait * step.progress #!", "NameError: name 'wait' is not defined"),
     ("term", "def helper(x):\n    return x.y #!\ndef compute(step, weight):\n    return helper(None)",
      "'NoneType' object has no attribute 'y'"),
