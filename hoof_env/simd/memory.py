@@ -337,6 +337,13 @@ class Rows:
 
     # by number and by name
 
+    __hash__ = object.__hash__
+
+    def __eq__(self, other: object) -> bool:
+        if self._open != ():
+            raise TraceError(f"a comparison of memory with {kind_of(other)}: expected its numbers")
+        return self is other
+
     def __len__(self) -> int:
         if self._size is None:
             raise TypeError("these rows have no length")
