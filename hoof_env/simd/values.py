@@ -101,6 +101,9 @@ class Lanes(Value):
         self.n = n
         self.factors = factors
 
+    def __repr__(self) -> str:
+        return f"Lanes({self.x})"
+
     @overload
     def __add__(self, other: Number) -> Lanes: ...
     @overload
@@ -177,6 +180,9 @@ class Mask(Value):
         self.x = x
         self.n = n
 
+    def __repr__(self) -> str:
+        return f"Mask({self.x})"
+
     def __and__(self, other: Truth) -> Mask:
         return self._with("and", other)
 
@@ -221,6 +227,9 @@ class Plane(Value):
     def __init__(self, a: Lanes, b: Lanes) -> None:
         self.a = a
         self.b = b
+
+    def __repr__(self) -> str:
+        return f"Plane({self.a.x}, {self.b.x})"
 
     @property
     def n(self) -> int:

@@ -2,6 +2,7 @@
 
 import sys
 import threading
+from typing import Annotated
 
 import gymnasium as gym
 import numpy as np
@@ -9,9 +10,10 @@ import pytest
 
 from benchmarks.scenes import engine, scenes
 from hoof_env.dynamics import hoof
-from hoof_env.simd import Matrix, Number, loop, on_numpy, read, where, write
+from hoof_env.simd import Matrix, Number, loop, new_rows, on_numpy, read, vector, where, write
 from hoof_env.simd import compile as compile_module
 from hoof_env.simd.compile import Kernel, is_on_numpy, kernel
+from hoof_env.simd.layout import Block, Layout, Row, Vector
 from hoof_env.simd.machines import CURRENT, Eager
 
 
@@ -142,8 +144,6 @@ def test_errors_are_those_of_the_source_with_its_lines():
 
 
 def test_a_row_that_was_never_written_is_an_error_where_it_is_used():
-    from hoof_env.simd import new_rows
-
     @kernel
     def careless(x: Matrix) -> None:
         rows = new_rows(None, 8, 2)
@@ -194,6 +194,40 @@ def test_a_debugger_sees_arrays_in_the_contact_of_an_environments_step():
     assert all(isinstance(x, np.ndarray) and x.shape == (1,) for pair in seen for x in pair)
     assert any(depth[0] > 0 and force[0] > 0 for depth, force in seen)
     assert all(force[0] == 0 for depth, force in seen if depth[0] <= 0)
+
+
+class Point(Layout):
+    place: Vector
+    depth: Row
+
+
+class Hoof(Layout):
+    toe: Point
+    loads: Annotated[Block, 2]
+
+
+def test_values_and_rows_are_printed_with_what_they_hold():
+    """Where a kernel is traced there is nothing to print yet but names."""
+    said = []
+
+    @kernel
+    def work(x: Matrix) -> None:
+        rows = new_rows(Hoof, 2)
+        rows.toe.place = vector(read(x.first, 0, 1, 2), 1.0)
+        rows.toe.depth = 0.5
+        said.extend(map(repr, (rows, rows.toe.place, rows.toe.depth, rows.toe.depth > 0.0)))
+
+    work.run_now(np.array([3.0, 4.0]))
+    assert said == [
+        "toe: \n  place: Plane([3. 4.], [1. 1.])\n  depth: Lanes([0.5 0.5])\nloads: rows of numbers",
+        "Plane([3. 4.], [1. 1.])",
+        "Lanes([0.5 0.5])",
+        "Mask([ True  True])",
+    ]
+    said.clear()
+    work(np.array([3.0, 4.0]))
+    assert said[0] == "rows of toe, loads"
+    assert said[1].startswith("Plane(%")
 
 
 @pytest.mark.parametrize("num_threads", [1, 2])
