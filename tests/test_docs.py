@@ -19,8 +19,8 @@ PAGES = sorted([*ROOT.glob("*.md"), *(page for folder in FOLDERS for page in (RO
 LIVE = [page for page in PAGES if "evidence" not in page.parts]
 """Frozen pages name the commands of their commits."""
 HAND_WRITTEN = (
-    "agents", "decisions", "elasticity", "engine", "help", "horse", "look_inside", "own_task", "paper", "parameters",
-    "project", "start", "task", "view",
+    "agents", "decisions", "elasticity", "engine", "help", "horse", "look_inside", "own_task", "paper",
+    "parameters", "project", "start", "task", "view",
 )  # fmt: skip
 BLOCK = re.compile(r"^```(\w*)\n(.*?)^```", re.MULTILINE | re.DOTALL)
 EXAMPLES = [

@@ -214,7 +214,7 @@ class Kernel:
 
     def run_now(self, *arguments: Any, exact: bool = True) -> Any:
         """Run the kernel on NumPy, step by step, as a debugger can follow; see `machines.Eager`."""
-        return run_now(self, *arguments, exact=exact)
+        return run_on(Eager(exact), self, *arguments)
 
 
 _CTYPES: dict[Any, list[Any]] = {
@@ -263,21 +263,15 @@ def traced(function: Callable[..., Any], parameters: Sequence[Parameter]) -> tup
         return machine.text("kernel", declared, kind), ctype
 
 
-def run_now(kernel: Kernel, *arguments: Any, exact: bool = True) -> Any:
-    """Run a kernel on NumPy: the same source, one operation after the other, on arrays.
-
-    Args:
-        kernel: the kernel.
-        arguments: as for a call of it.
-        exact: see `machines.Eager`.
-    """
-    return _run(kernel.function, kernel.parameters, arguments, Eager(exact))
+def run_on(machine: Any, kernel: Kernel, *arguments: Any) -> Any:
+    """Run a kernel on a machine that computes at once, such as `machines.Eager`; return what machine code
+    would."""
+    return _run(kernel.function, kernel.parameters, arguments, machine)
 
 
 def _run(
     function: Callable[..., Any], parameters: Sequence[Parameter], arguments: Sequence[Any], machine: Any
 ) -> Any:
-    """Run the function of a kernel on a machine that computes at once; return what machine code would."""
     with running_on(machine), np.errstate(all="ignore"):
         given: list[Any] = []
         for kind, argument in zip(parameters, arguments, strict=True):

@@ -210,7 +210,7 @@ class Mask(Value):
 
     def __bool__(self) -> bool:
         if CURRENT.machine.runs_now and not self.n:
-            return bool(self.x)
+            return CURRENT.machine.truth(self.x)
         return super().__bool__()
 
     def to_whole(self) -> Index:
