@@ -4,10 +4,14 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
 
 import hoof_env
-from hoof_env.simd import maximum, where
+from hoof_env.simd import Number
 from hoof_env.tasks.reward import TERMS as LEG_TERMS
+from hoof_env.tasks.reward import Outcome
 
 THRESHOLD = 1.5
 """Running peak from which it is charged [weights of trunk and leg]: between the 1.3 of a soft gait and the 5
@@ -23,29 +27,29 @@ GROUNDS = {"stiffness": (1e4, 4e4), "restitution": (0.2, 0.8)}
 """Ranges of the grounds: stiffness from a half to twice the usual one [N/m^1.375], restitution about it."""
 
 
-def threshold(step, weight):  # type: ignore[no-untyped-def]
+def threshold(step: Outcome, weight: Number) -> Any:
     """Return the charge for the time in which the running peak is beyond a threshold, times the excess in
     weights."""
     excess = step.leg.strides.running_peak / step.weight - THRESHOLD
-    return -weight * step.seconds * maximum(excess, 0.0)
+    return -weight * step.seconds * np.maximum(excess, 0.0)
 
 
-def first_contact(step, weight):  # type: ignore[no-untyped-def]
+def first_contact(step: Outcome, weight: Number) -> Any:
     """Return the charge for the normal force at the end of the step in which a stance begins, in weights."""
     load = step.leg.report.toe.normal + step.leg.report.heel.normal
-    return -weight * where(step.sums.stances > 0.0, load / step.weight, 0.0)
+    return -weight * np.where(step.sums.stances > 0.0, load / step.weight, 0.0)
 
 
-def approach(step, weight):  # type: ignore[no-untyped-def]
+def approach(step: Outcome, weight: Number) -> Any:
     """Return the charge for the squared approach speeds of the points in contact when a stance begins."""
     toe = step.leg.state.toe.inverse_approach_speed
     heel = step.leg.state.heel.inverse_approach_speed
     # The inner choice avoids a division by 0 of points that are not in contact
-    faster = maximum(
-        where(toe > 0.0, 1.0 / where(toe > 0.0, toe, 1.0), 0.0),
-        where(heel > 0.0, 1.0 / where(heel > 0.0, heel, 1.0), 0.0),
+    faster = np.maximum(
+        np.where(toe > 0.0, 1.0 / np.where(toe > 0.0, toe, 1.0), 0.0),
+        np.where(heel > 0.0, 1.0 / np.where(heel > 0.0, heel, 1.0), 0.0),
     )
-    return -weight * where(step.sums.stances > 0.0, faster * faster, 0.0)
+    return -weight * np.where(step.sums.stances > 0.0, faster * faster, 0.0)
 
 
 TERMS = {

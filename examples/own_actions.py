@@ -9,7 +9,6 @@ import numpy as np
 
 import hoof_env
 from hoof_env.leg.kinematics import FrameMotion, pose
-from hoof_env.simd import maximum
 
 LEG = hoof_env.load_geometry()
 WALK = hoof_env.load_gait("walk")
@@ -62,8 +61,8 @@ STEPS = hoof_env.ActionMap(
 def impact(step, weight, free):
     """Charge each newton by which the episode's highest force rises, above a force that is free."""
     own = step.episode.own.impact
-    highest = maximum(own.highest, step.sums.highest_grf)
-    rise = maximum(highest, free) - maximum(own.highest, free)
+    highest = np.maximum(own.highest, step.sums.highest_grf)
+    rise = np.maximum(highest, free) - np.maximum(own.highest, free)
     own.highest = highest
     return -0.001 * weight * rise
 

@@ -4,13 +4,10 @@ contact.
 python examples/own_task.py
 """
 
-import math
-
 import gymnasium as gym
 import numpy as np
 
 import hoof_env
-from hoof_env.simd import maximum, where
 from hoof_env.simd.math import root_power
 
 
@@ -22,10 +19,9 @@ def friction(step, weight):
 
 
 def comfort(step, weight):
-    """Reward a trunk that hardly accelerates: an ordinary function of numbers with `if` and `math`."""
-    if step.failed:
-        return 0.0
-    return weight * math.exp(-abs(step.trunk.report.acceleration.imag) / 9.81)
+    """Reward a trunk that hardly accelerates."""
+    smooth = np.exp(-abs(step.trunk.report.acceleration.imag) / 9.81)
+    return np.where(step.failed > 0.0, 0.0, weight * smooth)
 
 
 def vertical_acceleration(scene):
@@ -36,8 +32,8 @@ def vertical_acceleration(scene):
 def turf(penetration, rate, inverse_approach_speed, ground):
     """Return a normal force [N] that grows stiffer with depth and loses more on the way out than Eq. 14."""
     spring = ground.stiffness * root_power(penetration, 12) * (1.0 + penetration / 0.05)
-    damping = ground.chi * where(rate < 0.0, 2.0 * rate, rate) * inverse_approach_speed
-    return spring * maximum(1.0 + damping, 0.0)
+    damping = ground.chi * np.where(rate < 0.0, 2.0 * rate, rate) * inverse_approach_speed
+    return spring * np.maximum(1.0 + damping, 0.0)
 
 
 hoof_env.register(
@@ -45,7 +41,7 @@ hoof_env.register(
     base="leg",
     terms=[
         hoof_env.Term("friction", 0.5, "1/kJ", "power of friction", friction),
-        hoof_env.Term("comfort", 0.1, "-", "per step without acceleration", comfort, scalar=True),
+        hoof_env.Term("comfort", 0.1, "-", "per step without acceleration", comfort),
     ],
     entries=[
         hoof_env.Entry(

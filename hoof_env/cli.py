@@ -215,8 +215,7 @@ def mjcf(
 
 
 COMMANDS: dict[str, Callable[..., None]] = {
-    command.__name__: command
-    for command in (reproduce, render, view, export, compare, average, manual, mjcf)
+    command.__name__: command for command in (reproduce, render, view, export, compare, average, manual, mjcf)
 } | {"evaluate": evaluate, "list": list_ids, "demo": demo}
 """Functions by sub-command, in the order of the help."""
 

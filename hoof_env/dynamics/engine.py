@@ -76,7 +76,7 @@ class TrunkEngine(EngineMotion):
         strides: true to count stances, peak forces and work; `strides` has them.
         limits: where the motion should end, see `parts.Result`. An engine with limits, if only `Limits()`,
             takes legs of other sizes in `vary`, and its `strides` have horizontal impulses.
-        contact_law: law of the normal force instead of the ground's, see `hoof.law_of`.
+        contact_law: law of the normal force instead of the ground's, see `hoof.contact_force`.
 
     Attributes:
         runs_scalar: true if environments are run one by one in one thread, not side by side.
@@ -90,7 +90,7 @@ class TrunkEngine(EngineMotion):
 
     Raises:
         ParameterError: a value is out of range or of the wrong type; or, at the first reset, the contact law
-            cannot be compiled.
+            cannot be part of a kernel.
         GeometryError: a leg has no place for its links at any crank angle.
 
     Warns:
@@ -166,7 +166,7 @@ class TrunkEngine(EngineMotion):
         self._memory = memory.new_memory(self, self.num_envs, columns, self.reacts)
         self._model = memory.new_model(self, self.filters, self.counts_strides)
         self._arrangement = ONE_BY_ONE[len(self.limbs)] if self.runs_scalar else SIDE_BY_SIDE
-        self._kernels = {}
+        self._calls = None
 
     def __repr__(self) -> str:
         legs = f"{len(self.limbs)} leg{'s' * (len(self.limbs) > 1)}"
@@ -177,7 +177,7 @@ class TrunkEngine(EngineMotion):
         """Return the attributes of a copy, which has memory of its own even if it is shallow."""
         m = self._memory
         # kernels are left out: the copy finds them, perhaps in another process
-        parts = {**vars(self), "_kernels": {}}
+        parts = {**vars(self), "_calls": None}
         return {
             **parts,
             "_memory": (m.data, self.num_envs, m.constants, m.reactions.copy(), m.features),

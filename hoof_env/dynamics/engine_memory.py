@@ -11,8 +11,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from hoof_env.dynamics import engine_states, layout, memory
-from hoof_env.dynamics.advance import ARRAYS, EngineKind, static_of
+from hoof_env.dynamics.advance import ARRAYS, EngineKind
 from hoof_env.dynamics.form import engine_layout
+from hoof_env.dynamics.model import static_of
 from hoof_env.dynamics.names import NamedColumns
 from hoof_env.dynamics.parts import (
     MOST_IMPULSE,
@@ -25,7 +26,6 @@ from hoof_env.dynamics.parts import (
     Trunk,
 )
 from hoof_env.dynamics.push import push_kernel
-from hoof_env.dynamics.reactions import reactions_layout
 from hoof_env.errors import (
     Floats,
     NotStartedError,
@@ -163,8 +163,8 @@ class EngineMemory(Mechanics):
             raise ParameterError("reactions: expected an engine made with reactions=True, got one without")
         rows = self._memory.reactions[:, :, : self.num_envs]
         legs, _, n = rows.shape
-        layout = reactions_layout(self.features.structure)
-        parts = {name: rows[:, layout.rows(name)].copy() for name in layout.fields}
+        form = layout.reactions_layout(self.features.structure)
+        parts = {name: rows[:, form.rows(name)].copy() for name in form.fields}
         joints = parts.pop("joints").reshape(legs, -1, 2, n)
         # of one weld or moment the axis is left out
         moments = {name: part[:, 0] if part.shape[1] == 1 else part for name, part in parts.items()}

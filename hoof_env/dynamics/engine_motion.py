@@ -9,14 +9,15 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from hoof_env.dynamics import engine_states, layout, memory
-from hoof_env.dynamics.advance import ARRAYS, Arrangement, EngineKind, engine_kernel, static_of
+from hoof_env.dynamics.advance import ARRAYS, Arrangement, EngineKind, engine_kernel
 from hoof_env.dynamics.engine_memory import EngineMemory
 from hoof_env.dynamics.limits import CHECK_EVERY
+from hoof_env.dynamics.model import static_of
 from hoof_env.dynamics.names import NamedColumns
 from hoof_env.dynamics.parts import broken
 from hoof_env.errors import NotStartedError, count
 from hoof_env.simd.compile import Kernel
-from hoof_env.simd.memory import Held
+from hoof_env.simd.memory import Arrays
 from hoof_env.simd.threads import run_together
 from hoof_env.simd.user_functions import UserFunctionError, user_error
 
@@ -39,7 +40,7 @@ class EngineMotion(EngineMemory):
     contact_law: Callable[..., Any] | None
     reacts: bool
     _arrangement: Arrangement
-    _kernels: dict[Any, Any]
+    _calls: EngineCalls | None
 
     @property
     def substep(self) -> float:
@@ -108,10 +109,13 @@ class EngineMotion(EngineMemory):
         whole[..., 0] = m.data
         for k in range(1, times):
             self._go(min(every, steps - (k - 1) * every), True)
+            if not m.result.any():
+                whole[..., k] = m.data
+                continue
             if lost := broken(m.result).any():
                 self.observe()
             whole[..., k] = m.data
-            if lost or (m.result.any() and not continue_past_limits):
+            if lost or not continue_past_limits:
                 times = k if lost else k + 1
                 break
         kept = memory.memory_of(whole[..., :times], self.num_envs, m.constants, m.reactions, m.features)
@@ -157,43 +161,72 @@ class EngineMotion(EngineMemory):
 
     def _go_substeps(self, substeps: int, account: bool) -> None:
         """Advance by substeps; a negative number starts the environments that are to be started."""
-        kernel = self._find_kernel(is_start=substeps < 0)
+        calls = self._present_calls()
         try:
-            calls = [(held, self.substep, max(substeps, 0), account) for held in self._held_blocks(kernel)]
-            run_together(kernel, calls, self.num_threads)
+            calls.run(substeps < 0, self.substep, max(substeps, 0), account)
         except UserFunctionError as error:
             raise user_error("contact_law", error) from None
 
     def compile(self) -> None:
-        """Compile or load the kernel that starts environments.
+        """Trace and compile the kernel that starts environments, or load it.
 
         Raises:
             ParameterError: the law of contact cannot be part of a kernel.
         """
         try:
-            self._find_kernel(is_start=True).compile()
+            self._present_calls().kernel(is_start=True).compile()
         except UserFunctionError as error:
             raise user_error("contact_law", error) from None
 
-    def _find_kernel(self, is_start: bool = False) -> Kernel:
-        """Return the kernel for the present arrays; those of other conditions may have replaced them."""
-        if self._kernels.get("arrays") is not self._model:
-            known = static_of(self._model[0])
-            kind = EngineKind(self.features, self.contact_law, known, self.reacts)
-            self._kernels = {"arrays": self._model, "kind": kind}
-        if is_start not in self._kernels:
-            kernel = engine_kernel(self._kernels["kind"], self._arrangement, is_start)
-            self._kernels[is_start] = kernel
-        found: Kernel = self._kernels[is_start]
-        return found
+    def _present_calls(self) -> EngineCalls:
+        """Return kernels and arguments for the present model, which other conditions may have replaced."""
+        if self._calls is None or self._calls.model is not self._model:
+            kind = EngineKind(self.features, self.contact_law, static_of(self._model[0]), self.reacts)
+            self._calls = EngineCalls(
+                kind, self._arrangement, self._model, self.arrays, self.blocks, self.num_threads
+            )
+        return self._calls
 
-    def _held_blocks(self, kernel: Kernel) -> list[Held]:
-        """Return the present arrays as arguments of a kernel, a block of columns for each."""
-        arrays = self.arrays
-        before = self._kernels.get("held arrays", ())
-        if len(before) != len(arrays) or any(one is not other for one, other in zip(before, arrays, strict=True)):
-            named = dict(zip(ARRAYS, arrays, strict=True))
-            self._kernels["held"] = [kernel.parameters[0].hold(named, block) for block in self.blocks]
-            self._kernels["held arrays"] = arrays
-        blocks: list[Held] = self._kernels["held"]
-        return blocks
+
+class EngineCalls:
+    """Kernels of an engine, and their arguments.
+
+    Args:
+        kind: kind of the engine.
+        arrangement: environments that are advanced at once.
+        model: arrays of the model, by which calls are known to be those of the present conditions.
+        arrays: all arrays, `TrunkEngine.arrays`.
+        blocks: columns of each call.
+        num_threads: number of calls at once.
+    """
+
+    def __init__(
+        self,
+        kind: EngineKind,
+        arrangement: Arrangement,
+        model: Any,
+        arrays: tuple[NDArray[Any], ...],
+        blocks: list[range],
+        num_threads: int,
+    ) -> None:
+        self.model = model
+        self._kind = kind
+        self._arrangement = arrangement
+        self._num_threads = num_threads
+        self._kernels: dict[bool, Kernel] = {}
+        named = dict(zip(ARRAYS, arrays, strict=True))
+        self._held = [Arrays(kind.arrays).hold(named, block) for block in blocks]
+
+    def kernel(self, is_start: bool) -> Kernel:
+        """Return the kernel that advances environments, or that starts them."""
+        if is_start not in self._kernels:
+            self._kernels[is_start] = engine_kernel(self._kind, self._arrangement, is_start)
+        return self._kernels[is_start]
+
+    def run(self, is_start: bool, *arguments: Any) -> None:
+        """Run a kernel on all blocks, with the arguments that follow the arrays."""
+        kernel = self.kernel(is_start)
+        if len(self._held) == 1:
+            kernel(self._held[0], *arguments)
+        else:
+            run_together(kernel, [(held, *arguments) for held in self._held], self._num_threads)

@@ -2,12 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
+from hoof_env.dynamics.layout import Contact, ContactMemory, LegRows, TrunkRows, TrunkSettings
+from hoof_env.dynamics.model import Model
 from hoof_env.ground.laws import friction_part, normal_force
 from hoof_env.ground.terrain import surface
 from hoof_env.simd import (
+    Lanes,
+    Number,
+    Plane,
+    Truth,
     absolute,
     any_lane,
     cond,
@@ -21,37 +26,36 @@ from hoof_env.simd import (
     where,
 )
 from hoof_env.simd.math import clip, root_power
-from hoof_env.simd.user_functions import foreign, function_name, number_of
+from hoof_env.simd.user_functions import foreign, function_name, inputs
 
 
-def level_ground(leg):  # type: ignore[no-untyped-def]
+def level_ground(leg: LegRows) -> None:
     """Set what is constant on ground that is level and the same everywhere: normal and scales of the
     terrain."""
     upward = vector(full_like(leg, 0.0), 1.0)
-    leg.toe.ground_normal = upward
-    leg.toe.stiffness_scale = 1.0
-    leg.toe.friction_scale = 1.0
-    leg.heel.ground_normal = upward
-    leg.heel.stiffness_scale = 1.0
-    leg.heel.friction_scale = 1.0
+    for point in (leg.toe, leg.heel):
+        point.ground_normal = upward
+        point.stiffness_scale = 1.0
+        point.friction_scale = 1.0
 
 
-def lift_heel(leg, springs):  # type: ignore[no-untyped-def]
+def lift_heel(leg: LegRows, springs: int) -> None:
     """Set the contact of a heel that is not there, of a hoof with one point, to nothing; it stays so."""
-    leg.heel.penetration = 0.0
-    leg.heel.penetration_rate = 0.0
-    leg.heel.slide = 0.0
-    leg.heel.spring_force = 0.0
-    leg.heel.inverse_approach_speed = 0.0
-    leg.heel.normal = 0.0
-    leg.heel.friction = 0.0
+    heel = leg.heel
+    heel.penetration = 0.0
+    heel.penetration_rate = 0.0
+    heel.slide = 0.0
+    heel.spring_force = 0.0
+    heel.inverse_approach_speed = 0.0
+    heel.normal = 0.0
+    heel.friction = 0.0
     for k in range(springs):
-        leg.heel.deflection[k] = 0.0
-        leg.heel.deflection_rate[k] = 0.0
-        leg.heel.mean_deflection_rate[k] = 0.0
+        heel.deflection[k] = 0.0
+        heel.deflection_rate[k] = 0.0
+        heel.mean_deflection_rate[k] = 0.0
 
 
-def meet_ground(trunk, leg, model):  # type: ignore[no-untyped-def]
+def meet_ground(trunk: TrunkRows, leg: LegRows, model: Model) -> None:
     """Compute the forces of the ground on toe and heel, and their generalised forces on crank and frame."""
     hip = leg.hip
     pitch_rate = trunk.rates.pitch_rate
@@ -75,7 +79,17 @@ def meet_ground(trunk, leg, model):  # type: ignore[no-untyped-def]
         leg.ground_moment_beta = toe_beta
 
 
-def meet_point(trunk, leg, point, memory, arm, arm_by_theta, hip, hip_velocity, model):  # type: ignore[no-untyped-def]
+def meet_point(
+    trunk: TrunkRows,
+    leg: LegRows,
+    point: Contact,
+    memory: ContactMemory,
+    arm: Plane,
+    arm_by_theta: Plane,
+    hip: Plane,
+    hip_velocity: Plane,
+    model: Model,
+) -> tuple[Plane, Lanes, Lanes]:
     """Compute the motion of a hoof point; return the force of the ground on it and that force's parts along
     theta and beta. `arm` is the vector from O to the point in the leg's frame, `hip` is O's place [m]."""
     arm = leg.turn * arm
@@ -104,29 +118,33 @@ def meet_point(trunk, leg, point, memory, arm, arm_by_theta, hip, hip_velocity, 
         press_through_spring(trunk, leg, point, memory, model)
     else:
         press_rigidly(trunk, point, memory, penetration, rate, sliding_speed, model)
-    force = vector(point.friction, point.normal)  # on level ground
-    if model.is_terrain:
-        force = force_of(point)
+    force = force_of(point) if model.is_terrain else vector(point.friction, point.normal)
     return force, dot(force, by_theta), cross(arm, force)
 
 
-def force_of(point):  # type: ignore[no-untyped-def]
+def force_of(point: Contact) -> Plane:
     """Return the force of the ground on a hoof point, in the world [N]."""
     return point.normal * point.ground_normal - point.friction * perpendicular(point.ground_normal)
 
 
-def press_rigidly(trunk, point, memory, penetration, rate, sliding_speed, model):  # type: ignore[no-untyped-def]
+def press_rigidly(
+    trunk: TrunkRows,
+    point: Contact,
+    memory: ContactMemory,
+    penetration: Lanes,
+    rate: Lanes,
+    sliding_speed: Lanes,
+    model: Model,
+) -> None:
     """Compute the forces on a point of a rigid hoof, which is the sole itself."""
     nothing = 0.0 * absolute(penetration)  # 0, but NaN where the penetration is NaN
     inverse_speed = memory.inverse_approach_speed
     inside = penetration > 0.0
 
-    def meets():  # type: ignore[no-untyped-def]
+    def meets() -> tuple[Lanes, Lanes, Lanes, Lanes]:
         latched = latch(trunk, memory, inside, inverse_speed, penetration, rate, model)
-        pushed, stored = model.law(
-            trunk.settings, point.stiffness_scale, penetration, rate, latched, model.eighths
-        )
         laws = trunk.settings
+        pushed, stored = contact_force(laws, point.stiffness_scale, penetration, rate, latched, model)
         part = friction_part(
             absolute(sliding_speed), model.friction_law, laws.friction_slow, laws.friction_fast
         )
@@ -148,7 +166,9 @@ def press_rigidly(trunk, point, memory, penetration, rate, sliding_speed, model)
     point.friction = friction
 
 
-def press_through_spring(trunk, leg, point, memory, model):  # type: ignore[no-untyped-def]
+def press_through_spring(
+    trunk: TrunkRows, leg: LegRows, point: Contact, memory: ContactMemory, model: Model
+) -> None:
     """Compute the forces on a point of a compliant hoof. Its sole has no mass: spring and damper carry the
     force of the ground.
 
@@ -171,7 +191,7 @@ def press_through_spring(trunk, leg, point, memory, model):  # type: ignore[no-u
     inverse_speed = memory.inverse_approach_speed
     inside = penetration > 0.0
 
-    def meets():  # type: ignore[no-untyped-def]
+    def meets() -> tuple[Lanes, Lanes, Lanes]:
         approach = depth_rate - free_return_rate
         latched = latch(trunk, memory, inside, inverse_speed, penetration, approach, model)
         pushed = ground_spring(laws, point.stiffness_scale, maximum(penetration, 0.0), model.eighths)
@@ -200,17 +220,28 @@ def press_through_spring(trunk, leg, point, memory, model):  # type: ignore[no-u
     point.friction = -held
 
 
-def latch(trunk, memory, inside, inverse_speed, penetration, rate, model):  # type: ignore[no-untyped-def]
+def latch(
+    trunk: TrunkRows,
+    memory: ContactMemory,
+    inside: Truth,
+    inverse_speed: Lanes,
+    penetration: Lanes,
+    rate: Lanes,
+    model: Model,
+) -> Lanes:
     """Return 1 / v0 [s/m] of points that are in the ground, kept from when they entered it."""
 
-    def entered():  # type: ignore[no-untyped-def]
+    def entered() -> Lanes:
         entering = inverse_entry_speed(trunk, memory, penetration, rate, model)
         return where(inverse_speed > 0.0, inverse_speed, entering)
 
-    return cond(any_lane(inside & (inverse_speed == 0.0)), entered, inverse_speed)
+    latched: Lanes = cond(any_lane(inside & (inverse_speed == 0.0)), entered, inverse_speed)
+    return latched
 
 
-def inverse_entry_speed(trunk, memory, penetration, rate, model):  # type: ignore[no-untyped-def]
+def inverse_entry_speed(
+    trunk: TrunkRows, memory: ContactMemory, penetration: Lanes, rate: Lanes, model: Model
+) -> Lanes:
     """Return 1 / v0 [s/m] with v0 the approach speed at the crossing of the surface, interpolated between the
     last whole step and now."""
     before = memory.penetration
@@ -226,60 +257,55 @@ def inverse_entry_speed(trunk, memory, penetration, rate, model):  # type: ignor
     return span / maximum(entry, floor * span)
 
 
-def ground_spring(ground, stiffness_scale, penetration, eighths):  # type: ignore[no-untyped-def]
+def ground_spring(ground: TrunkSettings, stiffness_scale: Lanes, penetration: Lanes, eighths: int) -> Lanes:
     """Return the elastic force K d^n of Eq. 14 [N]."""
-    # the usual exponent, 3/2, as a constant: `root_power` then has no branches
-    if eighths == 12:
-        power = root_power(penetration, 12)
-    else:
-        power = root_power(penetration, eighths)
+    power = root_power(penetration, eighths)
     return ground.stiffness * stiffness_scale * power
 
 
-def contact_force(ground, stiffness_scale, penetration, rate, inverse_speed, eighths):  # type: ignore[no-untyped-def]
-    """Return the normal force on a point inside the ground (Eq. 14), and its elastic part [N]."""
-    spring = ground_spring(ground, stiffness_scale, penetration, eighths)
-    return normal_force(spring, ground.chi, ground.dashpot, rate, inverse_speed), spring  # Eq. 14
-
-
+@inputs
 class GroundHere(NamedTuple):
     """Parameters of the ground under a hoof point, for a law of contact."""
 
-    stiffness: Any  # K of Eq. 14, with the terrain's factor there [N/m^n]
-    eighths: Any  # the exponent n in eighths, for `root_power`
-    chi: Any  # damping factor, from restitution and `normal_law` [-]
-    dashpot: Any  # [N s/m]
+    stiffness: Lanes  # K of Eq. 14, with the terrain's factor there [N/m^n]
+    eighths: int  # the exponent n in eighths, for `root_power`
+    chi: Lanes  # damping factor, from restitution and `normal_law` [-]
+    dashpot: Lanes  # [N s/m]
 
 
-def law_of(contact_law: Callable[..., Any] | None) -> Any:
-    """Return the kernel of the normal force: `contact_force`, or the user's law in its place.
+def contact_force(
+    ground: TrunkSettings,
+    stiffness_scale: Lanes,
+    penetration: Lanes,
+    rate: Lanes,
+    inverse_speed: Lanes,
+    model: Model,
+) -> tuple[Lanes, Lanes]:
+    """Return the normal force on a point inside the ground, and the part that is stored in it [N]: of Eq. 14
+    or, if the model has one, of a user's law.
 
-    Args:
-        contact_law: function of penetration [m], its rate [m/s], the inverse of the approach speed [s/m] and
-            `GroundHere`; returns the normal force [N]. Negative (adhesive) values are set to 0. No part of
-            this force counts as stored in the ground.
+    That is a function of penetration [m], its rate [m/s], the inverse of the approach speed [s/m] and
+    `GroundHere`, which returns the normal force [N]. Negative (adhesive) values are set to 0. No part of this
+    force counts as stored.
     """
-    if contact_law is None:
-        return contact_force
-    force = foreign(contact_law)
-    number = number_of(f"the contact law {function_name(contact_law)}")
-
-    def push(ground, stiffness_scale, penetration, rate, inverse_speed, eighths):  # type: ignore[no-untyped-def]
-        here = GroundHere(ground.stiffness * stiffness_scale, eighths, ground.chi, ground.dashpot)
-        pushed = maximum(number(force(penetration, rate, inverse_speed, here)), 0.0)
-        return pushed, 0.0 * pushed
-
-    return push
+    law = model.contact_law
+    if law is None:
+        spring = ground_spring(ground, stiffness_scale, penetration, model.eighths)
+        return normal_force(spring, ground.chi, ground.dashpot, rate, inverse_speed), spring  # Eq. 14
+    force = foreign(f"the contact law {function_name(law)}", law)
+    here = GroundHere(ground.stiffness * stiffness_scale, model.eighths, ground.chi, ground.dashpot)
+    pushed = maximum(force(penetration, rate, inverse_speed, here), 0.0)
+    return pushed, 0.0 * pushed
 
 
-def remember_contacts(leg):  # type: ignore[no-untyped-def]
+def remember_contacts(leg: LegRows) -> None:
     """Store penetration, rate and inverse approach speed of toe and heel at a whole step; the speed is 0
     outside the ground."""
     remember_point(leg.toe, leg.state.toe)
     remember_point(leg.heel, leg.state.heel)
 
 
-def remember_point(point, memory):  # type: ignore[no-untyped-def]
+def remember_point(point: Contact, memory: ContactMemory) -> None:
     """Store them for one point, see `remember_contacts`."""
     memory.penetration = point.penetration
     memory.penetration_rate = point.penetration_rate
@@ -290,21 +316,21 @@ def remember_point(point, memory):  # type: ignore[no-untyped-def]
 # States of the hooves' springs, for the functions of `stepping`; `count` rows a point, 0 of rigid hooves
 
 
-def begin_springs(leg, count):  # type: ignore[no-untyped-def]
+def begin_springs(leg: LegRows, count: int) -> None:
     """Set the springs of the first stage to the state itself."""
     for k in range(count):
         leg.toe.deflection[k] = leg.state.toe.deflection[k]
         leg.heel.deflection[k] = leg.state.heel.deflection[k]
 
 
-def clear_springs(leg, count):  # type: ignore[no-untyped-def]
+def clear_springs(leg: LegRows, count: int) -> None:
     """Set the means of the springs' rates to 0."""
     for k in range(count):
         leg.toe.mean_deflection_rate[k] = 0.0
         leg.heel.mean_deflection_rate[k] = 0.0
 
 
-def weigh_springs(leg, count, weight):  # type: ignore[no-untyped-def]
+def weigh_springs(leg: LegRows, count: int, weight: Number) -> None:
     """Add the rates at the present stage to their means."""
     toe = leg.toe.mean_deflection_rate
     heel = leg.heel.mean_deflection_rate
@@ -313,14 +339,14 @@ def weigh_springs(leg, count, weight):  # type: ignore[no-untyped-def]
         heel[k] = heel[k] + weight * leg.heel.deflection_rate[k]
 
 
-def move_springs(leg, count, elapsed):  # type: ignore[no-untyped-def]
+def move_springs(leg: LegRows, count: int, elapsed: Number) -> None:
     """Move the springs `elapsed` [s] from the step's start with the rates of the present stage."""
     for k in range(count):
         leg.toe.deflection[k] = leg.state.toe.deflection[k] + elapsed * leg.toe.deflection_rate[k]
         leg.heel.deflection[k] = leg.state.heel.deflection[k] + elapsed * leg.heel.deflection_rate[k]
 
 
-def end_springs(leg, count, averages, h):  # type: ignore[no-untyped-def]
+def end_springs(leg: LegRows, count: int, averages: bool, h: Number) -> None:
     """Advance the springs' states by a step of `h` [s]."""
     for k in range(count):
         toe = leg.toe.deflection_rate[k]

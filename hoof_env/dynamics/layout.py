@@ -9,12 +9,12 @@ the speed and the bits of these.
 
 from __future__ import annotations
 
-from typing import Annotated, Any, NamedTuple
+from typing import Annotated, NamedTuple
 
 from hoof_env.dynamics.leg_constants import PAPER_STRUCTURE, Structure
 from hoof_env.gait import parameter_names
 from hoof_env.leg.profile import Functions, Slopes
-from hoof_env.simd.layout import Block, Layout, Row, Size, Vector
+from hoof_env.simd.layout import AnyLayout, Block, Layout, Row, Size, Vector
 
 MAX_STATE = 1e9
 """Largest angle [rad] and place [m] of a state, where rounding is 6e-7 (6e-10 at 1e6); also the largest rate
@@ -26,10 +26,14 @@ SPRING = Size("spring", 0)
 LIMITED = Size("limited", 0)
 LIMITS = Size("limits", 0)
 
+# and with those of the paper's structure
+JOINT_ROWS = Size("joint_rows", 2 * len(PAPER_STRUCTURE.mechanism.joints))
+WELDS = Size("welds", len(PAPER_STRUCTURE.mechanism.welds))
+
 
 class Features(NamedTuple):
-    """Options of an engine beyond the paper's rigid leg. They are constants when its kernels are compiled: an
-    option that is off costs neither time nor memory.
+    """Options of an engine beyond the paper's rigid leg. They are constants of its kernels: an option that is
+    off costs neither time nor memory.
 
     Attributes:
         harmonics: order of the swing law, 1 to `gait.MOST_HARMONICS`.
@@ -52,15 +56,16 @@ class Features(NamedTuple):
         """Number of gait parameters of a leg."""
         return 2 + 2 * self.harmonics
 
-    def of(self, layout: Any) -> Any:
+    def of(self, layout: type[AnyLayout]) -> type[AnyLayout]:
         """Return a layout of this module in the sizes of engines with these features."""
         # springs: normal and tangential; limits: lowest and highest pitch and height, and the clearance
-        return layout.sized(
+        sized: type[AnyLayout] = layout.sized(
             gait=self.gait_size,
             spring=2 * self.springs,
             limited=int(self.has_limits),
             limits=5 * self.has_limits,
         )
+        return sized
 
 
 PLAIN = Features()
@@ -391,6 +396,22 @@ class LegMemory(Layout):
     command: Annotated[Block, GAIT]
     report: LegReport
     settings: LegSettings
+
+
+class Reactions(Layout):
+    """Joint forces and moments of a leg."""
+
+    joints: Annotated[Block, JOINT_ROWS]  # force of each joint, as in `Mechanism.joints`: x and y [N]
+    lock: Annotated[Block, WELDS]  # moment on the first body of each weld by the second [N m]
+    driver: Row  # moment on the crank by the leg's frame [N m]
+    hip: Row  # moment on the leg's frame by the trunk, about O [N m]
+
+
+def reactions_layout(structure: Structure) -> type[Reactions]:
+    """Return the layout of the reactions of legs with a structure."""
+    joints, welds = structure.mechanism.joints, structure.mechanism.welds
+    sized: type[Reactions] = Reactions.sized(joint_rows=2 * len(joints), welds=len(welds))
+    return sized
 
 
 # Names in records, states and infos

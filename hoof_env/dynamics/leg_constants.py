@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import hashlib
 from functools import cache
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, get_type_hints
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,7 +21,7 @@ BETWEEN_ANGLES = 1.05
 
 
 class Structure(NamedTuple):
-    """The structure for which kernels are compiled.
+    """The structure for which kernels are made.
 
     Attributes:
         mechanism: of the leg.
@@ -71,16 +71,20 @@ class Solid(Layout):
     mixed: Vector  # on the tail by the head; on the head by the tail its mirror image
 
 
+class LegConstants(Layout):
+    """Constants that legs of all structures have; `constants_layout` adds those of one."""
+
+    crank: Row  # length [m]
+    travel: Row  # 1 or -1
+    toe_is_first: Row  # 1 if the toe is the first of the mechanism's feet, else 0
+    reach: Row  # farthest of any joint but the sole's points from O, at any crank angle [m]
+
+
 @cache
-def constants_layout(structure: Structure) -> Any:
+def constants_layout(structure: Structure) -> type[LegConstants]:
     """Return the layout of the constants of legs with a structure."""
     mechanism = structure.mechanism
-    fields: dict[str, Any] = {
-        "crank": Row,  # length [m]
-        "travel": Row,  # 1 or -1
-        "toe_is_first": Row,  # 1 if the toe is the first of the mechanism's feet, else 0
-        "reach": Row,  # farthest of any joint but the sole's points from O, at any crank angle [m]
-    }
+    fields: dict[str, Any] = get_type_hints(LegConstants, include_extras=True)
     fields |= {f"pivot_{name}": Vector for name in mechanism.pivots}  # from O [m]
     # from the toe, over that of the heel from the toe [-]
     fields |= {f"sole_{name}": Vector for name in mechanism.sole}
@@ -92,7 +96,8 @@ def constants_layout(structure: Structure) -> Any:
     for body in mechanism.bodies:
         fields[f"body_{body.name}"] = Solid if body.name in structure.off_centre else Rod
     digest = hashlib.sha256(repr(structure).encode()).hexdigest()[:12]
-    return new_layout(f"LegConstants_{digest}", fields)
+    made: type[LegConstants] = new_layout(f"LegConstants_{digest}", fields)
+    return made
 
 
 def leg_constants(geometry: Geometry) -> NDArray[np.float64]:

@@ -18,12 +18,19 @@ momentum of all bodies together: in flight it is constant to round-off, with any
 
 from __future__ import annotations
 
+from typing import TypeVar
+
 from hoof_env.dynamics.hoof import meet_ground
-from hoof_env.dynamics.layout import MAX_STATE, Moving
+from hoof_env.dynamics.layout import MAX_STATE, LegRows, Moving, TrunkRows
+from hoof_env.dynamics.model import Model
 from hoof_env.dynamics.parts import FIXED, FREE, RAIL, SUSPENDED
 from hoof_env.gait import COS, OFFSET, SIN, SPEED
-from hoof_env.leg.profile import locate, look_up
+from hoof_env.leg.profile import Functions, Slopes, locate, look_up
 from hoof_env.simd import (
+    Lanes,
+    Number,
+    Plane,
+    Whole,
     absolute,
     block_at,
     cond,
@@ -41,16 +48,19 @@ from hoof_env.simd.math import clip, cos_sin
 
 MOVING = Moving.size
 
+Sum = TypeVar("Sum", Lanes, Plane)
 
-def add(total, x, lanes_are_legs):  # type: ignore[no-untyped-def]
+
+def add(total: Sum, x: Sum, lanes_are_legs: bool) -> Sum:
     """Return total + x, lane by lane; where the lanes are the legs of one trunk, return total plus the x of
     all lanes, one after the other as in a loop over legs."""
     if lanes_are_legs:
-        return lane_sum(total, x)
+        summed: Sum = lane_sum(total, x)
+        return summed
     return total + rounded(x)
 
 
-def evaluate(trunk, legs, leg_count, model, elapsed):  # type: ignore[no-untyped-def]
+def evaluate(trunk: TrunkRows, legs: LegRows, leg_count: Whole, model: Model, elapsed: Number) -> None:
     """Compute all forces and accelerations at the present stage, `elapsed` [s] after the step's start."""
     if model.kind != FIXED:
         clear_trunk(trunk, model.kind)
@@ -77,13 +87,13 @@ def evaluate(trunk, legs, leg_count, model, elapsed):  # type: ignore[no-untyped
         accelerate_crank(trunk, block_at(legs, i), model.motors)
 
 
-def find_crank(leg, model):  # type: ignore[no-untyped-def]
+def find_crank(leg: LegRows, model: Model) -> None:
     """Compute cell, cosine and sine of the crank angle, for all legs before their look-ups need them."""
     locate(leg, model.cells)
     leg.cosine, leg.sine = cos_sin(leg.theta)
 
 
-def look_up_functions(trunk, leg, model):  # type: ignore[no-untyped-def]
+def look_up_functions(trunk: TrunkRows, leg: LegRows, model: Model) -> None:
     """Look up the functions of the crank angle and their derivatives."""
     look_up(leg, model.tables)
     if model.form.has_limits:
@@ -95,7 +105,7 @@ def look_up_functions(trunk, leg, model):  # type: ignore[no-untyped-def]
     )
 
 
-def scale_functions(value, slope, length, mass):  # type: ignore[no-untyped-def]
+def scale_functions(value: Functions, slope: Slopes, length: Lanes, mass: Lanes) -> None:
     """Scale the functions to those of a similar leg, `length` times as large with `mass` times the mass."""
     moment = mass * length
     inertia = mass * length * length
@@ -114,7 +124,7 @@ def scale_functions(value, slope, length, mass):  # type: ignore[no-untyped-def]
     value.frame_inertia_slope = inertia * value.frame_inertia_slope
 
 
-def place_frame(trunk, leg, harmonics, elapsed):  # type: ignore[no-untyped-def]
+def place_frame(trunk: TrunkRows, leg: LegRows, harmonics: int, elapsed: Number) -> None:
     """Compute the leg's frame (E1), and its first moment and inertia in the world. The swing is phi = phi_0
     + phi_s sin(theta) + phi_c cos(theta) and higher harmonics, if any; each parameter moves as its filter
     does."""
@@ -167,14 +177,13 @@ def place_frame(trunk, leg, harmonics, elapsed):  # type: ignore[no-untyped-def]
     )
 
 
-def gait_parameter_at(leg, k, elapsed):  # type: ignore[no-untyped-def]
+def gait_parameter_at(leg: LegRows, k: int, elapsed: Number) -> tuple[Lanes, Lanes, Lanes]:
     """Return parameter k of the gait, its rate and acceleration, `elapsed` [s] after the step's start."""
     value = leg.state.gait[k]
     rate = leg.state.gait_rate[k]
     acceleration = leg.gait_acceleration[k]
 
-
-    def moved():  # type: ignore[no-untyped-def]
+    def moved() -> tuple[Lanes, Lanes]:
         return (
             value + elapsed * (rate + 0.5 * elapsed * acceleration),
             rate + elapsed * acceleration,
@@ -183,7 +192,7 @@ def gait_parameter_at(leg, k, elapsed):  # type: ignore[no-untyped-def]
     return (*cond(elapsed != 0.0, moved, (value, rate)), acceleration)
 
 
-def keep_still(trunk):  # type: ignore[no-untyped-def]
+def keep_still(trunk: TrunkRows) -> None:
     """Set the trunk's constant quantities (those of a fixed trunk, or of one that does not pitch)."""
     for k in range(MOVING):
         trunk.stage[k] = trunk.state.moving[k]
@@ -198,7 +207,7 @@ def keep_still(trunk):  # type: ignore[no-untyped-def]
     trunk.turn = vector(full_like(trunk, 1.0), 0.0)
 
 
-def clear_trunk(trunk, kind):  # type: ignore[no-untyped-def]
+def clear_trunk(trunk: TrunkRows, kind: int) -> None:
     """Reset the trunk's sums before the legs are gathered."""
     if kind == FREE:
         cosine, sine = cos_sin(trunk.stage.pitch)
@@ -210,7 +219,7 @@ def clear_trunk(trunk, kind):  # type: ignore[no-untyped-def]
     trunk.relative_angular_momentum = 0.0
 
 
-def gather_leg(trunk, leg, kind, lanes_are_legs):  # type: ignore[no-untyped-def]
+def gather_leg(trunk: TrunkRows, leg: LegRows, kind: int, lanes_are_legs: bool) -> None:
     """Add a leg to first moment, momentum, inertia and spin about the trunk's centre of mass (E6)."""
     s = leg.first_moment
     w = leg.theta_rate
@@ -233,7 +242,7 @@ def gather_leg(trunk, leg, kind, lanes_are_legs):  # type: ignore[no-untyped-def
     trunk.relative_momentum = add(trunk.relative_momentum, drift, lanes_are_legs)
 
 
-def gather_legs(trunk, legs, leg_count, model):  # type: ignore[no-untyped-def]
+def gather_legs(trunk: TrunkRows, legs: LegRows, leg_count: Whole, model: Model) -> None:
     """Compute the legs' functions and frames at the present state, and their sums about the trunk's centre of
     mass (E6): what the momentum of all bodies needs, without forces."""
     clear_trunk(trunk, model.kind)
@@ -245,7 +254,7 @@ def gather_legs(trunk, legs, leg_count, model):  # type: ignore[no-untyped-def]
         gather_leg(trunk, leg, model.kind, model.lanes_are_legs)
 
 
-def move_trunk(trunk, kind):  # type: ignore[no-untyped-def]
+def move_trunk(trunk: TrunkRows, kind: int) -> None:
     """Compute place and velocity of the trunk from centre of mass and momentum of all (E7), on a rail along x
     only, and the forces on it other than its legs'."""
     centre = trunk.stage.centre
@@ -289,7 +298,7 @@ def move_trunk(trunk, kind):  # type: ignore[no-untyped-def]
     trunk.fallen = where(place.imag < trunk.settings.bottom, 1.0, trunk.fallen)
 
 
-def set_up_crank(trunk, leg, motors, elapsed):  # type: ignore[no-untyped-def]
+def set_up_crank(trunk: TrunkRows, leg: LegRows, motors: bool, elapsed: Number) -> None:
     """Set up a crank's equation of motion (E5), with the trunk's acceleration a,
 
         crank_inertia theta_tt + moment_by_crank . a + crank_pitch_coupling pitch_tt = torque + ground - rest.
@@ -336,7 +345,7 @@ def set_up_crank(trunk, leg, motors, elapsed):  # type: ignore[no-untyped-def]
         leg.free_theta_acceleration = where(is_motor, free, wanted_rate)
 
 
-def load_trunk(trunk, leg, kind, motors, lanes_are_legs):  # type: ignore[no-untyped-def]
+def load_trunk(trunk: TrunkRows, leg: LegRows, kind: int, motors: bool, lanes_are_legs: bool) -> None:
     """Add a leg to the trunk's equations, its crank eliminated (E8), and to outer force and moment."""
     w = leg.theta_rate
     frame_rate = leg.beta_rate
@@ -382,7 +391,7 @@ def load_trunk(trunk, leg, kind, motors, lanes_are_legs):  # type: ignore[no-unt
         )
 
 
-def accelerate_trunk(trunk, kind):  # type: ignore[no-untyped-def]
+def accelerate_trunk(trunk: TrunkRows, kind: int) -> None:
     """Solve the trunk's equations (E8) for its accelerations, by Cramer's rule."""
     load = trunk.rates.force + trunk.load
     xx = trunk.mass_xx
@@ -419,7 +428,7 @@ def accelerate_trunk(trunk, kind):  # type: ignore[no-untyped-def]
     trunk.pitch_acceleration = pitch_acc
 
 
-def accelerate_crank(trunk, leg, motors):  # type: ignore[no-untyped-def]
+def accelerate_crank(trunk: TrunkRows, leg: LegRows, motors: bool) -> None:
     """Set the crank's acceleration; a motor's crank yields to the trunk's acceleration (E9)."""
     leg.theta_acceleration = leg.free_theta_acceleration
     if motors:

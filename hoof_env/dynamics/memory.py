@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from hoof_env.constants import GRAVITY
 from hoof_env.dynamics import layout
-from hoof_env.dynamics.advance import LANES, MODEL
+from hoof_env.dynamics.advance import LANES
 from hoof_env.dynamics.form import engine_layout
 from hoof_env.dynamics.layout import (
     MAX_STATE,
@@ -23,6 +23,7 @@ from hoof_env.dynamics.layout import (
     TrunkState,
 )
 from hoof_env.dynamics.leg_constants import PAPER_STRUCTURE, leg_constants, structure_of
+from hoof_env.dynamics.model import MODEL
 from hoof_env.dynamics.parts import (
     FREE,
     RAIL,
@@ -135,10 +136,10 @@ def new_memory(scene: Mechanics, num_envs: int, columns: int, reacts: bool) -> M
     """Allocate the memory of an engine; states are NaN until reset."""
     legs = len(scene.limbs)
     form = engine_layout(scene.features)
-    constants = np.zeros((legs, form.constants_size))
+    constants = np.zeros((legs, form.constants.size))
     if reacts or scene.features.has_limits:
         constants = np.array([leg_constants(limb.geometry) for limb in scene.limbs])
-    reactions = np.zeros((legs, form.reactions_size, columns if reacts else 0))
+    reactions = np.zeros((legs, form.reactions.size, columns if reacts else 0))
     data = copy_of(np.zeros((form.trunk_rows + legs * form.leg_rows, columns)))
     whole = memory_of(data, columns, constants, reactions, scene.features)
     whole.trunk[:] = np.nan

@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+from hoof_env.dynamics.layout import LegRows, TrunkRows
 from hoof_env.dynamics.mechanics import gather_legs
+from hoof_env.dynamics.model import Model
 from hoof_env.dynamics.parts import FREE, RAIL
-from hoof_env.simd import cross, dot, full_like, perpendicular, vector, where
+from hoof_env.simd import Truth, Whole, cross, dot, full_like, perpendicular, vector, where
 
 
-def velocities_to_momenta(trunk, legs, leg_count, model, starts):  # type: ignore[no-untyped-def]
+def velocities_to_momenta(
+    trunk: TrunkRows, legs: LegRows, leg_count: Whole, model: Model, starts: Truth
+) -> None:
     """Compute centre of mass, momentum and spin of all bodies at a start, as `mechanics.move_trunk` inverts
     it (E7).
 

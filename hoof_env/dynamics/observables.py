@@ -21,15 +21,40 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
+from hoof_env.dynamics.form import EngineLayout
+from hoof_env.dynamics.layout import (
+    Account,
+    Contact,
+    LegReport,
+    LegRows,
+    PointReport,
+    TrunkReport,
+    TrunkRows,
+)
 from hoof_env.dynamics.mechanics import add
+from hoof_env.dynamics.model import Model
 from hoof_env.errors import Floats
-from hoof_env.simd import absolute, block_at, dot, loop, maximum, minimum, perpendicular, sqrt, where
+from hoof_env.simd import (
+    Lanes,
+    Number,
+    Plane,
+    Whole,
+    absolute,
+    block_at,
+    dot,
+    loop,
+    maximum,
+    minimum,
+    perpendicular,
+    sqrt,
+    where,
+)
 
 REVOLUTION = 2 * math.pi
 """One revolution of the crank [rad]."""
 
 
-def find_drives(trunk, leg):  # type: ignore[no-untyped-def]
+def find_drives(trunk: TrunkRows, leg: LegRows) -> None:
     """Compute torques and powers of crank and swing from the accelerations (E2 to E4)."""
     w = leg.theta_rate
     acc = leg.theta_acceleration
@@ -64,7 +89,9 @@ def find_drives(trunk, leg):  # type: ignore[no-untyped-def]
     leg.swing_power = by_frame * where(is_motor, sway, k * w + sway)
 
 
-def keep_account(trunk, legs, leg_count, model, account, weight):  # type: ignore[no-untyped-def]
+def keep_account(
+    trunk: TrunkRows, legs: LegRows, leg_count: Whole, model: Model, account: Account, weight: Number
+) -> None:
     """Add the present stage's powers and forces, times `weight` [s], to an `Account`."""
     velocity = trunk.velocity
     lanes_are_legs = model.lanes_are_legs
@@ -101,7 +128,7 @@ def keep_account(trunk, legs, leg_count, model, account, weight):  # type: ignor
             account.hoof[1] = add(account.hoof[1], weight * lost, lanes_are_legs)
 
 
-def report_trunk(trunk, report):  # type: ignore[no-untyped-def]
+def report_trunk(trunk: TrunkRows, report: TrunkReport) -> None:
     """Fill a `TrunkReport`."""
     report.place = trunk.place
     report.velocity = trunk.velocity
@@ -110,7 +137,7 @@ def report_trunk(trunk, report):  # type: ignore[no-untyped-def]
     report.pitch_acceleration = trunk.pitch_acceleration
 
 
-def report_leg(trunk, leg, report, form):  # type: ignore[no-untyped-def]
+def report_leg(trunk: TrunkRows, leg: LegRows, report: LegReport, form: EngineLayout) -> None:
     """Fill a `LegReport`. The rows of a heel that is not there stay 0."""
     find_drives(trunk, leg)
     side = leg.settings.side
@@ -131,7 +158,7 @@ def report_leg(trunk, leg, report, form):  # type: ignore[no-untyped-def]
         report_point(leg.heel, hip + leg.turn * leg.functions.heel, report.heel)
 
 
-def report_point(point, place, report):  # type: ignore[no-untyped-def]
+def report_point(point: Contact, place: Plane, report: PointReport) -> None:
     """Fill a `PointReport`."""
     report.x = place.real
     report.y = place.imag
@@ -140,7 +167,7 @@ def report_point(point, place, report):  # type: ignore[no-untyped-def]
     report.friction = point.friction
 
 
-def count_stride(trunk, leg, form, h):  # type: ignore[no-untyped-def]
+def count_stride(trunk: TrunkRows, leg: LegRows, form: EngineLayout, h: Lanes | float) -> None:
     """Update the open stance and the sums with a whole step of `h` [s] that ends here."""
     find_drives(trunk, leg)
     push = leg.ground_force

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from functools import lru_cache
 
-from hoof_env.dynamics.advance import EngineKind, leg_memory_of, read_leg, read_trunk, unpack_model
+from hoof_env.dynamics.advance import EngineKind, leg_memory_of, read_leg, read_trunk
 from hoof_env.dynamics.form import engine_layout
+from hoof_env.dynamics.layout import LegRows, TrunkRows
 from hoof_env.dynamics.mechanics import (
     accelerate_crank,
     accelerate_trunk,
@@ -14,13 +15,14 @@ from hoof_env.dynamics.mechanics import (
     move_trunk,
     set_up_crank,
 )
+from hoof_env.dynamics.model import Model, unpack_model
 from hoof_env.dynamics.stepping import begin_step
-from hoof_env.simd import block_at, columns, full_like, loop, new_rows, vector
+from hoof_env.simd import Plane, Whole, block_at, columns, full_like, loop, new_rows, vector
 from hoof_env.simd.compile import Kernel
 from hoof_env.simd.memory import Arrays, Given
 
 
-def push_cranks(trunk, legs, leg_count, model, impulse):  # type: ignore[no-untyped-def]
+def push_cranks(trunk: TrunkRows, legs: LegRows, leg_count: Whole, model: Model, impulse: Plane) -> None:
     """Add to the speeds of motors' cranks what an `impulse` [N s] on the trunk's centre of mass changes at
     once: (E8) and (E9) with impulses for forces, and jumps of speeds for accelerations."""
     gather_legs(trunk, legs, leg_count, model)
@@ -48,11 +50,11 @@ def push_cranks(trunk, legs, leg_count, model, impulse):  # type: ignore[no-unty
 
 @lru_cache(maxsize=64)
 def push_kernel(kind: EngineKind) -> Kernel:
-    """Return the kernel that adds to the crank speeds of some environments what impulses on their trunks change
-    at once.
+    """Return the kernel that adds to the crank speeds of some environments what impulses on their trunks
+    change at once.
 
-    Its argument are the arrays of the engine, and of the n environments that are pushed: `impulses` [N s], forward
-    and upward, shape (2, n), and `which`, their columns, shape (n,).
+    Its argument are the arrays of the engine, and of the n environments that are pushed: `impulses` [N s],
+    forward and upward, shape (2, n), and `which`, their columns, shape (n,).
     """
     form = engine_layout(kind.features)
     count = kind.legs

@@ -11,18 +11,22 @@ with the new rates. Source: Hairer, Norsett & Wanner, Solving Ordinary Different
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from types import MappingProxyType
 
 from hoof_env.dynamics.hoof import begin_springs, clear_springs, end_springs, move_springs, weigh_springs
+from hoof_env.dynamics.layout import LegRows, TrunkRows
 from hoof_env.dynamics.mechanics import MOVING
+from hoof_env.dynamics.model import Model
 from hoof_env.dynamics.parts import FIXED, FREE
 from hoof_env.gait import INNER, SPEED
-from hoof_env.simd import block_at, loop, when, where
+from hoof_env.simd import Lanes, Number, Whole, block_at, loop, when, where
+from hoof_env.simd.layout import Layout
 from hoof_env.simd.math import clip
 
 
-def filter_accelerations(leg, count, settings):  # type: ignore[no-untyped-def]
+def filter_accelerations(leg: LegRows, count: int, settings: Sequence[Number]) -> None:
     """Set the accelerations of the command filters: bounded, towards a bounded rate, towards the command."""
     for k in range(count):
         gain = settings[3 * k]
@@ -33,17 +37,14 @@ def filter_accelerations(leg, count, settings):  # type: ignore[no-untyped-def]
         leg.gait_acceleration[k] = clip(INNER * gain * (wanted - leg.state.gait_rate[k]), acc_bound)
 
 
-def advance_rows(kind, to, start, factor, slope):  # type: ignore[no-untyped-def]
+def advance_rows(kind: int, to: Layout, start: Layout, factor: Number, slope: Layout) -> None:
     """Set to = start + factor slope for all rows that move."""
     # the last two rows, pitch and spin, move only with a free trunk
-    for k in range(MOVING - 2):
+    for k in range(MOVING if kind == FREE else MOVING - 2):
         to[k] = start[k] + factor * slope[k]
-    if kind == FREE:
-        for k in range(MOVING - 2, MOVING):
-            to[k] = start[k] + factor * slope[k]
 
 
-def begin_step(trunk, legs, leg_count, model):  # type: ignore[no-untyped-def]
+def begin_step(trunk: TrunkRows, legs: LegRows, leg_count: Whole, model: Model) -> None:
     """Set the first stage to the state itself, and the filters' accelerations for the whole step."""
     if model.kind != FIXED:
         for k in range(MOVING):
@@ -63,7 +64,7 @@ def begin_step(trunk, legs, leg_count, model):  # type: ignore[no-untyped-def]
             clear_springs(leg, model.form.springs)
 
 
-def weigh_stage(trunk, legs, leg_count, model, weight):  # type: ignore[no-untyped-def]
+def weigh_stage(trunk: TrunkRows, legs: LegRows, leg_count: Whole, model: Model, weight: Number) -> None:
     """Add the derivatives at the present stage to their means, if the scheme averages: otherwise the last
     stage's derivatives are those of the step."""
     if not model.averages:
@@ -80,7 +81,7 @@ def weigh_stage(trunk, legs, leg_count, model, weight):  # type: ignore[no-untyp
             weigh_springs(leg, model.form.springs, weight)
 
 
-def prescribed(leg, elapsed):  # type: ignore[no-untyped-def]
+def prescribed(leg: LegRows, elapsed: Number) -> tuple[Lanes, Lanes]:
     """Return angle and rate of a prescribed crank `elapsed` [s] into the step, exactly as its filter
     moves."""
     value = leg.state.gait[SPEED]
@@ -92,7 +93,7 @@ def prescribed(leg, elapsed):  # type: ignore[no-untyped-def]
     return theta, value + elapsed * (rate + 0.5 * elapsed * acceleration)
 
 
-def next_stage(trunk, legs, leg_count, model, elapsed):  # type: ignore[no-untyped-def]
+def next_stage(trunk: TrunkRows, legs: LegRows, leg_count: Whole, model: Model, elapsed: Number) -> None:
     """Move `elapsed` [s] from the step's start with the derivatives of the present stage."""
     if model.kind != FIXED:
         advance_rows(model.kind, trunk.stage, trunk.state.moving, elapsed, trunk.rates)
@@ -106,14 +107,14 @@ def next_stage(trunk, legs, leg_count, model, elapsed):  # type: ignore[no-untyp
         move_springs(leg, model.form.springs, elapsed)
 
 
-def use_new_rates(trunk, h):  # type: ignore[no-untyped-def]
+def use_new_rates(trunk: TrunkRows, h: Number) -> None:
     """Set the rates of centre and pitch to those at the step's end (semi-implicit Euler)."""
     rates = trunk.rates
     rates.velocity = rates.velocity + h * rates.force * trunk.settings.inverse_mass
     rates.pitch_rate = rates.pitch_rate + h * trunk.pitch_acceleration
 
 
-def end_step(trunk, legs, leg_count, model, h):  # type: ignore[no-untyped-def]
+def end_step(trunk: TrunkRows, legs: LegRows, leg_count: Whole, model: Model, h: Number) -> None:
     """Advance the state by a step; the filters advance exactly."""
     if model.kind != FIXED:
         if model.new_rates:

@@ -8,7 +8,7 @@ from hoof_env.envs.frames_kernel import put_action
 from hoof_env.envs.scene import Scene
 from hoof_env.simd import Cell, Truth, Whole, full, loop, read, write
 from hoof_env.simd.math import clip
-from hoof_env.simd.user_functions import foreign, number_of, numbers_of
+from hoof_env.simd.user_functions import foreign
 from hoof_env.tasks.episode import ACTIONS
 from hoof_env.tasks.own_parts import ActionMap
 
@@ -19,7 +19,8 @@ def are_numbers(scene: Scene) -> Truth:
     total = Cell(0.0)  # stays 0 unless an action is infinite or not a number
     for k in loop(scene.columns * scene.kind.action_size):
         total.value = total.value + (scene.actions[k] - scene.actions[k])
-    return total.value == 0.0  # type: ignore[no-any-return]
+    found: Truth = total.value == 0.0
+    return found
 
 
 def apply(scene: Scene, n: Whole, scratch: Any) -> None:
@@ -38,8 +39,6 @@ def convert(scene: Scene, action_map: ActionMap, n: Whole) -> None:
     given = len(action_map.names)
     size = scene.kind.body.legs * ACTIONS
     actions = tuple(clip(read(scene.acted, n * given + k, given, lanes), 1.0) for k in range(given))
-    compute = foreign(action_map.compute)
-    found = numbers_of(action_map.title, size)(compute(actions, scene.inputs(n)))
-    number = number_of(action_map.title)
-    for k, action in enumerate(found):
-        write(clip(full(number(action), lanes), 1.0), scene.mapped, n * size + k, size)
+    compute = foreign(action_map.title, action_map.compute, count=size, legs=scene.layouts.legs)
+    for k, action in enumerate(compute(actions, scene.inputs(n))):
+        write(clip(full(action, lanes), 1.0), scene.mapped, n * size + k, size)

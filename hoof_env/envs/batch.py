@@ -81,6 +81,7 @@ COPIED = (
 FOUND_AGAIN = (
     "held",
     "_blocks",
+    "_chosen",
     "entries",
     "true_entries",
     "kernel",

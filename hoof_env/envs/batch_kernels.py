@@ -7,14 +7,15 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from hoof_env.dynamics.advance import EngineKind, static_of
+from hoof_env.dynamics.advance import EngineKind
 from hoof_env.dynamics.engine import TrunkEngine
 from hoof_env.dynamics.form import engine_layout
+from hoof_env.dynamics.model import static_of
 from hoof_env.envs.batch_build import find_entries
 from hoof_env.envs.conditions import under_each
 from hoof_env.envs.infos import InfoLayout
 from hoof_env.envs.scene import ALL_ARRAYS, TaskKind, functions_of, is_from_outside, known_of
-from hoof_env.envs.step import NOT_A_NUMBER, StepKernels, step_kernels
+from hoof_env.envs.step import NOT_A_NUMBER, step_kernels
 from hoof_env.errors import ParameterError
 from hoof_env.simd.compile import Kernel
 from hoof_env.simd.layout import views
@@ -94,7 +95,11 @@ class BatchKernels:
             EngineKind(self.engine.features, self.task.contact_law, static_of(self.engine.arrays[1])),
             known_of(self.task_record),
         )
-        self.kernels = step_kernels(kind, is_scalar)
+        # found once for each kind: those with a function from outside are made anew, which takes time
+        chosen = vars(self).setdefault("_chosen", {})
+        if (kind, is_scalar) not in chosen:
+            chosen[kind, is_scalar] = step_kernels(kind, is_scalar)
+        self.kernels = chosen[kind, is_scalar]
         self.kernel = self._step_paper if self.paper else self.kernels.step
 
     def find(self) -> None:

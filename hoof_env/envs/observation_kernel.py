@@ -10,7 +10,7 @@ from hoof_env.envs.scene import Scene, functions_of, is_from_outside
 from hoof_env.simd import Lanes, Whole, apply_to_rows, full_like, loop, new_rows, rolled, when, where, write
 from hoof_env.simd.math import clip, tanh
 from hoof_env.simd.noise import uniform
-from hoof_env.simd.user_functions import foreign, number_of
+from hoof_env.simd.user_functions import foreign
 from hoof_env.simd.values import rounded
 from hoof_env.tasks.observation import Entry, ObservationInputs
 
@@ -34,10 +34,11 @@ def measure(scene: Scene, entry: Entry, inputs: ObservationInputs, scaled: bool)
     if not is_user_entry(entry):
         number = rounded(compute(inputs))
         return number if scale is None else scale(number, inputs)
-    number = number_of(entry.title)(foreign(compute)(inputs, *scene.constants(entry.constants)))
+    legs = scene.layouts.legs
+    number = foreign(entry.title, compute, legs=legs)(inputs, *scene.constants(entry.constants))
     if scale is None:
         return number
-    return number_of(f"the scale of {entry.title}")(foreign(scale)(number, inputs))
+    return foreign(f"the scale of {entry.title}", scale, legs=legs)(number, inputs)
 
 
 def add_noise(scene: Scene, numbers: Any, n: Whole, ahead: int) -> None:

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
-from hoof_env.dynamics.layout import StrideSums
+from typing import Any
+
+from hoof_env.dynamics.layout import LegMemory, StrideSums, TrunkMemory
 from hoof_env.dynamics.limits import has_moved
 from hoof_env.dynamics.names import RENAMED
-from hoof_env.simd import block_at, maximum, minimum, rounded, where
-from hoof_env.tasks.episode import FAILED, TRUNCATED
+from hoof_env.simd import Lanes, Mask, Number, block_at, maximum, minimum, rounded, where
+from hoof_env.tasks.episode import FAILED, TRUNCATED, Episode, Memories
 from hoof_env.tasks.reward import BEARING, LONGEST_STRIDE, Outcome
 
 MOVED = {
@@ -17,7 +19,7 @@ MOVED = {
 """Present names of attributes by the old ones, for messages; sums were attributes of the `Outcome` itself."""
 
 
-def bear(episode, impulse, seconds):  # type: ignore[no-untyped-def]
+def bear(episode: Episode, impulse: Lanes, seconds: Number) -> Lanes:
     """Return the part of an impulse over the weight for which bearing is rewarded [s]: all within the
     allowance, less the part beyond it. The allowance grows with time, and the impulse uses it up; see
     `reward.BEARING`."""
@@ -27,7 +29,7 @@ def bear(episode, impulse, seconds):  # type: ignore[no-untyped-def]
     return borne - (impulse - borne)
 
 
-def sum_up(first_leg, layouts, works, sums):  # type: ignore[no-untyped-def]
+def sum_up(first_leg: LegMemory, layouts: Memories, works: Mask, sums: StrideSums) -> None:
     """Write the sums over all legs of the step into `sums`, 0 where the engine failed."""
     for k in range(layouts.sums):
         total = first_leg.sums[k]
@@ -37,14 +39,16 @@ def sum_up(first_leg, layouts, works, sums):  # type: ignore[no-untyped-def]
         sums[k] = where(works, total, 0.0)
 
 
-def put_together(layouts, k, one, other):  # type: ignore[no-untyped-def]
+def put_together(layouts: Memories, k: int, one: Lanes, other: Lanes) -> Lanes:
     """Return the sum of two values of the k-th of `StrideSums`, of a peak the larger value."""
     if (layouts.peaks >> k) & 1:
         return maximum(one, other)
     return one + other
 
 
-def find_outcome(task, trunk, leg, episode, layouts, sums):  # type: ignore[no-untyped-def]
+def find_outcome(
+    task: Any, trunk: TrunkMemory, leg: LegMemory, episode: Episode, layouts: Memories, sums: StrideSums
+) -> Outcome:
     """Return the outcome of the step; `sums` is memory for `StrideSums`."""
     # Where the engine failed the state is that of before the step: nothing is rewarded.
     works = has_moved(trunk.result)
@@ -73,7 +77,7 @@ def find_outcome(task, trunk, leg, episode, layouts, sums):  # type: ignore[no-u
     )
 
 
-def add_up(outcome, episode, layouts):  # type: ignore[no-untyped-def]
+def add_up(outcome: Outcome, episode: Episode, layouts: Memories) -> None:
     """Add the step to the sums of the episode."""
     episode.time = episode.time + outcome.seconds
     episode.distance = episode.distance + outcome.progress
@@ -82,7 +86,7 @@ def add_up(outcome, episode, layouts):  # type: ignore[no-untyped-def]
         episode.sums[k] = put_together(layouts, k, episode.sums[k], outcome.sums[k])
 
 
-def decide(task, outcome, episode):  # type: ignore[no-untyped-def]
+def decide(task: Any, outcome: Outcome, episode: Episode) -> tuple[Mask, Mask, Mask]:
     """Count the step, and return masks of the rows in which the episode ends, in which another speed is
     commanded from the next step on, and in which the trunk is pushed after this step."""
     steps = episode.steps + 1.0

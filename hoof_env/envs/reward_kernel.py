@@ -7,7 +7,7 @@ from typing import Any
 from hoof_env.dynamics.limits import has_moved
 from hoof_env.envs.scene import Scene, is_from_outside
 from hoof_env.simd import Lanes, Whole, where
-from hoof_env.simd.user_functions import foreign, number_of
+from hoof_env.simd.user_functions import foreign
 from hoof_env.tasks.reward import Outcome, Term
 
 
@@ -42,12 +42,13 @@ def compute_user_term(scene: Scene, term: Term, k: int, outcome: Outcome, n: Who
     now = scene.kept_rows(n)
     count = scene.layouts.own_rows if term.keeps else 0
     before = [now[row] for row in range(count)]
-    compute = foreign(term.compute)
-    found = number_of(term.title)(compute(outcome, scene.task.weights[k], *scene.constants(term.constants)))
+    keeps = term.name if term.keeps else ""
+    compute = foreign(term.title, term.compute, keeps=keeps, legs=scene.layouts.legs)
+    found: Lanes = compute(outcome, scene.task.weights[k], *scene.constants(term.constants))
     works = has_moved(outcome.trunk.result)
     for row in range(count):
         now[row] = where(works, now[row], before[row])
-    return found  # type: ignore[no-any-return]
+    return found
 
 
 def clear_failed(outcome: Outcome, episode: Any, k: int) -> None:

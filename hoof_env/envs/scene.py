@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -15,7 +15,7 @@ from hoof_env.simd.memory import Arrays, Given, RecordType
 from hoof_env.tasks.body import BodyKernels
 from hoof_env.tasks.episode import ACTIONS, Memories, memories_of, task_type
 from hoof_env.tasks.observation import Entry, ObservationInputs
-from hoof_env.tasks.own_parts import ActionMap, Own, own_of
+from hoof_env.tasks.own_parts import ActionMap, Constant, Own, own_of
 from hoof_env.tasks.reward import Term
 
 STEP_ARRAYS = {
@@ -76,9 +76,7 @@ class TaskKind:
     @cached_property
     def layouts(self) -> Memories:
         """Layouts of the memory of a step."""
-        return memories_of(
-            self.body.episode, len(self.terms), self.engine.features, self.body.legs, self.own
-        )
+        return memories_of(self.body.episode, len(self.terms), self.engine.features, self.body.legs, self.own)
 
     @cached_property
     def slots(self) -> Slots:
@@ -221,7 +219,7 @@ class Scene:
             self._model.ground_per_metre if is_terrain else 0.0,
         )
 
-    def constants(self, taken: tuple[Any, ...]) -> tuple[Any, ...]:
+    def constants(self, taken: Sequence[Constant]) -> tuple[Any, ...]:
         """Return the values of constants that a term or an entry takes."""
         names = self.kind.own.constants
         return tuple(self.task.constants[names.index(constant.name)] for constant in taken)

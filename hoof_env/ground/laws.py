@@ -27,7 +27,7 @@ from collections.abc import Callable
 
 from hoof_env.errors import ParameterError, check_choice, check_number
 from hoof_env.simd import maximum, minimum
-from hoof_env.simd.math import exp_of_negative
+from hoof_env.simd.math import Real, exp_of_negative
 
 
 def exact(cr: float) -> float:
@@ -122,7 +122,7 @@ def _bisect(f: Callable[[float], float], low: float, high: float) -> float:
             high = middle
 
 
-def normal_force(spring, chi, dashpot, rate, inverse_speed):  # type: ignore[no-untyped-def]
+def normal_force(spring: Real, chi: Real, dashpot: Real, rate: Real, inverse_speed: Real) -> Real:
     """Return the normal force [N] on a point inside the ground (Eq. 14) from K d^n [N], chi [-], c [N s/m], v
     [m/s] and 1 / v0 [s/m]. The ground does not pull."""
     return maximum(spring * (1.0 + chi * rate * inverse_speed) + dashpot * rate, 0.0)  # Eq. 14
@@ -134,7 +134,7 @@ FRICTION_LAWS = ("ambrosio", "threlfall", "tanh")
 AMBROSIO, THRELFALL, TANH = range(3)
 
 
-def friction_part(speed, law, slow, fast):  # type: ignore[no-untyped-def]
+def friction_part(speed: Real, law: int, slow: Real, fast: Real) -> Real:
     """Return the friction coefficient over its kinetic value, mu(|v|) / mu_k [-], 0 to 1; 0 at rest.
 
     Speeds are |v| and the thresholds of `Ground` [m/s]; `law`, an index into `FRICTION_LAWS`, is the same in

@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from hoof_env.errors import ParameterError, check_number
-from hoof_env.simd import floor, gather_eight, minimum, where
+from hoof_env.simd import Lanes, Matrix, Number, floor, gather_eight, minimum, where
 
 MOST_KNOTS = 1_000_000
 """Largest number of knots."""
@@ -274,8 +274,10 @@ class TerrainGrid(NamedTuple):
     per_metre: float  # number of cells in a metre [1/m]
 
 
-def surface(x, cells, origin, per_metre):  # type: ignore[no-untyped-def]
-    """Return the ground at `x` [m], which may be lanes: height [m], normal x and y [-], factors of stiffness
+def surface(
+    x: Lanes, cells: Matrix, origin: Number, per_metre: Number
+) -> tuple[Lanes, Lanes, Lanes, Lanes, Lanes]:
+    """Return the ground at `x` [m]: height [m], normal x and y [-], factors of stiffness
     and friction [-]. Heights and factors are NaN where x is not finite."""
     place = (x - origin) * per_metre
     # not `maximum`, since NaN must be in a cell, too

@@ -1,6 +1,6 @@
 """The structure of a leg as a list: points in the order in which they are found, bodies, joints, feet.
 
-A `Mechanism` is the structure alone. It is hashable, and kernels are compiled for it. Its lengths have names
+A `Mechanism` is the structure alone. It is hashable, and kernels are made for it. Its lengths have names
 only; the numbers stand in `Geometry`, by these names. `mechanism_list.read_mechanism` reads and checks the
 list as it stands in a preset:
 

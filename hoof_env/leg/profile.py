@@ -14,7 +14,7 @@ Everything is in the frame of the leg with O at the origin, after the mirror int
 from __future__ import annotations
 
 from functools import lru_cache
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,8 +26,11 @@ from hoof_env.simd import floor, minimum, steady, where
 from hoof_env.simd.layout import Layout, Row, Vector
 from hoof_env.simd.machines import CURRENT
 from hoof_env.simd.math import ROUNDER
-from hoof_env.simd.memory import read
+from hoof_env.simd.memory import Pointer, read
 from hoof_env.simd.values import Index, Lanes, full, transposed
+
+if TYPE_CHECKING:  # its rows have those of this module
+    from hoof_env.dynamics.layout import LegRows
 
 
 class Functions(Layout):
@@ -307,8 +310,8 @@ def _polynomials(rows: list[Any], angles: list[Any], first: int, last: int) -> t
     return values, slopes
 
 
-def locate(leg, cells):  # type: ignore[no-untyped-def]
-    """In which of `cells` of its table the crank angle of a leg is, and how far from its middle.
+def locate(leg: LegRows, cells: Lanes | float) -> None:
+    """Find in which of `cells` of its table the crank angle of a leg is, and how far from its middle.
 
     To be asked some while before `look_up`, which waits for the answer. What is not a number is in some cell,
     not a number from its middle."""
@@ -321,17 +324,18 @@ def locate(leg, cells):  # type: ignore[no-untyped-def]
     leg.cell_angle = angle - cell * (TURN / cells)
 
 
-def look_up(leg, table):  # type: ignore[no-untyped-def]
+def look_up(leg: LegRows, table: Pointer) -> None:
     """Fill a leg's functions and slopes, see `Functions`, where `locate` found its crank angle to be; what is
     not a number gives values that are none."""
-    machine, fields, lanes = CURRENT.machine, leg._layout.fields, max(leg._n, 1)
+    rows: Any = leg
+    machine, fields, lanes = CURRENT.machine, rows._layout.fields, max(rows._n, 1)
     values, slopes = fields["functions"].start, fields["slopes"].start
     if machine.runs_now:
-        _look_up_now(leg, table, values, slopes)
+        _look_up_now(rows, table, values, slopes)
         return
 
     def loaded(name: str, kind: str, per_lane: int) -> list[str]:  # one by one: each is needed in all lanes
-        first = leg._at(fields[name].start)
+        first = rows._at(fields[name].start)
         return [machine.load(machine.at(first, per_lane * lane, kind), kind) for lane in range(lanes)]
 
     # What was added to the number of a row's first element is in the upper half of its bits.
@@ -342,10 +346,10 @@ def look_up(leg, table):  # type: ignore[no-untyped-def]
     others, _ = _polynomials(places, angles, SLOPED, FUNCTIONS)
     for first, found in ((values, sloped), (values + SLOPED, others), (slopes, derivatives)):
         for k, column in enumerate(transposed(found)):
-            leg[first + k] = Lanes(column.x, leg._n)
+            leg[first + k] = Lanes(column.x, rows._n)
 
 
-def _look_up_now(leg: Any, table: Any, values: int, slopes: int) -> None:
+def _look_up_now(leg: Any, table: Pointer, values: int, slopes: int) -> None:
     """`look_up` on a machine that computes at once: all lanes together, function by function."""
     machine = CURRENT.machine
     begin = machine.whole_of((leg.row_begin - WHOLE).x)

@@ -191,13 +191,17 @@ class Kernel:
             return _run(self.function, self.parameters, arguments, _HERE.machine)
         if self.call is None:
             self.compile()
+        if Matrix not in self.parameters:
+            return self.call(*arguments)
         given: list[Any] = []
         for kind, argument in zip(self.parameters, arguments, strict=True):
             given += _array(argument) if kind is Matrix else [argument]
         return self.call(*given)
 
     def compile(self) -> None:
-        """Trace the kernel, and find its machine code."""
+        """Trace the kernel and find its machine code, unless that was done before."""
+        if self.call is not None:
+            return
         text, result = traced(self.function, self.parameters)
         kinds: list[Any] = []
         for kind in self.parameters:

@@ -13,6 +13,7 @@ the coefficients of sine and cosine are fdlibm's (Sun Microsystems, k_sin.c and 
 from __future__ import annotations
 
 import math
+from typing import TypeVar
 
 from hoof_env.simd.values import (
     Lanes,
@@ -27,6 +28,8 @@ from hoof_env.simd.values import (
     where,
 )
 
+Real = TypeVar("Real", float, Lanes)
+
 EXPONENT_UNIT = 8
 """Denominator of the exponents that `root_power` takes: whole multiples of 1 / EXPONENT_UNIT."""
 
@@ -39,7 +42,7 @@ HALF_PI_LOW = float.fromhex("0x1.0b4611a626331p-34")  # the rest
 ROUNDER = 1.5 * 2.0**52  # adding and subtracting it rounds to the nearest whole number
 
 
-def root_power(d: Lanes, eighths: int) -> Lanes:
+def root_power(d: Real, eighths: int) -> Real:
     """Return d^(eighths / 8) by square roots; 0 for negative d, relative error below 1e-15. `eighths` is a
     whole number from 8 to 24, the same in all lanes."""
     base = maximum(d, 0.0)
@@ -63,7 +66,7 @@ def root_power(d: Lanes, eighths: int) -> Lanes:
     return rounded(power)
 
 
-def exp_of_negative(x: Lanes) -> Lanes:
+def exp_of_negative(x: Real) -> Real:
     """Return exp(x) for x <= 0, relative error below 1e-13; exp(-40) below -40. The series of exp(x / 256),
     squared eight times."""
     # Taylor's series to the tenth power, by Horner's rule

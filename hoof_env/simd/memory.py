@@ -8,12 +8,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from typing import Any, NoReturn
+from typing import Any, NoReturn, overload
 
 import numpy as np
 from numpy.typing import NDArray
 
-from hoof_env.simd.layout import Named, Row, Vector
+from hoof_env.simd.layout import AnyLayout, Block, Named, Row, Vector
 from hoof_env.simd.machines import CURRENT, Place
 from hoof_env.simd.values import (
     Index,
@@ -21,10 +21,12 @@ from hoof_env.simd.values import (
     Mask,
     Number,
     Plane,
+    TraceError,
     Value,
     Whole,
     full,
     index,
+    kind_of,
     transposed,
     vector,
     word,
@@ -67,12 +69,13 @@ ITEMS = {"f8": "double", "f4": "float", "i8": "i64"}
 class Pointer(Value):
     """Place of numbers, read and written as ordinary ones: `pointer[k]`."""
 
-    __slots__ = ("item", "x")
+    __slots__ = ("is_locked", "item", "x")
     kind = "a pointer"
 
-    def __init__(self, x: Any, item: str = "double") -> None:
+    def __init__(self, x: Any, item: str = "double", is_locked: bool = False) -> None:
         self.x = x
         self.item = item
+        self.is_locked = is_locked
 
     def __getitem__(self, k: Whole) -> Any:
         machine = CURRENT.machine
@@ -82,12 +85,14 @@ class Pointer(Value):
         return Lanes(machine.load_real(place, self.item), 0)
 
     def __setitem__(self, k: Whole, value: Number) -> None:
+        if self.is_locked:
+            refuse_write("this array")
         machine = CURRENT.machine
         machine.store_real(machine.at(self.x, word(k), self.item), full(value, 0).x, self.item)
 
     def __add__(self, count: Whole) -> Pointer:
         """Return the pointer `count` elements further on."""
-        return Pointer(CURRENT.machine.at(self.x, word(count), self.item, False), self.item)
+        return Pointer(CURRENT.machine.at(self.x, word(count), self.item, False), self.item, self.is_locked)
 
 
 class Matrix:
@@ -103,6 +108,25 @@ class Matrix:
         self.shape = shape
 
 
+def refuse_write(what: str) -> NoReturn:
+    """Refuse that a user's function writes what it was given."""
+    raise TraceError(
+        f"assignment to {what}: a function may set only the rows that its term declares with `keeps`, as"
+        " step.episode.own.<term>.<row>"
+    )
+
+
+def _place(k: Any, size: int) -> Any:
+    """Return an index from 0 on, of `size` elements; one that is known only when the kernel runs as it is."""
+    if isinstance(k, Index):
+        return k
+    if isinstance(k, (bool, Value)) or not hasattr(k, "__index__"):
+        raise TraceError(f"an index that is {kind_of(k)}: expected a whole number below {size}")
+    if not -size <= k < size:
+        raise IndexError(f"no element {k}: there are {size}")
+    return k if k >= 0 else size + k
+
+
 class Field:
     """Array in a record: `field[k]`, or `field[k, j]` of two axes."""
 
@@ -114,7 +138,10 @@ class Field:
         return self.shape[0]
 
     def __getitem__(self, k: Any) -> Any:
-        return self._first[k[0] * self.shape[1] + k[1] if isinstance(k, tuple) else k]
+        if isinstance(k, tuple):
+            i, j = (_place(part, size) for part, size in zip(k, self.shape, strict=True))
+            return self._first[i * self.shape[1] + j]
+        return self._first[_place(k, self.shape[0] if len(self.shape) == 1 else math.prod(self.shape))]
 
 
 class Record:
@@ -122,9 +149,13 @@ class Record:
     runs."""
 
     def __init__(self, place: Any, kind: np.dtype[Any], known: Mapping[str, Any]) -> None:
-        self._place = place
-        self._kind = kind
-        self._known = known
+        vars(self).update(_place=place, _kind=kind, _known=known)
+
+    def __setattr__(self, name: str, value: Any) -> NoReturn:
+        refuse_write(f"{name!r}")
+
+    def __delattr__(self, name: str) -> NoReturn:
+        refuse_write(f"{name!r}")
 
     def __getattr__(self, name: str) -> Any:
         if name in self._known:
@@ -254,10 +285,15 @@ class Given:
 
 class Rows:
     """Memory on the stack with n doubles a row, named by a layout. Of a machine that computes at once it is
-    a list
-    of arrays, of which a store replaces an entry: arrays themselves do not change."""
+    a list of arrays, of which a store replaces an entry: arrays themselves do not change.
 
-    __slots__ = ("_empty", "_first", "_layout", "_n", "_place")
+    `locked` gives the same rows to functions that may not write them: `_open` is then None, or the names of
+    the fields, one inside the other, of the rows that they may set nevertheless; else it is (). `_size` is the
+    number of rows and `_legs` that of equal layouts that follow each other, each None where it is not known.
+    """
+
+    __slots__ = ("_empty", "_first", "_layout", "_legs", "_n", "_open", "_place", "_size")
+    kind = "memory"
 
     def __init__(self, place: Any, count: int, layout: Any, first: int = 0, is_empty: bool = False) -> None:
         put = object.__setattr__
@@ -266,6 +302,9 @@ class Rows:
         put(self, "_layout", layout)
         put(self, "_first", first)
         put(self, "_empty", is_empty)
+        put(self, "_open", ())
+        put(self, "_size", None if layout is None else layout.size)
+        put(self, "_legs", None)
 
     @property
     def lanes(self) -> int:
@@ -308,12 +347,35 @@ class Rows:
 
     # by number and by name
 
+    def __len__(self) -> int:
+        if self._size is None:
+            raise TypeError("these rows have no length")
+        return int(self._size)
+
+    def __bool__(self) -> bool:
+        if self._open != ():
+            raise TraceError("`if`, `and`, `or` or `not` of memory: expected a condition of its numbers")
+        return True
+
+    def __array__(self, *arguments: Any, **named: Any) -> Any:
+        raise TraceError("a function of NumPy of memory: expected its numbers, by name or number")
+
     def __getitem__(self, k: Any) -> Lanes:
-        return full(math.nan, self._n) if self._empty else self._read(k)
+        if self._empty:
+            return full(math.nan, self._n)
+        return self._read(k if self._size is None else _place(k, self._size))
 
     def __setitem__(self, k: Any, value: Any) -> None:
+        self._check_open(f"[{k}]")
         if not self._empty:
-            self._write(k, value)
+            self._write(k if self._size is None else _place(k, self._size), value)
+
+    def __delitem__(self, k: Any) -> NoReturn:
+        refuse_write("a row")
+
+    def _check_open(self, name: str) -> None:
+        if self._open != ():
+            refuse_write(name if name.startswith("[") else repr(name))
 
     def __getattr__(self, name: str) -> Any:
         if self._layout is None or name not in self._layout.fields:
@@ -324,14 +386,31 @@ class Rows:
         if kind is Vector:
             return vector(self._read(start), self._read(start + 1))
         if isinstance(kind, Named):
-            return self._part(start, kind)
-        return self._part(start, None, size == 0)
+            return self._inside(name, self._part(start, kind))
+        part = self._inside(name, self._part(start, None, size == 0))
+        object.__setattr__(part, "_size", size)
+        return part
+
+    def _inside(self, name: str, part: Any) -> Any:
+        """Return a part that may be written if this may."""
+        if self._open != ():
+            is_named = self._open is not None and self._open[0] == name
+            object.__setattr__(part, "_open", self._open[1:] if is_named else None)
+            room = self._layout.size - self._layout.fields[name].start
+            object.__setattr__(part, "_legs", room // max(part._size or 1, 1) if part._open != () else 1)
+        return part
+
+    def __delattr__(self, name: str) -> NoReturn:
+        refuse_write(f"{name!r}")
 
     def __setattr__(self, name: str, value: Any) -> None:
         if self._layout is None or name not in self._layout.fields:
             raise AttributeError(_no_field(self._layout, name))
+        self._check_open(name)
         start, size, kind = self._layout.fields[name]
         if kind is Vector:
+            if not isinstance(value, Plane):
+                raise TraceError(f"{kind_of(value)} in the place of a planar vector, {name!r}")
             self._write(start, value.a)
             self._write(start + 1, value.b)
         elif kind is Row:
@@ -344,7 +423,34 @@ class Rows:
 def _no_field(layout: Any, name: str) -> str:
     if layout is None:
         return f"no field {name!r}: these rows have numbers only"
-    return f"no field {name!r}; {layout.__name__} has {', '.join(layout.fields)}"
+    title = layout.__name__.split()[0]  # without the sizes of blocks
+    return f"no field {name!r}; {title if title.isidentifier() else 'it'} has {', '.join(layout.fields)}"
+
+
+def locked(rows: Any, but: tuple[str, ...] = (), legs: int = 1) -> Any:
+    """Return rows, or what else a user's function takes, such that it cannot write them.
+
+    Args:
+        rows: rows, a pointer, a matrix, or a named tuple with such.
+        but: names, one inside the other, of the field whose rows it may set.
+        legs: number of equal layouts that follow each other, for `block_at`, of the field `leg`.
+    """
+    if isinstance(rows, Rows):
+        made = object.__new__(type(rows))
+        for name in ("_place", "_n", "_layout", "_first", "_empty", "_size", "_row", "_stride"):
+            if hasattr(type(rows), name):
+                object.__setattr__(made, name, getattr(rows, name))
+        object.__setattr__(made, "_open", but or None)
+        object.__setattr__(made, "_legs", legs)
+        return made
+    if isinstance(rows, Pointer):
+        return Pointer(rows.x, rows.item, True)
+    if isinstance(rows, Matrix):
+        return Matrix(locked(rows.first), rows.shape)
+    if isinstance(rows, tuple) and hasattr(rows, "_fields"):
+        parts = zip(rows._fields, rows, strict=True)
+        return type(rows)(*(locked(part, but, legs if name == "leg" else 1) for name, part in parts))
+    return rows
 
 
 class Columns(Rows):
@@ -386,6 +492,8 @@ def read(pointer: Pointer, start: Whole, stride: Whole, n: int) -> Lanes:
 
 def write(x: Lanes, pointer: Pointer, start: Whole, stride: Whole) -> None:
     """Store lanes at pointer[start], pointer[start + stride], ...; they are rounded if singles are there."""
+    if pointer.is_locked:
+        refuse_write("this array")
     machine, item, n = CURRENT.machine, pointer.item, x.n
     first = machine.at(pointer.x, word(start), item, False)
     if n <= 1:
@@ -398,6 +506,10 @@ def write(x: Lanes, pointer: Pointer, start: Whole, stride: Whole) -> None:
             machine.store_real(place, machine.pick(x.x, lane, n), item)
 
 
+@overload
+def new_rows(layout: None, lanes: int, count: int = 1) -> Block: ...
+@overload
+def new_rows(layout: type[AnyLayout], lanes: int, count: int = 1) -> AnyLayout: ...
 def new_rows(layout: Any, lanes: int, count: int = 1) -> Any:
     """Return memory on the stack of the kernel, `count` times the rows of a layout, or `count` rows without
     names if that is None."""
@@ -407,6 +519,14 @@ def new_rows(layout: Any, lanes: int, count: int = 1) -> Any:
     return Rows(CURRENT.machine.slot("double", size * max(lanes, 1)), lanes, layout)
 
 
+@overload
+def columns(
+    matrix: Matrix, lanes: int, layout: None, column: Whole, row: Whole = 0, stride: Whole = 1
+) -> Block: ...
+@overload
+def columns(
+    matrix: Matrix, lanes: int, layout: type[AnyLayout], column: Whole, row: Whole = 0, stride: Whole = 1
+) -> AnyLayout: ...
 def columns(matrix: Matrix, lanes: int, layout: Any, column: Whole, row: Whole = 0, stride: Whole = 1) -> Any:
     """Return columns of a matrix of two axes by the names of a layout.
 
@@ -423,17 +543,27 @@ def columns(matrix: Matrix, lanes: int, layout: Any, column: Whole, row: Whole =
     return Columns(place, lanes, layout, width, stride)
 
 
-def block_at(rows: Any, number: Whole) -> Any:
-    """Return the rows of the `number`-th of several equal layouts, the first of which is `rows`."""
+def block_at(first: AnyLayout, number: Whole) -> AnyLayout:
+    """Return the rows of the `number`-th of several equal layouts, of which the first is given."""
+    rows: Any = first
+    legs = rows._legs
+    if legs is not None:
+        number = _place(number, legs)
     if isinstance(number, int) and number == 0:
-        return rows
-    return rows._part(number * rows._layout.size, rows._layout)
+        return first
+    part: Any = rows._part(number * rows._layout.size, rows._layout)
+    if legs is not None or rows._open != ():
+        object.__setattr__(part, "_open", rows._open)
+        object.__setattr__(part, "_legs", 1 if isinstance(number, Index) else (legs or number + 1) - number)
+    return part
 
 
-def load_rows(to: Any, start: Any) -> None:
+def load_rows(to: AnyLayout, start: AnyLayout) -> None:
     """Read columns into rows of the same layout."""
-    for k in range(to._layout.size):
-        to._write(k, start._read(k))
+    rows: Any = to
+    read_from: Any = start
+    for k in range(rows._layout.size):
+        rows._write(k, read_from._read(k))
 
 
 def full_like(like: Any, value: Number) -> Lanes:

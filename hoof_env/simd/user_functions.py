@@ -4,41 +4,68 @@ messages for their authors."""
 from __future__ import annotations
 
 import dis
+import math
 import os
+import re
+import sysconfig
 import traceback
 from collections.abc import Callable, Iterator, Mapping
 from functools import wraps
 from pathlib import Path
-from types import CodeType, FunctionType, MappingProxyType
-from typing import Any
+from types import CodeType, FunctionType, MappingProxyType, ModuleType
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from hoof_env.errors import ParameterError
 from hoof_env.simd.machines import CURRENT
-from hoof_env.simd.values import TraceError, is_real, rounded
+from hoof_env.simd.memory import Rows, locked, refuse_write
+from hoof_env.simd.values import Lanes, Mask, Plane, TraceError, Value, is_real, kind_of, rounded
 
 PACKAGE = Path(__file__).parents[1]
 NUMPY = Path(np.__file__).parent
+LIBRARIES = tuple(Path(sysconfig.get_path(name)) for name in ("stdlib", "purelib", "platlib"))
+
+MOST_OPERATIONS = 200_000
+"""Largest number of instructions of a user's function, some thousand times those of a term."""
+
+PLAIN_FLAGS = 0x0C | 0x20 | 0x80 | 0x200
+"""Flags of code that a plain function lacks: of *args, **kwargs, generators and coroutines."""
 
 
-class UserFunctionError(Exception):
+class UserFunctionError(ParameterError):
     """Reason why a function from outside this package cannot be part of a kernel, and where."""
 
 
-def foreign(function: Callable[..., Any]) -> Callable[..., Any]:
-    """Return a function from outside this package as a part of kernels: what it takes and returns enters sums
-    rounded, and what it raises becomes a `UserFunctionError`."""
+def foreign(
+    what: str, function: Callable[..., Any], count: int | None = None, keeps: str = "", legs: int = 1
+) -> Callable[..., Any]:
+    """Return a function from outside this package as a part of kernels: it cannot write what it takes, which
+    enters sums rounded, as does what it returns; what it raises becomes a `UserFunctionError`.
+
+    Args:
+        what: the function, for messages.
+        function: the function.
+        count: number of numbers that it returns as a tuple; None for one number.
+        keeps: name of the term whose rows, `episode.own.<term>`, it may set.
+        legs: number of legs behind the field `leg` of what it takes.
+    """
 
     @wraps(function)
     def part(*arguments: Any) -> Any:
-        given = tuple(map(rounded, arguments))
+        own = ("own", keeps) if keeps else ()
+        given = tuple(locked(rounded(argument), own, legs) for argument in arguments)
+        check_imports(what, function, UserFunctionError)
         try:
-            return rounded(_steady(function, given))
+            found = rounded(_steady(function, given))
         except UserFunctionError:
             raise
         except Exception as error:  # the user's code may raise anything
-            raise UserFunctionError(f"{_said(error)}{_place(error)}") from error
+            raise UserFunctionError(f"{what}: {_said(error)}{_place(error)}") from None
+        wrong = _wrong(found, count) or _kept_value(function)
+        if wrong:
+            raise UserFunctionError(f"{what} {wrong}, in {_where(function.__name__, function.__code__)}")
+        return found
 
     return part
 
@@ -49,82 +76,228 @@ def _steady(function: Callable[..., Any], arguments: tuple[Any, ...]) -> Any:
     machine = CURRENT.machine
     if machine.runs_now:
         return function(*arguments)
-    slots, lines, count = len(machine.slots), len(machine.lines), machine.count
-    function(*arguments)
-    first = machine.slots[slots:], machine.lines[lines:]
-    del machine.slots[slots:], machine.lines[lines:]
-    machine.count = count
-    result = function(*arguments)
-    if first != (machine.slots[slots:], machine.lines[lines:]):
-        raise TraceError(
-            f"{function.__qualname__} does something else at each call: a kernel is made of one call, so"
-            " random numbers, clocks and counters would stay as they were then"
+    slots, lines, count, most = len(machine.slots), len(machine.lines), machine.count, machine.most
+    machine.most = count + MOST_OPERATIONS
+    try:
+        first = _text(function(*arguments)), machine.slots[slots:], machine.lines[lines:]
+        del machine.slots[slots:], machine.lines[lines:]
+        machine.count = count
+        result = function(*arguments)
+    finally:
+        machine.most = most
+    if first != (_text(result), machine.slots[slots:], machine.lines[lines:]):
+        raise _Unsteady(
+            f"{function.__name__} does something else at each call: a kernel is made of one call, so random"
+            f" numbers, clocks and counters would stay as they were then{_at(function)}"
         )
     return result
 
 
+class _Unsteady(TraceError):
+    """Error that names its place itself."""
+
+
+def _text(x: Any) -> Any:
+    """Return what tells results of two calls apart."""
+    if isinstance(x, (Lanes, Mask)):
+        return x.x
+    if isinstance(x, Plane):
+        return x.a.x, x.b.x
+    if isinstance(x, (tuple, list)):
+        return [_text(part) for part in x]
+    return repr(x) if isinstance(x, (int, float, np.generic)) else type(x)
+
+
+# Results
+
+
+def _wrong(x: Any, count: int | None) -> str:
+    """Return what is wrong with the result of a function; nothing if it is right."""
+    if count is None:
+        return f"returns {_result(x)}; expected a number" if _is_wrong(x) else ""
+    expected = f"expected a tuple of {count} numbers"
+    if not isinstance(x, (tuple, list)):
+        return f"returns {_result(x)}; {expected}"
+    if len(x) != count:
+        return f"returns a tuple of {len(x)}; {expected}"
+    wrong = [k for k, one in enumerate(x) if _is_wrong(one)]
+    return f"returns {_result(x[wrong[0]])} at [{wrong[0]}]; {expected}" if wrong else ""
+
+
+def _is_wrong(x: Any) -> bool:
+    if isinstance(x, Value):
+        return not is_real(x)
+    if not is_real(x) or isinstance(x, bool):
+        return True
+    try:
+        return not math.isfinite(x)
+    except OverflowError:  # a whole number too large
+        return True
+
+
+def _result(x: Any) -> str:
+    if isinstance(x, (bool, np.bool_, Mask)):
+        return "a truth (np.where(condition, 1.0, 0.0) makes a number of it)"
+    if isinstance(x, (tuple, list)):
+        return f"a {type(x).__name__} of {len(x)}"
+    if isinstance(x, Plane):
+        return "a planar vector (.real and .imag are its numbers)"
+    words = kind_of(x)
+    return words if len(words) < 80 else f"{words[:80]}..."
+
+
+def _kept_value(function: Any) -> str:
+    """Return a complaint if a variable outside a function has kept a value of the kernel: the next kernel
+    would read it."""
+    for each in _reached(function):
+        for name, x in each.variables:
+            parts: list[Any] = [x]
+            if isinstance(x, (list, tuple, set)):
+                parts += x
+            elif isinstance(x, dict):
+                parts += x.values()
+            elif not isinstance(x, (ModuleType, Value, Rows, np.ndarray)) and hasattr(x, "__dict__"):
+                parts += vars(x).values()
+            if any(isinstance(part, Value) for part in parts):
+                return (
+                    f"keeps a value in {name!r}, which another kernel would read; a term keeps numbers from"
+                    " step to step with `keeps`"
+                )
+    return ""
+
+
+# Words and places
+
+
+NAMES = {
+    "Lanes": "a number", "float": "a number", "int": "a number", "Index": "a whole number", "Mask": "a truth",
+    "bool": "a truth", "Plane": "a planar vector", "Columns": "memory", "Rows": "memory", "Pointer": "an array",
+    "Matrix": "an array", "Record": "the record", "Field": "an array of the record", "NoneType": "nothing",
+}  # fmt: skip
+"""Names of types in Python's messages, in the words of users."""
+
+
 def _said(error: Exception) -> str:
-    """Return what an error says, for the author of the function."""
+    """Return what an error says, in one line, for the author of the function."""
+    words = " ".join(str(error).split())
     if isinstance(error, RecursionError):
         return "a recursion, or a loop, whose end is not known when the kernel is made: write it without"
-    if isinstance(error, (TraceError, AttributeError)):
-        return str(error)
-    return f"{type(error).__name__}: {error}" if str(error) else type(error).__name__
+    if isinstance(error, TraceError):
+        return words
+    if isinstance(error, TypeError) and "unsupported operand" in words and re.search(r"for [&|^]", words):
+        words += ": put comparisons in parentheses, as in (x > 0.0) & (y > 0.0)"
+    if isinstance(error, TypeError):
+        words = re.sub(r"'(\w+)'( object)?", lambda found: NAMES.get(found[1], found[0]), words)
+    if isinstance(error, AttributeError):
+        return words
+    return f"{type(error).__name__}: {words}" if words else type(error).__name__
 
 
 def _place(error: Exception) -> str:
     """Return function and line of the user's file."""
-    frames = [frame for frame in traceback.extract_tb(error.__traceback__) if not _is_ours(frame.filename)]
-    return f", in {frames[-1].name} ({frames[-1].filename}, line {frames[-1].lineno})" if frames else ""
+    if isinstance(error, _Unsteady):
+        return ""
+    frames = [
+        frame for frame in traceback.extract_tb(error.__traceback__) if not _is_in(frame.filename, OURS)
+    ]
+    users = [frame for frame in frames if not _is_in(frame.filename, LIBRARIES)] or frames
+    return f", in {users[-1].name} ({users[-1].filename}, line {users[-1].lineno})" if users else ""
 
 
-def _is_ours(path: str) -> bool:
+OURS = (PACKAGE, NUMPY)
+
+
+def _is_in(path: str, folders: tuple[Path, ...]) -> bool:
+    if path.startswith("<"):  # of a notebook or a console
+        return False
     where = Path(os.path.abspath(path))
-    return where.is_relative_to(PACKAGE) or where.is_relative_to(NUMPY)
+    return any(where.is_relative_to(folder) for folder in folders)
 
 
-def number_of(what: str) -> Callable[[Any], Any]:
-    """Return a function that passes on the result of `what`, and refuses it unless it is a number."""
-
-    def number(x: Any) -> Any:
-        if not is_real(x) or isinstance(x, bool):
-            raise UserFunctionError(f"{what} returns {_kind(x)}; expected a number")
-        return x
-
-    return number
+def _where(name: str, code: CodeType) -> str:
+    return f"{name} ({code.co_filename}, line {code.co_firstlineno})"
 
 
-def numbers_of(what: str, count: int) -> Callable[[Any], Any]:
-    """Return the same for a tuple of `count` values."""
-
-    def numbers(x: Any) -> Any:
-        if not isinstance(x, (tuple, list)) or len(x) != count:
-            given = f"a tuple of {len(x)}" if isinstance(x, (tuple, list)) else _kind(x)
-            raise UserFunctionError(f"{what} returns {given}; expected a tuple of {count} numbers")
-        return tuple(x)
-
-    return numbers
+def _at(function: Any) -> str:
+    return f", in {_where(function.__name__, function.__code__)}"
 
 
-def _kind(x: Any) -> str:
-    return getattr(x, "kind", "nothing" if x is None else f"{type(x).__name__} {x!r}")
+# What a function is, and what it reaches
+
+
+class Reached(NamedTuple):
+    """Function that another one reaches by its names, and the variables around it that it reads."""
+
+    function: FunctionType
+    variables: list[tuple[str, Any]]
+
+
+def _reached(function: FunctionType) -> Iterator[Reached]:
+    """Yield a function and the helpers of the same author that it reaches by globals, modules, closures and
+    defaults."""
+    seen = set()
+    waiting: list[Any] = [function]
+    root = str(function.__module__).split(".")[0]
+    while waiting:
+        one = waiting.pop()
+        if id(one) in seen:
+            continue
+        seen.add(id(one))
+        variables = list(_variables(one))
+        yield Reached(one, variables)
+        for _, x in variables:
+            x = getattr(x, "__wrapped__", x)
+            if not isinstance(x, FunctionType) or _is_in(x.__code__.co_filename, OURS):
+                continue
+            if str(x.__module__).split(".")[0] == root or not _is_in(x.__code__.co_filename, LIBRARIES):
+                waiting.append(x)
+
+
+def _variables(function: FunctionType) -> Iterator[tuple[str, Any]]:
+    codes = [function.__code__]
+    for code in codes:
+        codes += [part for part in code.co_consts if isinstance(part, CodeType)]
+        for name in code.co_names:
+            if name in function.__globals__:
+                x = function.__globals__[name]
+                yield name, x
+                if isinstance(x, ModuleType):
+                    found = ((f"{name}.{other}", vars(x).get(other)) for other in code.co_names)
+                    yield from (pair for pair in found if isinstance(pair[1], FunctionType))
+    for name, cell in zip(function.__code__.co_freevars, function.__closure__ or (), strict=True):
+        try:
+            yield name, cell.cell_contents
+        except ValueError:  # not set yet
+            continue
+    names = function.__code__.co_varnames
+    for name, x in [*zip(reversed(names[: function.__code__.co_argcount]),
+                         reversed(function.__defaults__ or ()), strict=False),
+                    *(function.__kwdefaults__ or {}).items()]:  # fmt: skip
+        yield name, x
+    yield from vars(function).items()
+
+
+def check_imports(name: str, function: Any, error: type[ParameterError] = ParameterError) -> None:
+    """Raise ParameterError, or the given kind of it, if a function or a helper of it imports something."""
+    for each, _ in _reached(function):
+        for line in _imports(each.__code__):
+            raise error(
+                f"{name}: `import` in {each.__name__} ({each.__code__.co_filename}, line {line}): expected it at"
+                " the top of the file, for a function becomes a kernel by one call"
+            )
 
 
 def check_function(name: str, function: Any, arguments: int) -> None:
     """Raise ParameterError unless something is a plain function of `arguments` arguments that imports
     nothing."""
-    if not isinstance(function, FunctionType) or function.__code__.co_flags & 0x0C:  # *args, **kwargs
+    if not isinstance(function, FunctionType) or function.__code__.co_flags & PLAIN_FLAGS:
         raise ParameterError(f"{name}: expected a plain function of {arguments} arguments, got {function!r}")
     code = function.__code__
     least = code.co_argcount - len(function.__defaults__ or ())
     if not least <= arguments <= code.co_argcount or code.co_kwonlyargcount:
         given = ", ".join(code.co_varnames[: code.co_argcount + code.co_kwonlyargcount])
         raise ParameterError(f"{name}: expected a function of {arguments} arguments, got one of ({given})")
-    for line in _imports(code):
-        raise ParameterError(
-            f"{name}: `import` in {function.__name__} ({code.co_filename}, line {line}): expected it at the"
-            " top of the file, for a function becomes a kernel by one call"
-        )
+    check_imports(name, function)
 
 
 def _imports(code: CodeType) -> Iterator[int]:
@@ -139,6 +312,22 @@ def _imports(code: CodeType) -> Iterator[int]:
     for part in code.co_consts:
         if isinstance(part, CodeType):
             yield from _imports(part)
+
+
+# What functions take, and messages
+
+
+def inputs(kind: Any) -> Any:
+    """Let a named tuple that users' functions take refuse unknown fields, and assignments, in words."""
+
+    def unknown(self: Any, name: str) -> Any:
+        raise AttributeError(f"no field {name!r}; {kind.__name__} has {', '.join(kind._fields)}")
+
+    def refuse(self: Any, name: str, value: Any = None) -> None:
+        refuse_write(repr(name))
+
+    kind.__getattr__, kind.__setattr__, kind.__delattr__ = unknown, refuse, refuse
+    return kind
 
 
 def user_error(

@@ -4,8 +4,7 @@ The machine that runs (`machines.CURRENT`) carries the operations out: a `Writer
 kernel is traced, `Eager` computes with NumPy at once. Ordinary numbers are computed at once on either.
 
 A product that enters a sum is not rounded: `a * b + c` on lanes is one fused operation. The expression
-decides
-this: a value remembers the factors of which it is the product, and `rounded` makes it forget them.
+decides this: a value remembers the factors of which it is the product, and `rounded` makes it forget them.
 """
 
 from __future__ import annotations
@@ -31,7 +30,12 @@ class Value:
 
     __slots__ = ()
     kind = "a value"
+    fields: tuple[str, ...] = ()  # that users' functions may know
     __hash__ = None  # type: ignore[assignment]
+
+    def __getattr__(self, name: str) -> Any:
+        has = f"it has {', '.join(self.fields)}" if self.fields else "it has none"
+        raise AttributeError(f"{self.kind} has no field {name!r}; {has}")
 
     def __bool__(self) -> bool:
         raise TraceError(
@@ -50,8 +54,8 @@ class Value:
 
     def _no_number(self) -> NoReturn:
         raise TraceError(
-            f"float(), int() or a function of `math` of {self.kind}, which is known when the kernel runs:"
-            " write NumPy's function, such as np.exp or np.sqrt"
+            f"float(), int(), range(), an index or a function of `math` of {self.kind}, which is known only when"
+            " the kernel runs: write NumPy's function, such as np.exp or np.sqrt, and np.where for a choice"
         )
 
     def __float__(self) -> float:
@@ -67,27 +71,55 @@ class Value:
         raise TraceError(f"round() of {self.kind}: write np.floor(x + 0.5)")
 
     def __array__(self, *arguments: Any, **named: Any) -> Any:
-        raise TraceError(f"{self.kind} cannot become an array of NumPy: a kernel works on lanes")
+        raise TraceError(
+            f"an array of NumPy with {self.kind}: a kernel has numbers only, so write out the operations on each"
+        )
 
     def __array_ufunc__(self, ufunc: Any, method: str, *inputs: Any, **named: Any) -> Any:
         function = UFUNCS.get(ufunc)
         if method != "__call__" or named or function is None:
             given = f"np.{ufunc.__name__}" + ("" if method == "__call__" else f".{method}")
             extra = f" with {', '.join(named)}" if named else ""
-            raise TraceError(f"{given}{extra} of {self.kind}: kernels have {_names(UFUNCS)}")
-        if any(isinstance(value, np.ndarray) for value in inputs):
-            raise TraceError(f"an array of NumPy with {self.kind} of a kernel: expected numbers")
-        return function(*inputs)
+            raise TraceError(f"{given}{extra} of {self.kind}: kernels have {known_functions()}")
+        return function(*map(_single, inputs))
 
     def __array_function__(self, function: Any, types: Any, inputs: Any, named: Any) -> Any:
         made = FUNCTIONS.get(function)
         if made is None:
-            raise TraceError(f"np.{function.__name__} of {self.kind}: kernels have {_names(FUNCTIONS)}")
-        return made(*inputs, **named)
+            raise TraceError(f"np.{function.__name__} of {self.kind}: kernels have {known_functions()}")
+        try:
+            return made(*map(_single, inputs), **named)
+        except TraceError:
+            raise
+        except TypeError as error:  # an argument that NumPy's function has, and this has not
+            raise TraceError(f"np.{function.__name__}: {error}") from None
 
 
-def _names(table: dict[Any, Any]) -> str:
-    return ", ".join(sorted({f"np.{function.__name__}" for function in table}))
+def known_functions() -> str:
+    """Return the names of NumPy's functions that work on values."""
+    return ", ".join(sorted({f"np.{function.__name__}" for function in (*UFUNCS, *FUNCTIONS)}))
+
+
+def _single(x: Any) -> Any:
+    """Return an array of no axes, such as np.where makes of two numbers, as a number; refuse others."""
+    if isinstance(x, np.ndarray):
+        if x.ndim:
+            raise TraceError(
+                f"an array of NumPy, of shape {x.shape}, in an operation with a value of a kernel, which is one"
+                " number: take its elements"
+            )
+        return x.item()
+    return x
+
+
+def kind_of(x: Any) -> str:
+    """Return what something is, for messages."""
+    if isinstance(x, np.ndarray):
+        return f"an array of NumPy, of shape {x.shape}"
+    kind = getattr(type(x), "kind", None)
+    if isinstance(kind, str):
+        return kind
+    return "nothing" if x is None else f"{type(x).__name__} {x!r}"
 
 
 class Lanes(Value):
@@ -151,6 +183,18 @@ class Lanes(Value):
     def __abs__(self) -> Lanes:
         return absolute(self)
 
+    def __mod__(self, other: Number) -> Lanes:
+        return _quotient_and_rest(self, other)[1] if is_real(other) else NotImplemented
+
+    def __rmod__(self, other: Number) -> Lanes:
+        return _quotient_and_rest(other, self)[1] if is_real(other) else NotImplemented
+
+    def __floordiv__(self, other: Number) -> Lanes:
+        return _quotient_and_rest(self, other)[0] if is_real(other) else NotImplemented
+
+    def __rfloordiv__(self, other: Number) -> Lanes:
+        return _quotient_and_rest(other, self)[0] if is_real(other) else NotImplemented
+
     def __lt__(self, other: Number) -> Mask:
         return _comparison("<", self, other)
 
@@ -203,10 +247,50 @@ class Mask(Value):
     def __invert__(self) -> Mask:
         return Mask(CURRENT.machine.invert(self.x, self.n), self.n)
 
-    def __mul__(self, other: Number) -> Lanes:
-        return where(self, other, 0.0) if is_real(other) else NotImplemented
+    def __xor__(self, other: Any) -> Any:
+        if isinstance(other, (bool, np.bool_)):
+            return ~self if other else self
+        return (self | other) & ~(self & other) if isinstance(other, Mask) else NotImplemented
+
+    __rxor__ = __xor__
+
+    def __eq__(self, other: Any) -> Any:
+        return ~(self ^ other) if isinstance(other, (bool, np.bool_, Mask)) else self.to_real() == other
+
+    def __ne__(self, other: Any) -> Any:
+        return self ^ other if isinstance(other, (bool, np.bool_, Mask)) else self.to_real() != other
+
+    def to_real(self) -> Lanes:
+        """Return 1.0 where it holds, else 0.0: what NumPy makes of a truth in arithmetic."""
+        return where(self, 1.0, 0.0)
+
+    def _sum(self, sign: str, one: Any, other: Any) -> Any:
+        if not all(is_real(part) or isinstance(part, Mask) for part in (one, other)):
+            return NotImplemented
+        if all(isinstance(part, (Mask, bool, np.bool_)) for part in (one, other)):  # as NumPy has it
+            return (one if isinstance(one, Mask) else other) | (other if isinstance(one, Mask) else one)
+        one, other = (part.to_real() if isinstance(part, Mask) else part for part in (one, other))
+        return _sum(sign, one, other)
+
+    def __add__(self, other: Any) -> Any:
+        return self._sum("+", self, other)
+
+    def __radd__(self, other: Any) -> Any:
+        return self._sum("+", other, self)
+
+    def __sub__(self, other: Any) -> Any:
+        return NotImplemented if isinstance(other, Mask) else self._sum("-", self, other)
+
+    def __rsub__(self, other: Any) -> Any:
+        return self._sum("-", other, self)
+
+    def __mul__(self, other: Any) -> Any:
+        return self & other if isinstance(other, (bool, Mask)) else product(self.to_real(), other)
 
     __rmul__ = __mul__
+
+    def __truediv__(self, other: Number) -> Lanes:
+        return self.to_real() / other
 
     def __bool__(self) -> bool:
         if CURRENT.machine.runs_now and not self.n:
@@ -223,6 +307,7 @@ class Plane(Value):
 
     __slots__ = ("a", "b")
     kind = "a planar vector"
+    fields = ("real", "imag")
 
     def __init__(self, a: Lanes, b: Lanes) -> None:
         self.a = a
@@ -274,6 +359,24 @@ class Plane(Value):
 
     def __neg__(self) -> Plane:
         return Plane(-self.a, -self.b)
+
+    def __pos__(self) -> Plane:
+        return self
+
+    def __abs__(self) -> Lanes:
+        return absolute(self)  # type: ignore[call-overload]
+
+    def conjugate(self) -> Plane:
+        """Return the mirror image at the x axis."""
+        return Plane(self.a, -self.b)
+
+    def __eq__(self, other: Any) -> Any:
+        return (
+            (self.a == other.a) & (self.b == other.b) if isinstance(other, Plane) else _no_match(self, other)
+        )
+
+    def __ne__(self, other: Any) -> Any:
+        return ~(self == other)
 
 
 class Index(Value):
@@ -386,6 +489,10 @@ def payload(value: Any, n: int) -> Any:
         return CURRENT.machine.single(value.x) if value.n else CURRENT.machine.spread(value.x, n)
     if isinstance(value, Index):
         return CURRENT.machine.spread(value.to_real().x, n)
+    value = _single(value)
+    if not is_real(value):
+        hint = ": write np.where(condition, 1.0, 0.0)" if isinstance(value, Mask) else ""
+        raise TraceError(f"{kind_of(value)} where a number is expected{hint}")
     return CURRENT.machine.number(float(value), n)
 
 
@@ -441,9 +548,17 @@ def product(one: Any, other: Any) -> Any:
     return Lanes(CURRENT.machine.binary("fmul", *factors, n), n, factors if n else None)
 
 
+def _no_match(one: Any, other: Any) -> Any:
+    """Refuse `==` and `!=` of what is never equal, of which Python would make False and True."""
+    raise TraceError(f"a comparison of {kind_of(one)} with {kind_of(other)}")
+
+
 def _comparison(symbol: str, one: Any, other: Any) -> Any:
+    other, one = _single(other), _single(one)
+    if isinstance(other, Mask):
+        other = other.to_real()
     if not is_real(other) or not is_real(one):
-        return NotImplemented
+        return _no_match(one, other) if symbol in ("==", "!=") else NotImplemented
     n = _lanes_of(one, other)
     return Mask(CURRENT.machine.compare(symbol, payload(one, n), payload(other, n), n), n)
 
@@ -502,12 +617,23 @@ def _real_function(name: str, at_once: Any) -> RealFunction:
         if isinstance(x, Index):
             x = x.to_real()
         if not isinstance(x, Lanes):
+            if isinstance(x, Value):
+                return _other_kind(at_once, x)
             return at_once(x)
         return Lanes(CURRENT.machine.unary(name, x.x, x.n), x.n)
 
     function.__name__ = at_once.__name__
     function.__doc__ = f"Return NumPy's {at_once.__name__} of a number."
     return function
+
+
+def _other_kind(at_once: Any, x: Value) -> Any:
+    """Return NumPy's function of a truth, or the length of a planar vector; refuse the rest."""
+    if isinstance(x, Plane) and at_once is np.abs:
+        return _library("hypot")(x.a, x.b)
+    if isinstance(x, Mask):
+        return UFUNCS[at_once](x.to_real())
+    raise TraceError(f"np.{at_once.__name__} of {x.kind}: expected a number")
 
 
 sqrt = _real_function("sqrt", np.sqrt)
@@ -520,6 +646,7 @@ def _library(name: str) -> Callable[..., Any]:
     """Return a function of the C library, which is called lane by lane."""
 
     def function(*inputs: Any) -> Any:
+        inputs = tuple(x.to_real() if isinstance(x, Mask) else x for x in inputs)
         n = _lanes_of(*inputs)
         return Lanes(CURRENT.machine.library(name, [payload(x, n) for x in inputs], n), n)
 
@@ -563,12 +690,18 @@ def where(condition: Any, yes: Any, no: Any) -> Any:
     if not isinstance(condition, Mask):
         if isinstance(condition, Value):
             raise TraceError(f"where() of {condition.kind}: expected a condition, such as x > 0.0")
+        if isinstance(yes, Value) or isinstance(no, Value):  # NumPy would ask these again
+            return yes if _single(condition) else no
         return np.where(condition, yes, no)
-    if isinstance(yes, Plane):
-        return Plane(where(condition, yes.a, no.a), where(condition, yes.b, no.b))
+    if isinstance(yes, Plane) or isinstance(no, Plane):
+        yes, no = (vector(part, 0.0) if is_real(part) else part for part in (yes, no))
+        if isinstance(yes, Plane) and isinstance(no, Plane):
+            return Plane(where(condition, yes.a, no.a), where(condition, yes.b, no.b))
+    if isinstance(yes, (Mask, bool, np.bool_)) and isinstance(no, (Mask, bool, np.bool_)):
+        return (condition._with("and", yes)) | ((~condition)._with("and", no))
+    yes, no = (part.to_real() if isinstance(part, Mask) else _single(part) for part in (yes, no))
     if not (is_real(yes) and is_real(no)):
-        wrong = no if is_real(yes) else yes
-        raise TraceError(f"where() of {getattr(wrong, 'kind', type(wrong).__name__)}: expected two numbers")
+        raise TraceError(f"where() of {kind_of(no if is_real(yes) else yes)}: expected two numbers")
     n = max(condition.n, _lanes_of(yes, no))
     chosen = CURRENT.machine.select(condition.x, payload(yes, n), payload(no, n), n, condition.n)
     return Lanes(chosen, n)
@@ -601,7 +734,10 @@ def minimum(x: Any, y: Any) -> Any:
 
 
 def _chosen(symbol: str, x: Any, y: Any) -> Any:
-    x, y = (part.to_real() if isinstance(part, Index) else part for part in (x, y))
+    x, y = (part.to_real() if isinstance(part, (Index, Mask)) else part for part in (x, y))
+    for part in (x, y):
+        if isinstance(part, Value) and not isinstance(part, Lanes):
+            raise TraceError(f"the larger or smaller of {part.kind}: expected two numbers")
     if not (isinstance(x, Lanes) or isinstance(y, Lanes)):
         if isinstance(x, np.ndarray) or isinstance(y, np.ndarray) or x != x or y != y:
             return (np.maximum if symbol == ">" else np.minimum)(x, y)
@@ -617,9 +753,11 @@ def _chosen(symbol: str, x: Any, y: Any) -> Any:
     return where(takes, y, x)
 
 
-def clip(x: Any, low: Any, high: Any) -> Any:
-    """Return a number limited to [low, high]."""
-    return minimum(maximum(x, low), high)
+def clip(x: Any, a_min: Any = None, a_max: Any = None, *, min: Any = None, max: Any = None) -> Any:
+    """Return a number limited to [a_min, a_max], of which None is no limit; arguments as NumPy's."""
+    low, high = (a_min if min is None else min), (a_max if max is None else max)
+    x = x if low is None else maximum(x, low)
+    return x if high is None else minimum(x, high)
 
 
 def any_lane(condition: Truth) -> Any:
@@ -708,7 +846,25 @@ def transposed(rows: list[Lanes]) -> list[Lanes]:
 
 
 def _sign(x: Any) -> Any:
-    return where(x > 0.0, 1.0, where(x < 0.0, -1.0, x * 0.0))
+    return where(x > 0.0, 1.0, where(x < 0.0, -1.0, where(x == 0.0, 0.0, x)))
+
+
+def _quotient_and_rest(x: Any, y: Any) -> tuple[Any, Any]:
+    """Return x // y and x % y as NumPy computes them: the rest has the sign of y."""
+    rest = _library("fmod")(x, y)
+    turns = rounded(x - rest) / y
+    crosses = (rest != 0.0) & ((y < 0.0) ^ (rest < 0.0))
+    turns = where(crosses, turns - 1.0, turns)
+    rest = where(rest != 0.0, where(crosses, rest + y, rest), _copysign(0.0, y))
+    below = floor(turns)
+    whole = where(turns - below > 0.5, below + 1.0, below)
+    whole = where(turns != 0.0, whole, _copysign(0.0, x / y))
+    is_zero = y == 0.0
+    return where(is_zero, x / y, whole), where(is_zero, _library("fmod")(x, y), rest)
+
+
+def _divided(x: Any, y: Any) -> Any:
+    return x / y if isinstance(x, Value) or not isinstance(y, Lanes) else y.__rtruediv__(x)
 
 
 def _copysign(x: Any, y: Any) -> Any:
@@ -734,7 +890,16 @@ UFUNCS: dict[Any, Callable[..., Any]] = {
     np.add: _sum_of,
     np.subtract: _difference,
     np.multiply: lambda x, y: x * y if isinstance(x, Value) else y * x,
-    np.divide: lambda x, y: x / y if isinstance(x, Value) else y.__rtruediv__(x),
+    np.divide: _divided,
+    np.floor_divide: lambda x, y: _quotient_and_rest(x, y)[0],
+    np.remainder: lambda x, y: _quotient_and_rest(x, y)[1],
+    np.conjugate: lambda x: x.conjugate() if isinstance(x, Plane) else x,
+    np.isinf: lambda x: absolute(x) == math.inf,
+    np.fmax: lambda x, y: where(y != y, x, where(x != x, y, maximum(x, y))),
+    np.fmin: lambda x, y: where(y != y, x, where(x != x, y, minimum(x, y))),
+    np.trunc: lambda x: _copysign(floor(absolute(x)), x),
+    np.logical_xor: lambda x, y: x ^ y,
+    np.bitwise_xor: lambda x, y: x ^ y,
     np.negative: lambda x: -x,
     np.positive: lambda x: x,
     np.absolute: absolute,
@@ -779,6 +944,9 @@ UFUNCS: dict[Any, Callable[..., Any]] = {
 FUNCTIONS: dict[Any, Callable[..., Any]] = {
     np.where: where,
     np.clip: clip,
+    np.real: lambda z: z.real if isinstance(z, Plane) else z,
+    np.imag: lambda z: z.imag if isinstance(z, Plane) else full(0.0, z.n),
+    np.angle: lambda z: _library("atan2")(z.b, z.a),
     np.zeros_like: lambda x: full(0.0, x.n),
     np.ones_like: lambda x: full(1.0, x.n),
     np.full_like: _full_like,

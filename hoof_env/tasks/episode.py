@@ -76,24 +76,7 @@ def episode_layout(
     return extended(made, "own", {term: dict.fromkeys(names, Row) for term, names in own.kept})
 
 
-class _Memories(NamedTuple):
-    """Fields of `Memories`."""
-
-    episode: Any
-    trunk: Any
-    leg: Any
-    trunk_rows: int
-    legs: int
-    gait: int
-    has_limits: bool
-    stride_sums: Any
-    sums: int
-    peaks: int
-    own_first: int
-    own_rows: int
-
-
-class Memories(_Memories):
+class Memories(NamedTuple):
     """Layouts of the memory that a step works on, constants of its kernels.
 
     Attributes:
@@ -107,6 +90,19 @@ class Memories(_Memories):
         peaks: bit mask of the stride sums that are peaks.
         own_first, own_rows: first row that terms keep in the memory of an episode, and number of these rows.
     """
+
+    episode: Any
+    trunk: Any
+    leg: Any
+    trunk_rows: int
+    legs: int
+    gait: int
+    has_limits: bool
+    stride_sums: Any
+    sums: int
+    peaks: int
+    own_first: int
+    own_rows: int
 
 
 @cache

@@ -23,6 +23,11 @@ from numpy.typing import NDArray
 from hoof_env.errors import ParameterError, check_choice, check_number
 from hoof_env.gait import WIDEST
 from hoof_env.simd import (
+    Lanes,
+    Mask,
+    Plane,
+    Pointer,
+    Whole,
     any_lane,
     block_at,
     cross,
@@ -366,7 +371,9 @@ FOLLOWED = 0.1
 mean of the last actions, and decays under zero actions."""
 
 
-def command_gait(task, actions, episode, first_leg, parameters, n, scratch):  # type: ignore[no-untyped-def]
+def command_gait(
+    task: Any, actions: Pointer, episode: Any, first_leg: Any, parameters: int, n: Whole, scratch: Any
+) -> None:
     """Command the gait of the episode with the offsets that actions make; `scratch` has room for
     `SCRATCH_SIZE` numbers. See `body.BodyKernels.command`.
 
@@ -414,24 +421,24 @@ def command_gait(task, actions, episode, first_leg, parameters, n, scratch):  # 
             leg.command[k] = minimum(maximum(wanted, task.low[k]), task.high[k])
 
 
-def phase_of(wave, half, fold, crank):  # type: ignore[no-untyped-def]
+def phase_of(wave: Plane, half: Lanes, fold: Plane, crank: Plane) -> Plane:
     """Return e^(i phase) of a pair for e^(i theta) = `crank`; see `Stride`."""
     return (1.0 / (1.0 + dot(wave, crank))) * (half * crank + fold * conjugate(crank) + wave)
 
 
-def conjugate(z):  # type: ignore[no-untyped-def]
+def conjugate(z: Plane) -> Plane:
     """Return the complex conjugate of a planar vector."""
     return vector(z.real, -z.imag)
 
 
-def refer_to_target(task, episode, switched):  # type: ignore[no-untyped-def]
+def refer_to_target(task: Any, episode: Any, switched: Mask) -> None:
     """Change the episode's gait to the reference gait of the new commanded speed in the rows `switched`; the
     kernel's form of `reference_gaits`."""
     if task.follows:
         when(any_lane(switched))(lambda: _refer(task, episode, switched))
 
 
-def _refer(task, episode, switched):  # type: ignore[no-untyped-def]
+def _refer(task: Any, episode: Any, switched: Mask) -> None:
     speeds = task.speeds
     gaits = task.gaits
     last = len(task.speeds) - 1

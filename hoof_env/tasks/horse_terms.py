@@ -6,13 +6,23 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
+from hoof_env.dynamics.layout import LegMemory
 from hoof_env.gait import PARAMETERS, WIDEST
 from hoof_env.ground.terrain import surface
-from hoof_env.simd import absolute, block_at, maximum, minimum, where
+from hoof_env.simd import Lanes, Number, absolute, block_at, maximum, minimum, where
 from hoof_env.simd.math import cos_sin
 from hoof_env.tasks.horse_gaits import LEGS
-from hoof_env.tasks.observation import PLAIN, TRUE_RATE, TRUTH, Entry, Scale, in_contact, tanh_of
-from hoof_env.tasks.reward import Term
+from hoof_env.tasks.observation import (
+    PLAIN,
+    TRUE_RATE,
+    TRUTH,
+    Entry,
+    ObservationInputs,
+    Scale,
+    in_contact,
+    tanh_of,
+)
+from hoof_env.tasks.reward import Outcome, Term
 
 # The observation
 
@@ -20,13 +30,13 @@ IN_WEIGHTS = Scale("tanh(x / weight)", lambda x, scene: x / scene.episode.weight
 """Scale of forces, in units of the horse's weight."""
 
 
-def _height(scene):  # type: ignore[no-untyped-def]
+def _height(scene: ObservationInputs) -> Lanes:
     """Measure the height of the trunk over the ground below it [m]."""
     place = scene.trunk.report.place
     return place.imag - surface(place.real, scene.ground, scene.ground_origin, scene.ground_per_metre)[0]
 
 
-def _from_hips(x, scene):  # type: ignore[no-untyped-def]
+def _from_hips(x: Lanes, scene: ObservationInputs) -> Lanes:
     """Scale a height, relative to that of the hips."""
     # Relative to the hip height, so that horses of all sizes are seen alike.
     return (x - scene.task.height) / (0.2 * scene.task.height)
@@ -45,19 +55,19 @@ def _of_leg(i: int, measure: Callable[[Any], Any]) -> Callable[[Any], Any]:
     return lambda scene: measure(block_at(scene.leg, i))
 
 
-def _sine(leg):  # type: ignore[no-untyped-def]
+def _sine(leg: LegMemory) -> Lanes:
     return cos_sin(leg.state.crank_angle)[1]
 
 
-def _cosine(leg):  # type: ignore[no-untyped-def]
+def _cosine(leg: LegMemory) -> Lanes:
     return cos_sin(leg.state.crank_angle)[0]
 
 
-def _toe_contact(leg):  # type: ignore[no-untyped-def]
+def _toe_contact(leg: LegMemory) -> Lanes:
     return in_contact(leg.state.toe)
 
 
-def _heel_contact(leg):  # type: ignore[no-untyped-def]
+def _heel_contact(leg: LegMemory) -> Lanes:
     return in_contact(leg.state.heel)
 
 
@@ -131,12 +141,12 @@ HORSE_ENTRIES = (
 # The reward
 
 
-def alive(step, weight):  # type: ignore[no-untyped-def]
+def alive(step: Outcome, weight: Number) -> Lanes:
     """Return the reward for the time in which the horse has not fallen."""
     return weight * step.seconds
 
 
-def tracking(step, weight):  # type: ignore[no-untyped-def]
+def tracking(step: Outcome, weight: Number) -> Lanes:
     """Return the reward for speed: 1 at the commanded speed, less twice the relative error, at least -1."""
     # Twice the error: with less, a policy gains by sliding less and staying behind the command.
     asked = maximum(step.commanded_progress, 1e-9)
@@ -144,35 +154,35 @@ def tracking(step, weight):  # type: ignore[no-untyped-def]
     return where(step.seconds > 0.0, weight * step.seconds * maximum(1.0 - 2.0 * error, -1.0), 0.0)
 
 
-def peak(step, weight):  # type: ignore[no-untyped-def]
+def peak(step: Outcome, weight: Number) -> Lanes:
     """Return the charge for the increase of the running peak GRF, in units of the horse's weight."""
     return -weight * step.sums.running_peak_increase / step.weight
 
 
-def slip(step, weight):  # type: ignore[no-untyped-def]
+def slip(step: Outcome, weight: Number) -> Lanes:
     """Return the charge for sliding, over the commanded distance and at most 1, times the duration."""
     asked = maximum(step.commanded_progress, 1e-9)
     return -weight * step.seconds * minimum(step.sums.slip / asked, 1.0)
 
 
-def landing(step, weight):  # type: ignore[no-untyped-def]
+def landing(step: Outcome, weight: Number) -> Lanes:
     """Return the charge for each stance that begins."""
     return -weight * step.sums.stances
 
 
-def work(step, weight):  # type: ignore[no-untyped-def]
+def work(step: Outcome, weight: Number) -> Lanes:
     """Return the charge for positive work over weight times commanded distance, times the duration."""
     asked = maximum(step.commanded_progress, 1e-9)
     return -weight * step.seconds * step.sums.positive_work / (step.weight * asked)
 
 
-def pitch(step, weight):  # type: ignore[no-untyped-def]
+def pitch(step: Outcome, weight: Number) -> Lanes:
     """Return the charge for the square of the trunk's pitch, times the duration."""
     angle = step.trunk.state.moving.pitch
     return -weight * step.seconds * (angle * angle)
 
 
-def fall(step, weight):  # type: ignore[no-untyped-def]
+def fall(step: Outcome, weight: Number) -> Lanes:
     """Return the charge for a failure, in the step that ends the episode."""
     return where(step.failed > 0.0, -weight, 0.0)
 

@@ -5,17 +5,21 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
 from hoof_env.errors import ParameterError
 from hoof_env.gait import LIMITS, FilterSettings
 from hoof_env.ground.terrain import surface
-from hoof_env.simd import where
+from hoof_env.simd import Lanes, Number, where
 from hoof_env.simd.math import cos_sin
-from hoof_env.simd.user_functions import check_function
-from hoof_env.tasks.own_parts import Constant, check_arguments, check_parts
+from hoof_env.simd.user_functions import check_function, inputs
+from hoof_env.tasks.own_parts import Constant, check_arguments, check_parts, without_scalar
+
+if TYPE_CHECKING:
+    from hoof_env.dynamics.layout import ContactMemory, LegMemory, TrunkMemory
+    from hoof_env.tasks.episode import Episode
 
 LOW, HIGH = (np.array([limit[i] for limit in LIMITS.values()]) for i in (0, 1))
 MIDDLE = (LOW + HIGH) / 2
@@ -25,6 +29,7 @@ HALF_RANGE = (HIGH - LOW) / 2
 AHEAD = (0.25, 0.5, 0.75, 1.0)  # places at which the height of the ground is observed, forward of O [m]
 
 
+@inputs
 class ObservationInputs(NamedTuple):
     """Arguments of the entries' functions.
 
@@ -35,13 +40,13 @@ class ObservationInputs(NamedTuple):
         ground, ground_origin, ground_per_metre: terrain, the arguments of `surface` after x.
     """
 
-    trunk: Any
-    leg: Any
-    episode: Any
+    trunk: TrunkMemory
+    leg: LegMemory
+    episode: Episode
     task: Any
     ground: Any
-    ground_origin: Any
-    ground_per_metre: Any
+    ground_origin: Number
+    ground_per_metre: Number
 
 
 @dataclass(frozen=True)
@@ -66,6 +71,7 @@ class Scale:
             check_function(f"scale {self.text!r}: apply", self.apply, 2)
 
 
+@without_scalar
 @dataclass(frozen=True)
 class Entry:
     """Entry of the observation.
@@ -74,9 +80,8 @@ class Entry:
         name: name of the quantity.
         group: group by which the setting `observation` chooses it.
         unit: unit of the number before it is scaled.
-        measure: function of `ObservationInputs` that returns the number; compiled like `reward.Term.compute`.
+        measure: function of `ObservationInputs` that returns the number; see `reward.Term.compute`.
         scale: scaling of the number.
-        scalar: True if `measure` and the scale are functions of ordinary numbers, see `reward.Term`.
         constants: further arguments of `measure`, which the setting `constants` changes.
 
     Raises:
@@ -89,7 +94,6 @@ class Entry:
     unit: str
     measure: Callable[..., Any]
     scale: Scale
-    scalar: bool = False
     constants: Sequence[Constant] = ()
 
     def __post_init__(self) -> None:
@@ -121,7 +125,7 @@ IN_WEIGHTS = Scale("tanh(x / 3 weights)", lambda x, scene: x / (3.0 * scene.epis
 RISE = Scale("tanh(x / (30 weights / s))", lambda x, scene: x / (30.0 * scene.episode.weight), True)
 
 
-def _height(x, scene):  # type: ignore[no-untyped-def]
+def _height(x: Lanes, scene: ObservationInputs) -> Lanes:
     """Scale a height: relative to the nominal one, in units of 0.3 m."""
     return (x - scene.task.height) * (1 / 0.3)
 
@@ -129,7 +133,7 @@ def _height(x, scene):  # type: ignore[no-untyped-def]
 def _in_range(k: int) -> Scale:
     """Return the scale of the k-th gait parameter, linear between its limits."""
 
-    def apply(x, scene):  # type: ignore[no-untyped-def]
+    def apply(x: Lanes, scene: ObservationInputs) -> Lanes:
         return (x - scene.task.middle[k]) / scene.task.half[k]
 
     return Scale(range_text(LOW[k], HIGH[k]), apply)
@@ -138,7 +142,7 @@ def _in_range(k: int) -> Scale:
 def _in_rate(k: int) -> Scale:
     """Return the scale of the rate of the k-th gait parameter, over its bound."""
 
-    def apply(x, scene):  # type: ignore[no-untyped-def]
+    def apply(x: Lanes, scene: ObservationInputs) -> Lanes:
         return x / scene.task.rate_bound[k]
 
     return Scale(rate_text(FilterSettings().to_array()[k, 1]), apply)
@@ -164,20 +168,20 @@ def _gait_rate(k: int) -> Callable[[Any], Any]:
     return lambda scene: scene.leg.state.gait_rate[k]
 
 
-def _sine(scene):  # type: ignore[no-untyped-def]
+def _sine(scene: ObservationInputs) -> Lanes:
     return cos_sin(scene.leg.state.crank_angle)[1]
 
 
-def _cosine(scene):  # type: ignore[no-untyped-def]
+def _cosine(scene: ObservationInputs) -> Lanes:
     return cos_sin(scene.leg.state.crank_angle)[0]
 
 
-def in_contact(memory):  # type: ignore[no-untyped-def]
+def in_contact(memory: ContactMemory) -> Lanes:
     """Return 1 if a hoof point is inside the ground, else 0."""
     return where(memory.penetration > 0.0, 1.0, 0.0)
 
 
-def _approach_speed(memory):  # type: ignore[no-untyped-def]
+def _approach_speed(memory: ContactMemory) -> Lanes:
     """Return the approach speed of a hoof point in contact [m/s], else 0."""
     inverse = memory.inverse_approach_speed
     # The inner choice avoids a division by 0 in lanes that take the other value.
@@ -188,7 +192,7 @@ def _ahead(distance: float) -> Callable[[Any], Any]:
     """Return a function that measures the height of the ground at a distance ahead of O [m]."""
 
     # Relative to the ground under O: heights in the world say nothing after hundreds of metres.
-    def rise(scene):  # type: ignore[no-untyped-def]
+    def rise(scene: ObservationInputs) -> Lanes:
         x = scene.trunk.report.place.real
         here = surface(x, scene.ground, scene.ground_origin, scene.ground_per_metre)[0]
         return surface(x + distance, scene.ground, scene.ground_origin, scene.ground_per_metre)[0] - here

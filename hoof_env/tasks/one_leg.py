@@ -28,7 +28,7 @@ from hoof_env.leg.geometry import load_geometry
 from hoof_env.leg.presets import preset_error_type, preset_label
 from hoof_env.render.instant import ONE_HIP, Hips
 from hoof_env.render.picture import LegPicture, Picture
-from hoof_env.simd import maximum, minimum, read
+from hoof_env.simd import Mask, Pointer, Whole, maximum, minimum, read
 from hoof_env.simd.math import clip
 from hoof_env.tasks.body import BodyKernels
 from hoof_env.tasks.episode import ACTIONS, Episode
@@ -140,7 +140,9 @@ def heading_now(engine: TrunkEngine, dt: float) -> Floats:
     return heading
 
 
-def command_rates(task, actions, episode, leg, parameters, n, scratch):  # type: ignore[no-untyped-def]
+def command_rates(
+    task: Any, actions: Pointer, episode: Episode, leg: Any, parameters: int, n: Whole, scratch: Any
+) -> None:
     """Command the rates that an action asks for, relative to where the gait is heading and within the limits;
     see `body.BodyKernels.command`."""
     for k in range(ACTIONS):
@@ -150,7 +152,7 @@ def command_rates(task, actions, episode, leg, parameters, n, scratch):  # type:
         leg.command[k] = minimum(maximum(command, task.low[k]), task.high[k])
 
 
-def keep_gait(task, episode, switched):  # type: ignore[no-untyped-def]
+def keep_gait(task: Any, episode: Episode, switched: Mask) -> None:
     """Do nothing: the gait of one leg does not depend on the commanded speed."""
 
 

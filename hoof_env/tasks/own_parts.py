@@ -5,9 +5,10 @@ from __future__ import annotations
 import keyword
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from functools import wraps
+from typing import Any, NamedTuple, TypeVar
 
-from hoof_env.errors import ParameterError, check_number
+from hoof_env.errors import ParameterError, UnknownArgumentError, check_number
 from hoof_env.simd.user_functions import check_function
 
 LARGEST = 1e12
@@ -28,6 +29,26 @@ def _is_text_by_name(pair: Any) -> bool:
     """True if something is a name and a text."""
     is_pair = isinstance(pair, tuple) and len(pair) == 2
     return is_pair and all(isinstance(text, str) for text in pair) and bool(pair[0])
+
+
+Part = TypeVar("Part", bound=type)
+
+
+def without_scalar(kind: Part) -> Part:
+    """Let a class refuse the argument `scalar`, which it had once, in words."""
+    made: Any = kind.__init__  # type: ignore[misc]
+
+    @wraps(made)
+    def begin(self: Any, *arguments: Any, **named: Any) -> None:
+        if "scalar" in named:
+            raise UnknownArgumentError(
+                f"{kind.__name__}: scalar is gone: write np.where for `if`, and NumPy's functions for those of"
+                " `math`"
+            )
+        made(self, *arguments, **named)
+
+    kind.__init__ = begin  # type: ignore[misc]
+    return kind
 
 
 @dataclass(frozen=True)
@@ -87,6 +108,7 @@ def _is_reserved(form: str) -> bool:
     return form in ("rates", "offsets") or form.startswith("offsets of ")
 
 
+@without_scalar
 @dataclass(frozen=True)
 class ActionMap:
     """Map from actions of one's own to those of the body.
@@ -95,8 +117,7 @@ class ActionMap:
         form: tag of the meaning of actions, which states, records and policies contain.
         actions: meaning of each action at 1, by its name; the space is a box from -1 to 1.
         compute: function of the actions, `action[k]` in [-1, 1], and the scene of an entry, which returns a
-            tuple with all actions of the body, which are clipped; compiled like `reward.Term.compute`.
-        scalar: True if `compute` is a function of ordinary numbers, see `reward.Term`.
+            tuple with all actions of the body, which are clipped; see `reward.Term.compute`.
 
     Raises:
         ParameterError: a form that the package has, no actions, or `compute` is not a function of two
@@ -106,7 +127,6 @@ class ActionMap:
     form: str
     actions: Mapping[str, str]
     compute: Callable[[Any, Any], Any]
-    scalar: bool = False
 
     def __post_init__(self) -> None:
         if not isinstance(self.form, str) or not self.form or _is_reserved(self.form):

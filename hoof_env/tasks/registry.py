@@ -54,7 +54,7 @@ class Task:
         body: function that makes the `body.Body` of settings.
         speeds: range of commanded speeds for a `target_speed` of None, of a horse of size 1; proportional to
             the root of the size [m/s].
-        contact_law: user's law instead of `normal_law`, see `dynamics.hoof.law_of`.
+        contact_law: user's law instead of `normal_law`, see `dynamics.hoof.contact_force`.
         action_map: map from actions to those of the body.
         module: module that registers the task, which other processes import.
     """
@@ -402,7 +402,7 @@ def register(
         terms: terms of the reward, behind those of the base; one with the same name replaces its term.
         entries: entries of the observation, behind those of the base; their groups are observed by default.
         contact_law: function of penetration [m], its rate [m/s], inverse approach speed [s/m] and the
-            ground's constants, which returns the normal force [N]; see `dynamics.hoof.law_of`.
+            ground's constants, which returns the normal force [N]; see `dynamics.hoof.contact_force`.
         action_map: actions of one's own, from which those of the body follow.
         defaults: settings, see the manual pages.
 

@@ -8,15 +8,21 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
 from hoof_env.errors import ParameterError, check_choice, check_number
-from hoof_env.simd import absolute, maximum, minimum, where
-from hoof_env.tasks.own_parts import Constant, Kept, check_arguments, check_parts
+from hoof_env.simd import Lanes, Number, absolute, maximum, minimum, where
+from hoof_env.simd.user_functions import inputs
+from hoof_env.tasks.own_parts import Constant, Kept, check_arguments, check_parts, without_scalar
+
+if TYPE_CHECKING:
+    from hoof_env.dynamics.layout import LegMemory, StrideSums, TrunkMemory
+    from hoof_env.tasks.episode import Episode
 
 
+@inputs
 class Outcome(NamedTuple):
     """Outcome of a control step, the argument of the terms. Where the engine failed, `failed` is 1 and what
     the step added is 0.
@@ -36,17 +42,17 @@ class Outcome(NamedTuple):
             i-th leg.
     """
 
-    seconds: Any
-    progress: Any
-    commanded_progress: Any
-    sums: Any
-    borne: Any
-    failed: Any
-    episode_seconds: Any
-    weight: Any
-    trunk: Any
-    leg: Any
-    episode: Any
+    seconds: Lanes
+    progress: Lanes
+    commanded_progress: Lanes
+    sums: StrideSums
+    borne: Lanes
+    failed: Lanes
+    episode_seconds: Lanes
+    weight: Lanes
+    trunk: TrunkMemory
+    leg: LegMemory
+    episode: Episode
 
 
 BEARING = 0.9
@@ -64,43 +70,43 @@ agents slow the crank down in a stance, and a leg can only oscillate its swing w
 # Arguments of all terms: an `Outcome`, and the weight of the term in the unit that `TERMS` says.
 
 
-def progress(step, weight):  # type: ignore[no-untyped-def]
+def progress(step: Outcome, weight: Number) -> Lanes:
     """Return the reward for forward travel, up to the commanded speed; weight in 1/m."""
     return weight * minimum(step.progress, step.commanded_progress)
 
 
-def overspeed(step, weight):  # type: ignore[no-untyped-def]
+def overspeed(step: Outcome, weight: Number) -> Lanes:
     """Return the charge for travel beyond the commanded speed; weight in 1/m."""
     return -weight * maximum(step.progress - step.commanded_progress, 0.0)
 
 
-def peak(step, weight):  # type: ignore[no-untyped-def]
+def peak(step: Outcome, weight: Number) -> Lanes:
     """Return the charge for the increase of the running peak GRF; weight in 1/kN."""
     return -0.001 * weight * step.sums.running_peak_increase
 
 
-def loading(step, weight):  # type: ignore[no-untyped-def]
+def loading(step: Outcome, weight: Number) -> Lanes:
     """Return the charge for the increase of the stance's loading rate; weight in s/MN."""
     return -1e-6 * weight * step.sums.loading_rate_increase
 
 
-def energy(step, weight):  # type: ignore[no-untyped-def]
+def energy(step: Outcome, weight: Number) -> Lanes:
     """Return the charge for positive work of the drives; weight in 1/kJ."""
     return -0.001 * weight * step.sums.positive_work
 
 
-def slip(step, weight):  # type: ignore[no-untyped-def]
+def slip(step: Outcome, weight: Number) -> Lanes:
     """Return the charge for the distance that the hoof slides in stance; weight in 1/m."""
     return -weight * step.sums.slip
 
 
-def failure(step, weight):  # type: ignore[no-untyped-def]
+def failure(step: Outcome, weight: Number) -> Lanes:
     """Return the charge for a failure, once, in proportion to the rest of the episode; weight in 1/s."""
     # For the rest, so that an early failure cannot be cheaper than the charges of continuing.
     return where(step.failed > 0.0, -weight * (step.episode_seconds - step.episode.time), 0.0)
 
 
-def support(step, weight):  # type: ignore[no-untyped-def]
+def support(step: Outcome, weight: Number) -> Lanes:
     """Return the reward for bearing weight, in proportion to the speed, up to the commanded one, and to the
     crank's rate, up to `STEPPING`; weight in 1/s. There is no reward for standing still under load, for
     oscillating the swing, or for moving back and forth."""
@@ -118,6 +124,7 @@ OBJECTIVES = ("progress", "peak force", "energy")
 PROGRESS, PEAK_FORCE, ENERGY = OBJECTIVES
 
 
+@without_scalar
 @dataclass(frozen=True)
 class Term:
     """Term of the reward.
@@ -127,10 +134,8 @@ class Term:
         weight: default weight.
         unit: unit of the weight.
         meaning: quantity that is weighted, for the manual page.
-        compute: function of an `Outcome` and the weight, compiled for one environment and for eight side by
-            side: + - * /, comparisons, and the functions of `hoof_env.simd`; `where` instead of `if`.
-        scalar: True if `compute` is a function of ordinary numbers, which may use `if` and `math`; it is
-            called for one environment after the other, which takes longer.
+        compute: plain function of an `Outcome` and the weight that returns the term, in Python's operators and
+            NumPy's functions, with np.where instead of `if`; see docs/own_task.md.
         constants: further arguments of `compute`, which the setting `constants` changes.
         keeps: numbers that the term keeps in an episode: `compute` reads and sets them, as
             `step.episode.own.<term>.<name>`; entries read them, too.
@@ -149,7 +154,6 @@ class Term:
     unit: str
     meaning: str
     compute: Callable[..., Any]
-    scalar: bool = False
     objective: str | None = None
     constants: Sequence[Constant] = ()
     keeps: Sequence[Kept] = ()

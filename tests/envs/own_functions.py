@@ -5,16 +5,15 @@ Its law is Eq. 14 again, so that what it adds can be compared with the id it beg
 
 import math
 
+import numpy as np
+
 from hoof_env import Entry, Scale, Term, register
-from hoof_env.simd import maximum, where
-from hoof_env.simd.compile import inline_llvm
 from hoof_env.simd.math import root_power
 
 ID = "own/Everything-v0"
 MODULE_ID = f"own_functions:{ID}"
 
 
-@inline_llvm
 def friction_power(point):
     return point.friction * point.slide
 
@@ -25,37 +24,34 @@ def friction(step, weight):
 
 
 def comfort(step, weight):
-    if step.failed:
-        return 0.0
-    return weight * math.exp(-abs(step.trunk.report.acceleration.imag) / 9.81)
+    smooth = np.exp(-abs(step.trunk.report.acceleration.imag) / 9.81)
+    return np.where(step.failed > 0.0, 0.0, weight * smooth)
 
 
 def rising(scene):
-    return where(scene.trunk.report.velocity.imag > 0.0, scene.trunk.report.acceleration.imag, 0.0)
+    return np.where(scene.trunk.report.velocity.imag > 0.0, scene.trunk.report.acceleration.imag, 0.0)
 
 
 def load_angle(scene):
     toe = scene.leg.report.toe
-    if toe.normal > 0.0:
-        return math.atan2(toe.friction, toe.normal)
-    return 0.0
+    return np.where(toe.normal > 0.0, np.arctan2(toe.friction, toe.normal), 0.0)
 
 
 def equation_14(penetration, rate, inverse_approach_speed, ground):
     spring = ground.stiffness * root_power(penetration, ground.eighths)
     damping = ground.chi * rate * inverse_approach_speed
-    return maximum(spring * (1.0 + damping) + ground.dashpot * rate, 0.0)
+    return np.maximum(spring * (1.0 + damping) + ground.dashpot * rate, 0.0)
 
 
 TERMS = (
     Term("friction", 0.5, "1/kJ", "power of friction", friction),
-    Term("comfort", 0.1, "-", "per step without acceleration", comfort, scalar=True),
+    Term("comfort", 0.1, "-", "per step without acceleration", comfort),
 )
 ENTRIES = (
     Entry(
         "rising", "feel", "m/s^2", rising, Scale("tanh(x / 9.81)", lambda x, scene: x / 9.81, saturates=True)
     ),
-    Entry("load angle", "feel", "rad", load_angle, Scale("/ pi", lambda x, s: x / math.pi), scalar=True),
+    Entry("load angle", "feel", "rad", load_angle, Scale("/ pi", lambda x, s: x / math.pi)),
     Entry("episode seconds", "watch", "s", lambda s: s.episode.time, Scale("/ 10", lambda x, s: 0.1 * x)),
 )
 

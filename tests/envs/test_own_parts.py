@@ -253,17 +253,15 @@ def undefined(action, scene):
     return action[0] / (action[0] - action[0]), 0.0, 0.0, 0.0
 
 
-@pytest.mark.parametrize("scalar", [False, True])
-def test_a_map_that_reads_beyond_its_actions_is_refused(scalar):
-    hoof_env.register(f"my_lab/Beyond{scalar}-v0", action_map=ActionMap("one", {"a": "-"}, beyond, scalar))
-    with pytest.raises(ParameterError, match=r"(?s)cannot compile .*beyond"):
-        gym.make(f"my_lab/Beyond{scalar}-v0")
+def test_a_map_that_reads_beyond_its_actions_is_refused():
+    hoof_env.register("my_lab/Beyond-v0", action_map=ActionMap("one", {"a": "-"}, beyond))
+    with pytest.raises(ParameterError, match=r"tuple index out of range, in beyond \("):
+        gym.make("my_lab/Beyond-v0")
 
 
-@pytest.mark.parametrize("scalar", [False, True])
-def test_nan_of_a_map_is_told(scalar):
-    hoof_env.register(f"my_lab/NaN{scalar}-v0", action_map=ActionMap("one", {"a": "-"}, undefined, scalar))
-    env = gym.make(f"my_lab/NaN{scalar}-v0")
+def test_nan_of_a_map_is_told():
+    hoof_env.register("my_lab/NaN-v0", action_map=ActionMap("one", {"a": "-"}, undefined))
+    env = gym.make("my_lab/NaN-v0")
     env.reset(seed=0)
     with pytest.raises(ParameterError, match="action_map 'one': expected numbers, got NaN for action 0"):
         env.step(np.zeros(1, np.float32))

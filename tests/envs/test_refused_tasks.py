@@ -1,5 +1,5 @@
-"""Own tasks that cannot be, by the words of each error: registrations (`REGISTRATIONS`), functions that
-cannot be compiled (`FUNCTIONS`), calls with an id (`CALLS`)."""
+"""Own tasks that cannot be, by the words of each error: registrations (`REGISTRATIONS`), calls with an id
+(`CALLS`). `test_refused_functions` has the functions."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import gymnasium as gym
 import pytest
 
 import hoof_env
-from hoof_env import ActionMap, Entry, Scale, Term, register
+from hoof_env import Entry, Scale, Term, register
 from hoof_env.envs.manual import page_of
 from hoof_env.errors import ParameterError
 from hoof_env.tasks import registry as tasks
@@ -31,21 +31,6 @@ def entry(measure, name="mine"):
 
 def constant(step, weight):
     return 1.0
-
-
-def uses_if(step, weight):
-    if step.progress > 0.0:
-        return weight
-    return 0.0
-
-
-def sometimes(step, weight):
-    if step.progress > 0.0:
-        return 1.0
-
-
-def outdated(step, weight):
-    return weight * step.highest
 
 
 def powers(penetration, rate, inverse_approach_speed, ground):
@@ -113,38 +98,6 @@ def test_registrations(arguments, words):
     with pytest.raises(ParameterError, match=words):
         register(**{"env_id": BAD, **arguments()})
     assert (dict(gym.registry), dict(tasks._OWN)) == before
-
-
-HERE = r"\(.*test_refused_tasks.py, line"
-FUNCTIONS = [
-    ({"terms": [term(uses_if)]}, f"{BAD}: cannot compile `if`, .* of numbers in uses_if {HERE}"),
-    (
-        {"terms": [term(sometimes, scalar=True)]},
-        f"{BAD}: term 'mine' returns nothing in some cases; expected a",
-    ),
-    ({"entries": [entry(lambda s: s.leg.command)]}, f"{BAD}: entry 'mine' returns .*; expected a number"),
-    *(
-        (
-            {"action_map": ActionMap("mine", {"a": "-"}, function)},
-            f"'mine' returns {given}; expected a tuple of 4",
-        )
-        for function, given in (
-            (lambda action, scene: (action[0], 0.0, 0.0), "a tuple of 3"),
-            (lambda action, scene: (action[0], 0.0, 0.0, 0.0, 0.0), "a tuple of 5"),
-            (lambda action, scene: action[0], "Lanes.*"),
-        )
-    ),
-    ({"contact_law": powers}, rf"{BAD}: cannot compile pow\(\) in powers {HERE} \d+\); expected"),
-    ({"terms": [term(outdated)]}, r"\.highest, which Outcome has not \(it is \.sums\.highest_grf now\)"),
-]
-"""Arguments of `register`, and words of the error when the environment is made: operation and place."""
-
-
-@pytest.mark.parametrize(("arguments", "words"), FUNCTIONS, ids=[row[1] for row in FUNCTIONS])
-def test_functions_that_cannot_be_compiled(arguments, words):
-    register(BAD, **arguments)
-    with pytest.raises(ParameterError, match=words):
-        gym.make(BAD)
 
 
 def registered_no_more(own):

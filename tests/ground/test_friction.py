@@ -10,9 +10,8 @@ from hypothesis import strategies as st
 
 from hoof_env.ground import laws
 from hoof_env.ground.laws import AMBROSIO, FRICTION_LAWS, TANH, THRELFALL
-from hoof_env.simd import loop, read, rows, write
+from hoof_env.simd import Matrix, loop, read, write
 from hoof_env.simd.compile import Kernel
-from hoof_env.simd.memory import doubles
 from tests.ground.plain_laws import friction_coefficient, friction_force
 from tests.oracle import laws as oracle
 
@@ -77,12 +76,11 @@ def test_regimes(law, speed, expected):
 def in_lanes(lanes, law):
     """A kernel that fills its second array from its first."""
 
-    def fill(speed, out, count):
-        row = rows(doubles(lanes), lanes, None)
-        for n in loop(0, count, lanes):
-            write(laws.friction_part(read(row, speed, n, 1), law, SLOW, FAST), out, n, 1)
+    def fill(speed, out):
+        for n in loop(0, speed.shape[0], lanes):
+            write(laws.friction_part(read(speed.first, n, 1, lanes), law, SLOW, FAST), out.first, n, 1)
 
-    return Kernel(fill, ["pointer", "pointer", "index"])
+    return Kernel(fill, [Matrix, Matrix])
 
 
 @pytest.mark.parametrize("law", LAWS)
@@ -90,7 +88,7 @@ def test_a_lane_has_the_bits_that_it_has_alone(law):
     speed = np.abs(np.random.default_rng(0).normal(scale=0.02, size=1000))
     together, alone = np.empty((2, 1000))
     for lanes, out in ((8, together), (1, alone)):
-        in_lanes(lanes, law)(speed.ctypes.data, out.ctypes.data, speed.size)
+        in_lanes(lanes, law)(speed, out)
     np.testing.assert_array_equal(together.view(np.int64), alone.view(np.int64))
     plain = [part(v, law) for v in speed.tolist()]  # which is not fused
     np.testing.assert_allclose(together, plain, rtol=0, atol=1e-13)

@@ -7,11 +7,12 @@ import numpy as np
 import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
-from numba import njit
 
 from hoof_env.errors import ParameterError
 from hoof_env.ground import terrain as lanes
 from hoof_env.ground.terrain import LONG_WAY, Terrain
+from hoof_env.simd import Matrix, Number, loop, read, write
+from hoof_env.simd.compile import kernel
 
 
 @st.composite
@@ -25,13 +26,21 @@ def terrains(draw):
     return Terrain(draw(row(-2, 2)), draw(row(0.1, 10)), draw(row(0, 3)), start, spacing)
 
 
-@njit(error_model="numpy")
-def surface(x, cells, origin, per_metre):
-    return lanes.surface(x, cells, origin, per_metre)
+@kernel
+def surface(x: Matrix, cells: Matrix, origin: Number, per_metre: Number, out: Matrix):
+    count = x.shape[0]
+    for n in loop(count):
+        found = lanes.surface(read(x.first, n, 1, 1), cells, origin, per_metre)
+        for k, value in enumerate(found):
+            write(value, out.first, k * count + n, 1)
 
 
 def at(terrain, x):
-    return np.array([surface(v, *terrain.to_grid()) for v in np.atleast_1d(x)]).T
+    """Height, normal x and y, and both factors, shape (5, n)."""
+    x = np.atleast_1d(np.asarray(x, np.float64))
+    out = np.empty((5, x.size))
+    surface(x, *terrain.to_grid(), out)
+    return out
 
 
 @given(terrains(), st.lists(st.floats(-100, 100), min_size=1, max_size=20))
@@ -89,16 +98,16 @@ def test_the_normal_stands_on_the_slope(terrain, x):
 def test_flat_ground_is_exactly_that_of_the_laws():
     assert Terrain.flat() == Terrain()
     for x in (-1e6, -0.3, 0.0, 1e6):
-        assert surface(x, *Terrain().to_grid()) == (0, 0, 1, 1, 1)
+        assert at(Terrain(), x)[:, 0].tolist() == [0, 0, 1, 1, 1]
 
 
 @pytest.mark.parametrize("angle", [-0.3, 0.1, 0.5])
 def test_slopes_and_ramps(angle):
     for x in (-200.0, 0.0, 3.0):
-        height, nx, ny, *_ = surface(x, *Terrain.slope(angle).to_grid())
+        height, nx, ny = at(Terrain.slope(angle), x)[:3, 0]
         assert height == pytest.approx(x * math.tan(angle), abs=1e-12)
         assert (nx, ny) == pytest.approx((-math.sin(angle), math.cos(angle)))
-    assert surface(2 * LONG_WAY, *Terrain.slope(angle).to_grid())[2] == 1
+    assert at(Terrain.slope(angle), 2 * LONG_WAY)[2] == 1
     ramp = Terrain.ramp(angle, start=1.0, length=2.0)
     heights = ramp.height_at(np.array([0.0, 1.0, 2.0, 3.0, 9.0]))
     assert heights == pytest.approx(np.tan(angle) * np.array([0, 0, 1, 2, 2]))
@@ -123,5 +132,4 @@ def test_lines_through_uneven_points():
 
 def test_what_is_not_a_number_stays_so():
     for terrain in (Terrain(), Terrain.ramp(0.2)):
-        height, _, _, stiffness, friction = surface(math.nan, *terrain.to_grid())
-        assert np.isnan([height, stiffness, friction]).all()
+        assert np.isnan(at(terrain, math.nan)[[0, 3, 4]]).all()
