@@ -15,7 +15,7 @@ import os
 import threading
 from collections import deque
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, contextmanager
 from functools import cache
 from typing import Any, get_type_hints
 from weakref import WeakValueDictionary
@@ -218,7 +218,7 @@ class Kernel:
 
     def run_now(self, *arguments: Any, exact: bool = True) -> Any:
         """Run the kernel on NumPy, step by step, as a debugger can follow; see `machines.Eager`."""
-        return run_on(Eager(exact), self, *arguments)
+        return _run(self.function, self.parameters, arguments, Eager(exact))
 
 
 _CTYPES: dict[Any, list[Any]] = {
@@ -267,15 +267,10 @@ def traced(function: Callable[..., Any], parameters: Sequence[Parameter]) -> tup
         return machine.text("kernel", declared, kind), ctype
 
 
-def run_on(machine: Any, kernel: Kernel, *arguments: Any) -> Any:
-    """Run a kernel on a machine that computes at once, such as `machines.Eager`; return what machine code
-    would."""
-    return _run(kernel.function, kernel.parameters, arguments, machine)
-
-
 def _run(
     function: Callable[..., Any], parameters: Sequence[Parameter], arguments: Sequence[Any], machine: Any
 ) -> Any:
+    """Run the function of a kernel on a machine that computes at once; return what machine code would."""
     with running_on(machine), np.errstate(all="ignore"):
         given: list[Any] = []
         for kind, argument in zip(parameters, arguments, strict=True):
@@ -292,8 +287,8 @@ def _run(
         return int(result.x) if isinstance(result, Mask) else result
 
 
-# A block in which kernels run on NumPy. A caller may have kept a kernel's `call`, to save what a check
-# costs; so the functions of ctypes change their class while there is such a block, and only then.
+# Blocks in which kernels are not run as machine code. A caller may have kept a kernel's `call`, to save
+# what a check costs; so the functions of ctypes change their class while there is such a block, and only then.
 
 
 class _Here(threading.local):
@@ -305,15 +300,21 @@ _CALLS: WeakValueDictionary[int, Any] = WeakValueDictionary()
 _BLOCKS: list[Any] = []
 
 
-@contextmanager
-def on_numpy(exact: bool = True) -> Iterator[None]:
+def on_numpy(exact: bool = True) -> AbstractContextManager[None]:
     """Let every kernel that this thread calls in the block run on NumPy, where a debugger can follow: slower
-    by ten thousand times, with the same bits. Threads that share the environments of a call wait meanwhile.
+    by ten thousand times, with the same bits.
 
     Args:
         exact: False for products that are rounded before they enter a sum: twice as fast, other last digits.
     """
-    before, machine = _HERE.machine, Eager(exact)
+    return on_machine(Eager(exact))
+
+
+@contextmanager
+def on_machine(machine: Any) -> Iterator[None]:
+    """Let every kernel that this thread calls in the block run on a machine that computes at once, `Eager` or
+    one like it. This thread makes all calls, also those that several would share."""
+    before = _HERE.machine
     with _LOCK:
         _BLOCKS.append(machine)
         _watch()
@@ -327,8 +328,8 @@ def on_numpy(exact: bool = True) -> Iterator[None]:
             _watch()
 
 
-def is_on_numpy() -> bool:
-    """Return True in a block of `on_numpy`."""
+def is_on_machine() -> bool:
+    """Return True in a block of `on_numpy` or `on_machine`."""
     return _HERE.machine is not None
 
 

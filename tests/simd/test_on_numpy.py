@@ -12,7 +12,7 @@ from benchmarks.scenes import engine, scenes
 from hoof_env.dynamics import hoof
 from hoof_env.simd import Matrix, Number, loop, new_rows, on_numpy, read, vector, where, write
 from hoof_env.simd import compile as compile_module
-from hoof_env.simd.compile import Kernel, is_on_numpy, kernel
+from hoof_env.simd.compile import Kernel, is_on_machine, kernel
 from hoof_env.simd.layout import Block, Layout, Row, Vector
 from hoof_env.simd.machines import CURRENT, Eager
 
@@ -35,11 +35,11 @@ def test_a_kernel_runs_on_numpy_in_the_block_only():
     assert work(2.0) == 6.0
     call = work.call
     with on_numpy():
-        assert is_on_numpy()
+        assert is_on_machine()
         assert work(2.0) == 6.0
         assert call(2.0) == 6.0
         assert type(work(2.0)) is float
-    assert not is_on_numpy()
+    assert not is_on_machine()
     assert work(2.0) == call(2.0) == 6.0
     assert seen == ["text", "number", "number", "number"]
 
@@ -64,12 +64,12 @@ def test_blocks_inside_blocks_and_errors_leave_it_as_it_was():
     with on_numpy():
         with on_numpy(exact=False):
             assert work.call(1.0) == 3.0
-        assert is_on_numpy()
+        assert is_on_machine()
         assert type(work.call) is not plain
         with pytest.raises(ZeroDivisionError), on_numpy():
             raise ZeroDivisionError
-        assert is_on_numpy()
-    assert not is_on_numpy()
+        assert is_on_machine()
+    assert not is_on_machine()
     assert type(work.call) is plain
 
 
@@ -81,7 +81,7 @@ def test_another_thread_runs_machine_code_meanwhile():
     seen.clear()
     found = []
     with on_numpy():
-        other = threading.Thread(target=lambda: found.append((work(2.0), call(2.0), is_on_numpy())))
+        other = threading.Thread(target=lambda: found.append((work(2.0), call(2.0), is_on_machine())))
         other.start()
         other.join()
         assert seen == []
