@@ -288,7 +288,8 @@ def _run(
 
 
 # Blocks in which kernels are not run as machine code. A caller may have kept a kernel's `call`, to save
-# what a check costs; so the functions of ctypes change their class while there is such a block, and only then.
+# what a check costs; so the functions of ctypes change their class while there is such a block, and only
+# then.
 
 
 class _Here(threading.local):

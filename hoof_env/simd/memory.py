@@ -288,8 +288,9 @@ class Rows:
     a list of arrays, of which a store replaces an entry: arrays themselves do not change.
 
     `locked` gives the same rows to functions that may not write them: `_open` is then None, or the names of
-    the fields, one inside the other, of the rows that they may set nevertheless; else it is (). `_size` is the
-    number of rows and `_legs` that of equal layouts that follow each other, each None where it is not known.
+    the fields, one inside the other, of the rows that they may set nevertheless; else it is (). `_size` is
+    the number of rows and `_legs` that of equal layouts that follow each other, each None where it is not
+    known.
     """
 
     __slots__ = ("_empty", "_first", "_layout", "_legs", "_n", "_open", "_place", "_size")

@@ -171,8 +171,9 @@ def _kept_value(function: Any) -> str:
 
 NAMES = {
     "Lanes": "a number", "float": "a number", "int": "a number", "Index": "a whole number", "Mask": "a truth",
-    "bool": "a truth", "Plane": "a planar vector", "Columns": "memory", "Rows": "memory", "Pointer": "an array",
-    "Matrix": "an array", "Record": "the record", "Field": "an array of the record", "NoneType": "nothing",
+    "bool": "a truth", "Plane": "a planar vector", "Columns": "memory", "Rows": "memory",
+    "Pointer": "an array", "Matrix": "an array", "Record": "the record", "Field": "an array of the record",
+    "NoneType": "nothing",
 }  # fmt: skip
 """Names of types in Python's messages, in the words of users."""
 
@@ -282,8 +283,8 @@ def check_imports(name: str, function: Any, error: type[ParameterError] = Parame
     for each, _ in _reached(function):
         for line in _imports(each.__code__):
             raise error(
-                f"{name}: `import` in {each.__name__} ({each.__code__.co_filename}, line {line}): expected it at"
-                " the top of the file, for a function becomes a kernel by one call"
+                f"{name}: `import` in {each.__name__} ({each.__code__.co_filename}, line {line}): expected it"
+                " at the top of the file, for a function becomes a kernel by one call"
             )
 
 

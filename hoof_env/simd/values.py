@@ -54,8 +54,9 @@ class Value:
 
     def _no_number(self) -> NoReturn:
         raise TraceError(
-            f"float(), int(), range(), an index or a function of `math` of {self.kind}, which is known only when"
-            " the kernel runs: write NumPy's function, such as np.exp or np.sqrt, and np.where for a choice"
+            f"float(), int(), range(), an index or a function of `math` of {self.kind}, which is known only"
+            " when the kernel runs: write NumPy's function, such as np.exp or np.sqrt, and np.where for a"
+            " choice"
         )
 
     def __float__(self) -> float:
@@ -72,7 +73,8 @@ class Value:
 
     def __array__(self, *arguments: Any, **named: Any) -> Any:
         raise TraceError(
-            f"an array of NumPy with {self.kind}: a kernel has numbers only, so write out the operations on each"
+            f"an array of NumPy with {self.kind}: a kernel has numbers only, so write out the operations on"
+            " each"
         )
 
     def __array_ufunc__(self, ufunc: Any, method: str, *inputs: Any, **named: Any) -> Any:
@@ -105,8 +107,8 @@ def _single(x: Any) -> Any:
     if isinstance(x, np.ndarray):
         if x.ndim:
             raise TraceError(
-                f"an array of NumPy, of shape {x.shape}, in an operation with a value of a kernel, which is one"
-                " number: take its elements"
+                f"an array of NumPy, of shape {x.shape}, in an operation with a value of a kernel, which is"
+                " one number: take its elements"
             )
         return x.item()
     return x
