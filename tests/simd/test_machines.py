@@ -3,7 +3,9 @@ goes through its machine."""
 
 import copy
 import math
+import re
 from fractions import Fraction
+from pathlib import Path
 from typing import ClassVar
 
 import gymnasium as gym
@@ -120,6 +122,13 @@ def test_machines_have_the_same_operations():
     at_once = {"table_rows", "whole_of", "truth"}
     assert operations(Writer) - operations(Eager) == text | whole
     assert operations(Eager) - operations(Writer) == at_once
+
+
+def test_the_page_names_all_that_a_third_machine_replaces():
+    page = (Path(compile_module.__file__).parent / "README.md").read_text(encoding="utf-8")
+    named = set(re.findall(r"`(\w+)`", page.partition("**A third machine**")[2].partition("\n## ")[0]))
+    operations = {name for name, part in vars(Eager).items() if callable(part) and not name.startswith("_")}
+    assert operations - named == {"at", "field", "slot"}  # places in memory, which are Python's
 
 
 def test_the_machine_of_a_thread_comes_back_after_an_error():

@@ -15,8 +15,8 @@ from hoof_env.simd.values import FUNCTIONS, LIBRARY, UFUNCS, Lanes
 
 WIDTH = 16
 SPECIAL = (
-    0.0, -0.0, 1.0, -1.0, 0.5, 2.0, 3.0, np.inf, -np.inf, np.nan, 5e-324, -5e-324, 2.2e-308, 1e-310, 1e300, -1e300,
-    0.1, 1e16, 709.5, -745.0, np.pi, 1 + 2**-52,
+    0.0, -0.0, 1.0, -1.0, 0.5, 2.0, 3.0, np.inf, -np.inf, np.nan, 5e-324, -5e-324, 2.2e-308, 1e-310, 1e300,
+    -1e300, 0.1, 1e16, 709.5, -745.0, np.pi, 1 + 2**-52,
 )  # fmt: skip
 
 
