@@ -312,6 +312,17 @@ class Rows:
         """Number of lanes."""
         return self._n
 
+    def __repr__(self) -> str:
+        """Return the names of the fields or, on a machine that computes at once, what they hold."""
+        names = () if self._layout is None else tuple(self._layout.fields)
+        if not (names and CURRENT.machine.runs_now):
+            return f"rows of {', '.join(names) or 'numbers'}"
+        parts = {name: repr(getattr(self, name)) for name in names}
+        return "\n".join(
+            f"{name}: " + ("\n" + part if "\n" in part else part).replace("\n", "\n  ")
+            for name, part in parts.items()
+        )
+
     # where a row is
 
     def _part(self, start: Any, layout: Any, is_empty: bool = False) -> Any:

@@ -138,6 +138,9 @@ class Lanes(Value):
         self.n = n
         self.factors = factors
 
+    def __repr__(self) -> str:
+        return f"Lanes({self.x})"
+
     @overload
     def __add__(self, other: Number) -> Lanes: ...
     @overload
@@ -226,6 +229,9 @@ class Mask(Value):
         self.x = x
         self.n = n
 
+    def __repr__(self) -> str:
+        return f"Mask({self.x})"
+
     def __and__(self, other: Truth) -> Mask:
         return self._with("and", other)
 
@@ -296,7 +302,7 @@ class Mask(Value):
 
     def __bool__(self) -> bool:
         if CURRENT.machine.runs_now and not self.n:
-            return bool(self.x)
+            return CURRENT.machine.truth(self.x)
         return super().__bool__()
 
     def to_whole(self) -> Index:
@@ -314,6 +320,9 @@ class Plane(Value):
     def __init__(self, a: Lanes, b: Lanes) -> None:
         self.a = a
         self.b = b
+
+    def __repr__(self) -> str:
+        return f"Plane({self.a.x}, {self.b.x})"
 
     @property
     def n(self) -> int:
