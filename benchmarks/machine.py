@@ -11,8 +11,6 @@ from functools import cache
 from importlib import metadata
 from pathlib import Path
 
-import llvmlite.binding as llvm
-
 from agents.runs import processor
 from hoof_env.simd import Matrix, read, write
 from hoof_env.simd.compile import host, optimised, target, traced

@@ -234,8 +234,8 @@ def compare(cases: list[Case], rounds: int) -> list[dict[str, Any]]:
 
 
 def start() -> dict[str, float]:
-    """Return the wall time [s] of `import hoof_env`, and of all up to a first step whose kernels are compiled:
-    medians of five processes each."""
+    """Return the wall time [s] of `import hoof_env`, and of all up to a first step whose kernels are
+    compiled: medians of five processes each."""
     root = Path(__file__).resolve().parents[1]
 
     def seconds_of(code: str, before: str = "", **settings: str) -> float:
@@ -250,8 +250,9 @@ def start() -> dict[str, float]:
 
     def first_step() -> float:
         with tempfile.TemporaryDirectory() as folder:
-            make = 'import gymnasium, hoof_env; env = gymnasium.make("hoof_env/HorseLeg-v0"); env.reset(seed=0)'
-            return seconds_of(f"{make}; env.step(env.action_space.sample())", HOOF_ENV_CACHE_DIR=folder)
+            make = 'import gymnasium, hoof_env; env = gymnasium.make("hoof_env/HorseLeg-v0")'
+            step = "env.reset(seed=0); env.step(env.action_space.sample())"
+            return seconds_of(f"{make}; {step}", HOOF_ENV_CACHE_DIR=folder)
 
     imported, stepped = (
         float(np.median([seconds() for _ in range(5)]))

@@ -1,4 +1,5 @@
-"""For all tests: windows are drawn unseen, and nobody computes in threads: there is a process on each processor, and threads that wait for others spin.
+"""For all tests: windows are drawn unseen, and nobody computes in threads: there is a process on each
+processor, and threads that wait for others spin.
 
 Where PyTorch cannot be had, what needs it is left out, and a line at the end says so."""
 

@@ -16,7 +16,8 @@ import hoof_env
 from hoof_env.envs.shipped import summaries
 
 ROOT = Path(__file__).resolve().parent.parent
-HEAVY = {"llvmlite", "torch", "pygame", "matplotlib", "tyro", "stable_baselines3", "scipy", "importlib.metadata"}
+HEAVY = {"llvmlite", "torch", "pygame", "matplotlib", "tyro", "stable_baselines3", "scipy"}
+HEAVY |= {"importlib.metadata"}
 
 
 SHIPPED = {".py", ".json", ".typed", ".toml", ".in", ".md", ".html", ".css", ".js", ".j2", ".safetensors"}

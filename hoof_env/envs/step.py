@@ -40,8 +40,8 @@ ONE = Arrangement("one", 1)
 
 @dataclass(frozen=True)
 class StepKernels:
-    """Kernels of a task; the argument of each are the arrays of `TaskKind.arrays`, but for `measure`, whose arrays
-    have `measured`, too.
+    """Kernels of a task; the argument of each are the arrays of `TaskKind.arrays`, but for `measure`, whose
+    arrays have `measured`, too.
 
     Attributes:
         step: control step; returns one of the codes above.
@@ -59,8 +59,8 @@ class StepKernels:
 
 
 def step_kernels(kind: TaskKind, is_scalar: bool) -> StepKernels:
-    """Return the kernels of tasks of one kind, which share them; with a function from outside, whose helpers and
-    constants may have changed since, as in a notebook, they are made anew.
+    """Return the kernels of tasks of one kind, which share them; with a function from outside, whose
+    helpers and constants may have changed since, as in a notebook, they are made anew.
 
     Args:
         kind: kind of the task.

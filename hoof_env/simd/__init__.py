@@ -1,6 +1,7 @@
 """Numbers side by side: values of kernels that work on many environments, or many legs, in one
 instruction."""
 
+import hoof_env.simd.numpy_functions  # noqa: F401 - lets NumPy's functions work on values
 from hoof_env.simd.compile import on_numpy
 from hoof_env.simd.control import Cell, cond, loop, one_of, rolled, when
 from hoof_env.simd.memory import (

@@ -193,7 +193,7 @@ class Kernel:
         self.call: Any = None
 
     def __call__(self, *arguments: Any) -> Any:
-        if _BLOCKS and _HERE.machine:
+        if BLOCKS and _HERE.machine is not None:
             return _run(self.function, self.parameters, arguments, _HERE.machine)
         if self.call is None:
             self.compile()
@@ -216,10 +216,6 @@ class Kernel:
         make: Any = ctypes.CFUNCTYPE if self.threads else ctypes.PYFUNCTYPE
         call = make(result, *kinds)(code.address)
         call.code = code  # the machine code lives as long as the function
-        call.source = self.function, self.parameters
-        with _LOCK:
-            _CALLS[id(call)] = call
-            _watch()
         self.call = call
 
     def run_now(self, *arguments: Any, exact: bool = True) -> Any:
@@ -293,9 +289,7 @@ def _run(
         return int(result.x) if isinstance(result, Mask) else result
 
 
-# Blocks in which kernels are not run as machine code. A caller may have kept a kernel's `call`, to save
-# what a check costs; so the functions of ctypes change their class while there is such a block, and only
-# then.
+# Blocks in which kernels are not run as machine code
 
 
 class _Here(threading.local):
@@ -303,8 +297,10 @@ class _Here(threading.local):
 
 
 _HERE = _Here()
-_CALLS: WeakValueDictionary[int, Any] = WeakValueDictionary()
-_BLOCKS: list[Any] = []
+
+BLOCKS: list[Any] = []
+"""Machines of the blocks that are open in any thread. While there are some, whoever keeps a kernel's
+`call`, to save what a check costs, has to call the kernel itself."""
 
 
 def on_numpy(exact: bool = True) -> AbstractContextManager[None]:
@@ -321,50 +317,18 @@ def on_numpy(exact: bool = True) -> AbstractContextManager[None]:
 def on_machine(machine: Any) -> Iterator[None]:
     """Let every kernel that this thread calls in the block run on a machine that computes at once, `Eager` or
     one like it. This thread makes all calls, also those that several would share."""
-    before = _HERE.machine
-    with _LOCK:
-        _BLOCKS.append(machine)
-        _watch()
-    _HERE.machine = machine
+    before, _HERE.machine = _HERE.machine, machine
+    BLOCKS.append(machine)
     try:
         yield
     finally:
         _HERE.machine = before
-        with _LOCK:
-            _BLOCKS.remove(machine)
-            _watch()
+        BLOCKS.remove(machine)
 
 
 def is_on_machine() -> bool:
     """Return True in a block of `on_numpy` or `on_machine`."""
     return _HERE.machine is not None
-
-
-def _watch() -> None:
-    """Let the functions of all kernels ask where they run, or no longer, as there are blocks."""
-    for call in list(_CALLS.values()):
-        kind: Any = type(call)
-        plain = getattr(kind, "plain", kind)
-        call.__class__ = _watched(plain) if _BLOCKS else plain
-
-
-@cache
-def _watched(kind: Any) -> Any:
-    """Return a class of ctypes' functions that ask where they run."""
-
-    class Watched(kind):
-        __slots__ = ()
-        source: tuple[Any, Any]
-        _flags_, _restype_, _argtypes_ = kind._flags_, kind._restype_, kind._argtypes_
-        plain = kind
-
-        def __call__(self, *arguments: Any) -> Any:
-            function, parameters = self.source
-            if _HERE.machine is None or Matrix in parameters:  # of which only the address is known here
-                return super().__call__(*arguments)
-            return _run(function, parameters, arguments, _HERE.machine)
-
-    return Watched
 
 
 def kernel(function: Callable[..., Any]) -> Kernel:

@@ -9,7 +9,6 @@ decides this: a value remembers the factors of which it is the product, and `rou
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Iterator
 from typing import Any, NoReturn, Protocol, TypeVar, overload
 
@@ -100,6 +99,11 @@ class Value:
             raise TraceError(f"np.{function.__name__}: {error}") from None
 
 
+UFUNCS: dict[Any, Callable[..., Any]] = {}
+FUNCTIONS: dict[Any, Callable[..., Any]] = {}
+"""NumPy's functions of numbers that work on values, and its other functions that do: `numpy_functions`."""
+
+
 def known_functions() -> str:
     """Return the names of NumPy's functions that work on values."""
     return ", ".join(sorted({f"np.{function.__name__}" for function in (*UFUNCS, *FUNCTIONS)}))
@@ -179,44 +183,44 @@ class Lanes(Value):
     def __pos__(self) -> Lanes:
         return self
 
-    def __pow__(self, power: Number) -> Lanes:
-        return _power(self, power)
+    def __pow__(self, exponent: Number) -> Lanes:
+        return power(self, exponent)
 
     def __rpow__(self, base: Number) -> Lanes:
-        return _power(base, self)
+        return power(base, self)
 
     def __abs__(self) -> Lanes:
         return absolute(self)
 
     def __mod__(self, other: Number) -> Lanes:
-        return _quotient_and_rest(self, other)[1] if is_real(other) else NotImplemented
+        return UFUNCS[np.remainder](self, other) if is_real(other) else NotImplemented
 
     def __rmod__(self, other: Number) -> Lanes:
-        return _quotient_and_rest(other, self)[1] if is_real(other) else NotImplemented
+        return UFUNCS[np.remainder](other, self) if is_real(other) else NotImplemented
 
     def __floordiv__(self, other: Number) -> Lanes:
-        return _quotient_and_rest(self, other)[0] if is_real(other) else NotImplemented
+        return UFUNCS[np.floor_divide](self, other) if is_real(other) else NotImplemented
 
     def __rfloordiv__(self, other: Number) -> Lanes:
-        return _quotient_and_rest(other, self)[0] if is_real(other) else NotImplemented
+        return UFUNCS[np.floor_divide](other, self) if is_real(other) else NotImplemented
 
     def __lt__(self, other: Number) -> Mask:
-        return _comparison("<", self, other)
+        return compare("<", self, other)
 
     def __le__(self, other: Number) -> Mask:
-        return _comparison("<=", self, other)
+        return compare("<=", self, other)
 
     def __gt__(self, other: Number) -> Mask:
-        return _comparison(">", self, other)
+        return compare(">", self, other)
 
     def __ge__(self, other: Number) -> Mask:
-        return _comparison(">=", self, other)
+        return compare(">=", self, other)
 
     def __eq__(self, other: Number) -> Mask:  # type: ignore[override]
-        return _comparison("==", self, other)
+        return compare("==", self, other)
 
     def __ne__(self, other: Number) -> Mask:  # type: ignore[override]
-        return _comparison("!=", self, other)
+        return compare("!=", self, other)
 
 
 class Mask(Value):
@@ -399,7 +403,7 @@ class Index(Value):
     def _with(self, name: str, one: Any, other: Any) -> Any:
         if isinstance(other, (float, Lanes)) or isinstance(one, (float, Lanes)):
             one, other = (part.to_real() if isinstance(part, Index) else part for part in (one, other))
-            return {"add": _sum_of, "sub": _difference, "mul": product}[name](one, other)
+            return {"add": add, "sub": subtract, "mul": product}[name](one, other)
         if not all(isinstance(value, (int, Index)) for value in (one, other)):
             return NotImplemented
         return Index(CURRENT.machine.index_binary(name, word(one), word(other)))
@@ -429,11 +433,11 @@ class Index(Value):
     def __rtruediv__(self, other: Number) -> Lanes:
         return other / self.to_real()
 
-    def __pow__(self, power: Number) -> Lanes:
-        return _power(self.to_real(), power)
+    def __pow__(self, exponent: Number) -> Lanes:
+        return power(self.to_real(), exponent)
 
     def __rpow__(self, base: Number) -> Lanes:
-        return _power(base, self.to_real())
+        return power(base, self.to_real())
 
     def __mod__(self, other: int) -> Any:
         """Return the rest of a number that is not negative."""
@@ -521,12 +525,12 @@ def full(value: Any, n: int) -> Lanes:
     return Lanes(payload(value, n), n)
 
 
-def _lanes_of(*values: Any) -> int:
+def lanes_of(*values: Any) -> int:
     return max((value.n for value in values if isinstance(value, (Lanes, Plane))), default=0)
 
 
 def _binary(name: str, one: Any, other: Any) -> Any:
-    n = _lanes_of(one, other)
+    n = lanes_of(one, other)
     return Lanes(CURRENT.machine.binary(name, payload(one, n), payload(other, n), n), n)
 
 
@@ -534,7 +538,7 @@ def _sum(sign: str, one: Any, other: Any) -> Any:
     if not (is_real(one) and is_real(other)):
         return NotImplemented
     machine = CURRENT.machine
-    n = _lanes_of(one, other)
+    n = lanes_of(one, other)
     if isinstance(other, Lanes) and other.factors and other.n == n:
         a, b = other.factors
         return Lanes(machine.fma(machine.negative(a, n) if sign == "-" else a, b, payload(one, n), n), n)
@@ -544,11 +548,11 @@ def _sum(sign: str, one: Any, other: Any) -> Any:
     return Lanes(machine.binary("fadd" if sign == "+" else "fsub", payload(one, n), payload(other, n), n), n)
 
 
-def _sum_of(one: Any, other: Any) -> Any:
+def add(one: Any, other: Any) -> Any:
     return one + other
 
 
-def _difference(one: Any, other: Any) -> Any:
+def subtract(one: Any, other: Any) -> Any:
     return one - other
 
 
@@ -563,7 +567,7 @@ def product(one: Any, other: Any) -> Any:
         return Plane(product(one, other.a), product(one, other.b)) if is_real(one) else NotImplemented
     if not (is_real(one) and is_real(other)):
         return NotImplemented
-    n = _lanes_of(one, other)
+    n = lanes_of(one, other)
     factors = payload(one, n), payload(other, n)
     return Lanes(CURRENT.machine.binary("fmul", *factors, n), n, factors if n else None)
 
@@ -573,13 +577,13 @@ def _no_match(one: Any, other: Any) -> Any:
     raise TraceError(f"a comparison of {kind_of(one)} with {kind_of(other)}")
 
 
-def _comparison(symbol: str, one: Any, other: Any) -> Any:
+def compare(symbol: str, one: Any, other: Any) -> Any:
     other, one = _single(other), _single(one)
     if isinstance(other, Mask):
         other = other.to_real()
     if not is_real(other) or not is_real(one):
         return _no_match(one, other) if symbol in ("==", "!=") else NotImplemented
-    n = _lanes_of(one, other)
+    n = lanes_of(one, other)
     return Mask(CURRENT.machine.compare(symbol, payload(one, n), payload(other, n), n), n)
 
 
@@ -587,21 +591,21 @@ MOST_PRODUCTS = 16
 """Largest whole power that is made of products."""
 
 
-def _power(base: Any, power: Any) -> Any:
-    """Return a power: of whole numbers by products, of halves by roots, of others by the C library."""
-    if isinstance(power, (int, float, np.integer, np.floating)):
-        power = float(power)
-        if power == 2.0:
+def power(base: Any, exponent: Any) -> Any:
+    """Return a exponent: of whole numbers by products, of halves by roots, of others by the C library."""
+    if isinstance(exponent, (int, float, np.integer, np.floating)):
+        exponent = float(exponent)
+        if exponent == 2.0:
             return base * base
-        if power == 0.5:
+        if exponent == 0.5:
             return sqrt(base)
-        if power.is_integer() and 0 < power <= MOST_PRODUCTS:
-            half = rounded(_power(base, power // 2)) if power > 1 else None
+        if exponent.is_integer() and 0 < exponent <= MOST_PRODUCTS:
+            half = rounded(power(base, exponent // 2)) if exponent > 1 else None
             if half is None:
                 return base
             square = rounded(half * half)
-            return square * base if power % 2 else square
-    return _library("pow")(base, power)
+            return square * base if exponent % 2 else square
+    return library("pow")(base, exponent)
 
 
 def rounded(value: V) -> V:
@@ -650,7 +654,7 @@ def _real_function(name: str, at_once: Any) -> RealFunction:
 def _other_kind(at_once: Any, x: Value) -> Any:
     """Return NumPy's function of a truth, or the length of a planar vector; refuse the rest."""
     if isinstance(x, Plane) and at_once is np.abs:
-        return _library("hypot")(x.a, x.b)
+        return library("hypot")(x.a, x.b)
     if isinstance(x, Mask):
         return UFUNCS[at_once](x.to_real())
     raise TraceError(f"np.{at_once.__name__} of {x.kind}: expected a number")
@@ -662,12 +666,12 @@ floor = _real_function("floor", np.floor)
 ceil = _real_function("ceil", np.ceil)
 
 
-def _library(name: str) -> Callable[..., Any]:
+def library(name: str) -> Callable[..., Any]:
     """Return a function of the C library, which is called lane by lane."""
 
     def function(*inputs: Any) -> Any:
         inputs = tuple(x.to_real() if isinstance(x, Mask) else x for x in inputs)
-        n = _lanes_of(*inputs)
+        n = lanes_of(*inputs)
         return Lanes(CURRENT.machine.library(name, [payload(x, n) for x in inputs], n), n)
 
     return function
@@ -675,7 +679,7 @@ def _library(name: str) -> Callable[..., Any]:
 
 def vector(x: Number, y: Number) -> Plane:
     """Return the planar vector (x, y)."""
-    n = _lanes_of(x, y)
+    n = lanes_of(x, y)
     a, b = (part if isinstance(part, Lanes) and part.n == n else full(part, n) for part in (x, y))
     return Plane(a, b)
 
@@ -722,7 +726,7 @@ def where(condition: Any, yes: Any, no: Any) -> Any:
     yes, no = (part.to_real() if isinstance(part, Mask) else _single(part) for part in (yes, no))
     if not (is_real(yes) and is_real(no)):
         raise TraceError(f"where() of {kind_of(no if is_real(yes) else yes)}: expected two numbers")
-    n = max(condition.n, _lanes_of(yes, no))
+    n = max(condition.n, lanes_of(yes, no))
     chosen = CURRENT.machine.select(condition.x, payload(yes, n), payload(no, n), n, condition.n)
     return Lanes(chosen, n)
 
@@ -762,12 +766,12 @@ def _chosen(symbol: str, x: Any, y: Any) -> Any:
         if isinstance(x, np.ndarray) or isinstance(y, np.ndarray) or x != x or y != y:
             return (np.maximum if symbol == ">" else np.minimum)(x, y)
         return y if (y > x if symbol == ">" else y < x) else x
-    n = _lanes_of(x, y)
+    n = lanes_of(x, y)
     are_known = [not isinstance(part, Lanes) for part in (x, y)]
     x, y = full(x, n), full(y, n)
     if are_known[0]:  # x is chosen by a comparison that NaN fails, so y is NaN where it is NaN
-        return where(_comparison(f"{symbol}=", x, y), x, y)
-    takes = _comparison(symbol, y, x)
+        return where(compare(f"{symbol}=", x, y), x, y)
+    takes = compare(symbol, y, x)
     if not are_known[1]:
         takes = takes | (y != y)
     return where(takes, y, x)
@@ -863,120 +867,3 @@ def transposed(rows: list[Lanes]) -> list[Lanes]:
             block = 2 * block
         columns += [Lanes(x, n) for x in square]
     return columns
-
-
-def _sign(x: Any) -> Any:
-    return where(x > 0.0, 1.0, where(x < 0.0, -1.0, where(x == 0.0, 0.0, x)))
-
-
-def _quotient_and_rest(x: Any, y: Any) -> tuple[Any, Any]:
-    """Return x // y and x % y as NumPy computes them: the rest has the sign of y."""
-    rest = _library("fmod")(x, y)
-    turns = rounded(x - rest) / y
-    crosses = (rest != 0.0) & ((y < 0.0) ^ (rest < 0.0))
-    turns = where(crosses, turns - 1.0, turns)
-    rest = where(rest != 0.0, where(crosses, rest + y, rest), _copysign(0.0, y))
-    below = floor(turns)
-    whole = where(turns - below > 0.5, below + 1.0, below)
-    whole = where(turns != 0.0, whole, _copysign(0.0, x / y))
-    is_zero = y == 0.0
-    return where(is_zero, x / y, whole), where(is_zero, _library("fmod")(x, y), rest)
-
-
-def _divided(x: Any, y: Any) -> Any:
-    return x / y if isinstance(x, Value) or not isinstance(y, (Lanes, Mask)) else y.__rtruediv__(float(x))
-
-
-def _select(conditions: Any, choices: Any, default: Any = 0.0) -> Any:
-    chosen = default
-    for condition, choice in zip(reversed(conditions), reversed(choices), strict=True):
-        chosen = where(condition, choice, chosen)
-    return chosen
-
-
-def _copysign(x: Any, y: Any) -> Any:
-    machine = CURRENT.machine
-    n = _lanes_of(x, y)
-    top = 1 << 63
-    size = machine.whole("and", machine.bits(payload(x, n), n), top - 1, n)
-    sign = machine.whole("and", machine.bits(payload(y, n), n), top, n)
-    return Lanes(machine.of_bits(machine.whole("or", size, sign, n), n), n)
-
-
-def _full_like(like: Any, value: Any) -> Any:
-    return full(value, like.n)
-
-
-LIBRARY = (
-    "exp", "exp2", "expm1", "log", "log2", "log10", "log1p", "sin", "cos", "tan", "sinh", "cosh", "tanh",
-    "hypot", "cbrt", "fmod",
-)  # fmt: skip
-"""Functions of NumPy that the C library has by the same name."""
-
-UFUNCS: dict[Any, Callable[..., Any]] = {
-    np.add: _sum_of,
-    np.subtract: _difference,
-    np.multiply: lambda x, y: x * y if isinstance(x, Value) else y * x,
-    np.divide: _divided,
-    np.floor_divide: lambda x, y: _quotient_and_rest(x, y)[0],
-    np.remainder: lambda x, y: _quotient_and_rest(x, y)[1],
-    np.conjugate: lambda x: x.conjugate() if isinstance(x, Plane) else x,
-    np.isinf: lambda x: absolute(x) == math.inf,
-    np.fmax: lambda x, y: where(y != y, x, where(x != x, y, maximum(x, y))),
-    np.fmin: lambda x, y: where(y != y, x, where(x != x, y, minimum(x, y))),
-    np.trunc: lambda x: _copysign(floor(absolute(x)), x),
-    np.logical_xor: lambda x, y: x ^ y,
-    np.bitwise_xor: lambda x, y: x ^ y,
-    np.negative: lambda x: -x,
-    np.positive: lambda x: x,
-    np.absolute: absolute,
-    np.fabs: absolute,
-    np.sqrt: sqrt,
-    np.square: lambda x: x * x,
-    np.reciprocal: lambda x: 1.0 / x,
-    np.floor: floor,
-    np.ceil: ceil,
-    np.power: _power,
-    np.float_power: _power,
-    np.minimum: minimum,
-    np.maximum: maximum,
-    np.sign: _sign,
-    np.copysign: _copysign,
-    np.isnan: lambda x: x != x,
-    np.isfinite: lambda x: x - x == 0.0,
-    np.less: lambda x, y: _comparison("<", x, y),
-    np.less_equal: lambda x, y: _comparison("<=", x, y),
-    np.greater: lambda x, y: _comparison(">", x, y),
-    np.greater_equal: lambda x, y: _comparison(">=", x, y),
-    np.equal: lambda x, y: _comparison("==", x, y),
-    np.not_equal: lambda x, y: _comparison("!=", x, y),
-    np.logical_and: lambda x, y: x & y,
-    np.logical_or: lambda x, y: x | y,
-    np.logical_not: lambda x: ~x,
-    np.bitwise_and: lambda x, y: x & y,
-    np.bitwise_or: lambda x, y: x | y,
-    np.invert: lambda x: ~x,
-    np.deg2rad: lambda x: x * (math.pi / 180),
-    np.rad2deg: lambda x: x * (180 / math.pi),
-    np.radians: lambda x: x * (math.pi / 180),
-    np.degrees: lambda x: x * (180 / math.pi),
-    np.arcsin: _library("asin"),
-    np.arccos: _library("acos"),
-    np.arctan: _library("atan"),
-    np.arctan2: _library("atan2"),
-    **{getattr(np, name): _library(name) for name in LIBRARY},
-}
-"""NumPy's functions of numbers that work on values."""
-
-FUNCTIONS: dict[Any, Callable[..., Any]] = {
-    np.where: where,
-    np.clip: clip,
-    np.select: _select,
-    np.real: lambda z: z.real if isinstance(z, Plane) else z,
-    np.imag: lambda z: z.imag if isinstance(z, Plane) else full(0.0, z.n),
-    np.angle: lambda z: _library("atan2")(z.b, z.a),
-    np.zeros_like: lambda x: full(0.0, x.n),
-    np.ones_like: lambda x: full(1.0, x.n),
-    np.full_like: _full_like,
-}
-"""NumPy's other functions that do."""

@@ -123,7 +123,8 @@ def test_scores_on_the_page_are_those_of_the_file(folder, report):
 
 def test_pictures_films_and_versions_of_a_quick_run(report):
     assert "Quick run." in report.text
-    for word in ("python 3.", "numpy ", "gymnasium ", "llvmlite ", "stable-baselines3 ", "torch ", "hoof-env "):
+    packages = ("numpy", "gymnasium", "llvmlite", "stable-baselines3", "torch", "hoof-env")
+    for word in ("python 3.", *(f"{package} " for package in packages)):
         assert word in report.text
     assert {"figure1", "figure3", "figure4", "figure5", "figure6", "curve"} <= set(report.ids)
     assert report.tags.count("video") == 5

@@ -15,8 +15,8 @@ LEG, HORSE = "hoof_env/HorseLeg-v0", "hoof_env/Horse-v0"
 FLAT, HILLS = None, {"kind": "hills", "seed": 1, "rise": 0.02}
 RANGES = {
     "trunk_mass": (40.0, 90.0), "trunk_share": (0.5, 0.9), "trunk_stiffness": (1e3, 4e3),
-    "trunk_damping": (100.0, 300.0), "trunk_drag": (0.0, 5.0), "stiffness": (2e4, 3e5), "restitution": (0.2, 0.9),
-    "approach_floor": (1e-4, 1e-2), "friction": (0.2, 0.8), "friction_slow": (1e-3, 2e-3),
+    "trunk_damping": (100.0, 300.0), "trunk_drag": (0.0, 5.0), "stiffness": (2e4, 3e5),
+    "restitution": (0.2, 0.9), "approach_floor": (1e-4, 1e-2), "friction": (0.2, 0.8), "friction_slow": (1e-3, 2e-3),
     "friction_fast": (1e-2, 2e-2), "motor_gain": (20.0, 60.0), "motor_torque": (200.0, 500.0),
 }  # fmt: skip
 """A range of each setting that may change for an episode."""
@@ -37,7 +37,8 @@ def drawn(generator, is_horse):
         {"noise": {"gait": steep}},
         {"noise": None, "bias": {"gait": steep}},
         {"reward_weights": {"peak": float(generator.uniform(0, 3))}},
-        {"randomize": {"friction": (0.3, 0.3 + steep)}, "strength": float(generator.uniform(0, 2)), "schedule": None},
+        {"randomize": {"friction": (0.3, 0.3 + steep)}},
+        {"strength": float(generator.uniform(0, 2)), "schedule": None},
         {"schedule": {"strength": [0.0, 1.0, int(generator.integers(1, 50))]}, "strength": 1.0},
         {"push_impulse": float(generator.uniform(0, 20)), "push_seconds": (0.1, 0.3)},
         {"target_speed": (1.0, float(generator.uniform(1.5, 3.0)))},

@@ -11,7 +11,8 @@ from hypothesis.extra.numpy import arrays
 
 from hoof_env.simd import Matrix, loop, read, vector, write
 from hoof_env.simd.compile import Kernel
-from hoof_env.simd.values import FUNCTIONS, LIBRARY, UFUNCS, Lanes
+from hoof_env.simd.numpy_functions import LIBRARY
+from hoof_env.simd.values import FUNCTIONS, UFUNCS, Lanes
 
 WIDTH = 16
 SPECIAL = (
