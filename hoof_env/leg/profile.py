@@ -14,7 +14,7 @@ Everything is in the frame of the leg with O at the origin, after the mirror int
 from __future__ import annotations
 
 from functools import lru_cache
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,9 +28,6 @@ from hoof_env.simd.machines import CURRENT
 from hoof_env.simd.math import ROUNDER
 from hoof_env.simd.memory import Pointer, read
 from hoof_env.simd.values import Index, Lanes, full, transposed
-
-if TYPE_CHECKING:  # its rows have those of this module
-    from hoof_env.dynamics.layout import LegRows
 
 
 class Functions(Layout):
@@ -310,7 +307,10 @@ def _polynomials(rows: list[Any], angles: list[Any], first: int, last: int) -> t
     return values, slopes
 
 
-def locate(leg: LegRows, cells: Lanes | float) -> None:
+# `leg` is rows of a `dynamics.layout.LegRows`, which this room below the mechanics does not import
+
+
+def locate(leg: Any, cells: Lanes | float) -> None:
     """Find in which of `cells` of its table the crank angle of a leg is, and how far from its middle.
 
     To be asked some while before `look_up`, which waits for the answer. What is not a number is in some cell,
@@ -324,18 +324,17 @@ def locate(leg: LegRows, cells: Lanes | float) -> None:
     leg.cell_angle = angle - cell * (TURN / cells)
 
 
-def look_up(leg: LegRows, table: Pointer) -> None:
+def look_up(leg: Any, table: Pointer) -> None:
     """Fill a leg's functions and slopes, see `Functions`, where `locate` found its crank angle to be; what is
     not a number gives values that are none."""
-    rows: Any = leg
-    machine, fields, lanes = CURRENT.machine, rows._layout.fields, max(rows._n, 1)
+    machine, fields, lanes = CURRENT.machine, leg._layout.fields, max(leg._n, 1)
     values, slopes = fields["functions"].start, fields["slopes"].start
     if machine.runs_now:
-        _look_up_now(rows, table, values, slopes)
+        _look_up_now(leg, table, values, slopes)
         return
 
     def loaded(name: str, kind: str, per_lane: int) -> list[str]:  # one by one: each is needed in all lanes
-        first = rows._at(fields[name].start)
+        first = leg._at(fields[name].start)
         return [machine.load(machine.at(first, per_lane * lane, kind), kind) for lane in range(lanes)]
 
     # What was added to the number of a row's first element is in the upper half of its bits.
@@ -346,7 +345,7 @@ def look_up(leg: LegRows, table: Pointer) -> None:
     others, _ = _polynomials(places, angles, SLOPED, FUNCTIONS)
     for first, found in ((values, sloped), (values + SLOPED, others), (slopes, derivatives)):
         for k, column in enumerate(transposed(found)):
-            leg[first + k] = Lanes(column.x, rows._n)
+            leg[first + k] = Lanes(column.x, leg._n)
 
 
 def _look_up_now(leg: Any, table: Pointer, values: int, slopes: int) -> None:

@@ -16,8 +16,9 @@ FLAT, HILLS = None, {"kind": "hills", "seed": 1, "rise": 0.02}
 RANGES = {
     "trunk_mass": (40.0, 90.0), "trunk_share": (0.5, 0.9), "trunk_stiffness": (1e3, 4e3),
     "trunk_damping": (100.0, 300.0), "trunk_drag": (0.0, 5.0), "stiffness": (2e4, 3e5),
-    "restitution": (0.2, 0.9), "approach_floor": (1e-4, 1e-2), "friction": (0.2, 0.8), "friction_slow": (1e-3, 2e-3),
-    "friction_fast": (1e-2, 2e-2), "motor_gain": (20.0, 60.0), "motor_torque": (200.0, 500.0),
+    "restitution": (0.2, 0.9), "approach_floor": (1e-4, 1e-2), "friction": (0.2, 0.8),
+    "friction_slow": (1e-3, 2e-3), "friction_fast": (1e-2, 2e-2), "motor_gain": (20.0, 60.0),
+    "motor_torque": (200.0, 500.0),
 }  # fmt: skip
 """A range of each setting that may change for an episode."""
 
