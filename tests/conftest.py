@@ -41,7 +41,7 @@ LONGEST = (
     "agents/test_demo.py",
     "view/test_tab.py",
     "paper/test_figures.py",
-    "simd/test_cache.py",
+    "simd/test_oracle.py",
     "dynamics/test_animal.py",
     "test_typing.py",
     "ecosystem/test_gymnasium.py",

@@ -2,7 +2,6 @@
 
 import json
 import re
-import runpy
 from importlib import import_module
 from pathlib import Path
 
@@ -19,8 +18,8 @@ PAGES = sorted([*ROOT.glob("*.md"), *(page for folder in FOLDERS for page in (RO
 LIVE = [page for page in PAGES if "evidence" not in page.parts]
 """Frozen pages name the commands of their commits."""
 HAND_WRITTEN = (
-    "agents", "decisions", "elasticity", "engine", "help", "horse", "own_task", "paper", "parameters",
-    "project", "start", "task", "view",
+    "agents", "decisions", "elasticity", "engine", "help", "horse", "look_inside", "own_task", "paper",
+    "parameters", "project", "start", "task", "view",
 )  # fmt: skip
 BLOCK = re.compile(r"^```(\w*)\n(.*?)^```", re.MULTILINE | re.DOTALL)
 EXAMPLES = [
@@ -187,9 +186,20 @@ def test_it_can_fail(tmp_path):
     assert list(broken(page)) == ["none.md", "#two"]
 
 
-def test_the_example_of_side_by_side_numbers_runs(tmp_path):
+def test_the_examples_of_side_by_side_numbers_run():
     text = (ROOT / "hoof_env/simd/README.md").read_text(encoding="utf-8")
-    (code,) = re.findall(r"```python\n(.*?)```", text, re.DOTALL)
-    (tmp_path / "balls.py").write_text(code, encoding="utf-8")  # kernels need a file, a new one no cache
-    space = runpy.run_path(str(tmp_path / "balls.py"))
-    assert (space["balls"][space["Ball"].rows("bounces")] == 1.0).all()
+    space = {"__name__": "page"}
+    exec("\n".join(code for kind, code in BLOCK.findall(text) if kind == "python"), space)
+    assert (space["balls"][space["Ball"].rows("bounces")] == 2.0).all()
+    assert space["motion"]["toe_normal"].max() > 0
+
+
+def test_the_landing_on_the_page_is_the_one_that_its_code_prints(capsys):
+    blocks = BLOCK.findall((ROOT / "docs" / "look_inside.md").read_text(encoding="utf-8"))
+    exec("\n".join(code for kind, code in blocks if kind == "python"), {})
+    printed = capsys.readouterr().out.splitlines()
+    assert len(printed) == 21
+    (told,) = (code.splitlines() for kind, code in blocks if kind == "text" and code.startswith("toe"))
+    shown = [line for line in told if line != "..."]
+    assert len(shown) >= 6
+    assert [line for line in printed if line in shown] == shown

@@ -339,7 +339,7 @@ def look_up(leg: LegRows, table: Pointer) -> None:
         return [machine.load(machine.at(first, per_lane * lane, kind), kind) for lane in range(lanes)]
 
     # What was added to the number of a row's first element is in the upper half of its bits.
-    begins = [machine.new(f"zext i32 {begin} to i64") for begin in loaded("row_begin", "i32", 2)]
+    begins = [machine.widened(begin) for begin in loaded("row_begin", "i32", 2)]
     places = [table + Index(begin) for begin in begins]
     angles = [Lanes(x, 0) for x in loaded("cell_angle", "double", 1)]
     sloped, derivatives = _polynomials(places, angles, 0, SLOPED)

@@ -15,13 +15,15 @@ import os
 import threading
 from collections import deque
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, contextmanager
 from functools import cache
 from typing import Any, get_type_hints
 from weakref import WeakValueDictionary
 
 import llvmlite.binding as llvm
 import numpy as np
+from llvmlite.binding.ffi import ObjectRef
+from llvmlite.binding.newpassmanagers import NewPassManager
 
 from hoof_env.errors import HoofEnvError
 from hoof_env.simd import objects
@@ -98,7 +100,11 @@ def optimised(text: str, machine: Any = None) -> Any:
     tuning = llvm.create_pipeline_tuning_options(speed_level=LEVEL)
     tuning.loop_vectorization = tuning.slp_vectorization = False
     passes = llvm.create_pass_builder(machine, tuning)
-    passes.getModulePassManager().run(module, passes)
+    manager = passes.getModulePassManager()
+    manager.run(module, passes)
+    # llvmlite 0.50 forgets it: its class has the `_dispose` of the base that does nothing
+    if type(manager)._dispose is ObjectRef._dispose:
+        NewPassManager._dispose(manager)
     return module
 
 
@@ -218,7 +224,7 @@ class Kernel:
 
     def run_now(self, *arguments: Any, exact: bool = True) -> Any:
         """Run the kernel on NumPy, step by step, as a debugger can follow; see `machines.Eager`."""
-        return run_now(self, *arguments, exact=exact)
+        return _run(self.function, self.parameters, arguments, Eager(exact))
 
 
 _CTYPES: dict[Any, list[Any]] = {
@@ -267,17 +273,6 @@ def traced(function: Callable[..., Any], parameters: Sequence[Parameter]) -> tup
         return machine.text("kernel", declared, kind), ctype
 
 
-def run_now(kernel: Kernel, *arguments: Any, exact: bool = True) -> Any:
-    """Run a kernel on NumPy: the same source, one operation after the other, on arrays.
-
-    Args:
-        kernel: the kernel.
-        arguments: as for a call of it.
-        exact: see `machines.Eager`.
-    """
-    return _run(kernel.function, kernel.parameters, arguments, Eager(exact))
-
-
 def _run(
     function: Callable[..., Any], parameters: Sequence[Parameter], arguments: Sequence[Any], machine: Any
 ) -> Any:
@@ -298,8 +293,9 @@ def _run(
         return int(result.x) if isinstance(result, Mask) else result
 
 
-# A block in which kernels run on NumPy. A caller may have kept a kernel's `call`, to save what a check
-# costs; so the functions of ctypes change their class while there is such a block, and only then.
+# Blocks in which kernels are not run as machine code. A caller may have kept a kernel's `call`, to save
+# what a check costs; so the functions of ctypes change their class while there is such a block, and only
+# then.
 
 
 class _Here(threading.local):
@@ -311,15 +307,21 @@ _CALLS: WeakValueDictionary[int, Any] = WeakValueDictionary()
 _BLOCKS: list[Any] = []
 
 
-@contextmanager
-def on_numpy(exact: bool = True) -> Iterator[None]:
+def on_numpy(exact: bool = True) -> AbstractContextManager[None]:
     """Let every kernel that this thread calls in the block run on NumPy, where a debugger can follow: slower
-    by ten thousand times, with the same bits. Threads that share the environments of a call wait meanwhile.
+    by ten thousand times, with the same bits.
 
     Args:
         exact: False for products that are rounded before they enter a sum: twice as fast, other last digits.
     """
-    before, machine = _HERE.machine, Eager(exact)
+    return on_machine(Eager(exact))
+
+
+@contextmanager
+def on_machine(machine: Any) -> Iterator[None]:
+    """Let every kernel that this thread calls in the block run on a machine that computes at once, `Eager` or
+    one like it. This thread makes all calls, also those that several would share."""
+    before = _HERE.machine
     with _LOCK:
         _BLOCKS.append(machine)
         _watch()
@@ -333,8 +335,8 @@ def on_numpy(exact: bool = True) -> Iterator[None]:
             _watch()
 
 
-def is_on_numpy() -> bool:
-    """Return True in a block of `on_numpy`."""
+def is_on_machine() -> bool:
+    """Return True in a block of `on_numpy` or `on_machine`."""
     return _HERE.machine is not None
 
 

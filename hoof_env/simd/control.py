@@ -10,10 +10,6 @@ from hoof_env.simd.machines import CURRENT, wide
 from hoof_env.simd.values import Index, Lanes, Mask, Plane, Truth, Whole, full, rounded, word
 
 
-class Always:
-    """Condition of a machine without branches, such as JAX under `jit`: what may be skipped always runs."""
-
-
 def _is_known(condition: Any) -> bool:
     return not isinstance(condition, Mask) or CURRENT.machine.runs_now
 
@@ -37,7 +33,7 @@ def cond(condition: Truth, then: Callable[[], Any], otherwise: Any) -> Any:
     """Return what `then` returns where a condition holds that all lanes share, else `otherwise`: a value or a
     tuple of values, or a function that returns them. The result enters sums rounded."""
     if _is_known(condition):
-        if isinstance(getattr(condition, "x", None), Always) or condition:
+        if condition:
             return rounded(then())
         return rounded(otherwise() if callable(otherwise) else otherwise)
     machine = CURRENT.machine

@@ -14,7 +14,7 @@ from itertools import pairwise, starmap
 from typing import Any
 
 from hoof_env.errors import ParameterError, count
-from hoof_env.simd.compile import Kernel, is_on_numpy
+from hoof_env.simd.compile import Kernel, is_on_machine
 
 MOST_THREADS = 1024
 """Largest number of threads."""
@@ -72,7 +72,7 @@ def run_together(kernel: Any, calls: Sequence[tuple[Any, ...]], num_threads: int
     The calling thread is one of the threads. All calls have ended when this returns, and when it raises, as
     at Ctrl-C.
     """
-    if num_threads == 1 or len(calls) == 1 or is_on_numpy():
+    if num_threads == 1 or len(calls) == 1 or is_on_machine():
         return [kernel(*call) for call in calls]
     # one thread compiles a kernel, not each of them
     if isinstance(kernel, Kernel) and kernel.call is None:

@@ -37,6 +37,9 @@ class Value:
         has = f"it has {', '.join(self.fields)}" if self.fields else "it has none"
         raise AttributeError(f"{self.kind} has no field {name!r}; {has}")
 
+    def __repr__(self) -> str:
+        return f"<{self.kind} that is known when the kernel runs>"
+
     def __bool__(self) -> bool:
         raise TraceError(
             f"`if`, `while`, `and`, `or`, `not`, min() or max() of {self.kind}, which is known only when"
@@ -54,8 +57,9 @@ class Value:
 
     def _no_number(self) -> NoReturn:
         raise TraceError(
-            f"float(), int(), range(), an index or a function of `math` of {self.kind}, which is known only when"
-            " the kernel runs: write NumPy's function, such as np.exp or np.sqrt, and np.where for a choice"
+            f"float(), int(), range(), an index or a function of `math` of {self.kind}, which is known only"
+            " when the kernel runs: write NumPy's function, such as np.exp or np.sqrt, and np.where for a"
+            " choice"
         )
 
     def __float__(self) -> float:
@@ -72,7 +76,8 @@ class Value:
 
     def __array__(self, *arguments: Any, **named: Any) -> Any:
         raise TraceError(
-            f"an array of NumPy with {self.kind}: a kernel has numbers only, so write out the operations on each"
+            f"an array of NumPy with {self.kind}: a kernel has numbers only, so write out the operations on"
+            " each"
         )
 
     def __array_ufunc__(self, ufunc: Any, method: str, *inputs: Any, **named: Any) -> Any:
@@ -105,8 +110,8 @@ def _single(x: Any) -> Any:
     if isinstance(x, np.ndarray):
         if x.ndim:
             raise TraceError(
-                f"an array of NumPy, of shape {x.shape}, in an operation with a value of a kernel, which is one"
-                " number: take its elements"
+                f"an array of NumPy, of shape {x.shape}, in an operation with a value of a kernel, which is"
+                " one number: take its elements"
             )
         return x.item()
     return x
@@ -132,6 +137,9 @@ class Lanes(Value):
         self.x = x
         self.n = n
         self.factors = factors
+
+    def __repr__(self) -> str:
+        return f"Lanes({self.x})"
 
     @overload
     def __add__(self, other: Number) -> Lanes: ...
@@ -221,6 +229,9 @@ class Mask(Value):
         self.x = x
         self.n = n
 
+    def __repr__(self) -> str:
+        return f"Mask({self.x})"
+
     def __and__(self, other: Truth) -> Mask:
         return self._with("and", other)
 
@@ -286,9 +297,12 @@ class Mask(Value):
     def __truediv__(self, other: Number) -> Lanes:
         return self.to_real() / other
 
+    def __rtruediv__(self, other: Number) -> Lanes:
+        return other / self.to_real()
+
     def __bool__(self) -> bool:
         if CURRENT.machine.runs_now and not self.n:
-            return bool(self.x)
+            return CURRENT.machine.truth(self.x)
         return super().__bool__()
 
     def to_whole(self) -> Index:
@@ -306,6 +320,9 @@ class Plane(Value):
     def __init__(self, a: Lanes, b: Lanes) -> None:
         self.a = a
         self.b = b
+
+    def __repr__(self) -> str:
+        return f"Plane({self.a.x}, {self.b.x})"
 
     @property
     def n(self) -> int:
@@ -405,6 +422,18 @@ class Index(Value):
 
     def __neg__(self) -> Any:
         return self._with("sub", 0, self)
+
+    def __truediv__(self, other: Number) -> Lanes:
+        return self.to_real() / other
+
+    def __rtruediv__(self, other: Number) -> Lanes:
+        return other / self.to_real()
+
+    def __pow__(self, power: Number) -> Lanes:
+        return _power(self.to_real(), power)
+
+    def __rpow__(self, base: Number) -> Lanes:
+        return _power(base, self.to_real())
 
     def __mod__(self, other: int) -> Any:
         """Return the rest of a number that is not negative."""
@@ -855,7 +884,14 @@ def _quotient_and_rest(x: Any, y: Any) -> tuple[Any, Any]:
 
 
 def _divided(x: Any, y: Any) -> Any:
-    return x / y if isinstance(x, Value) or not isinstance(y, Lanes) else y.__rtruediv__(x)
+    return x / y if isinstance(x, Value) or not isinstance(y, (Lanes, Mask)) else y.__rtruediv__(float(x))
+
+
+def _select(conditions: Any, choices: Any, default: Any = 0.0) -> Any:
+    chosen = default
+    for condition, choice in zip(reversed(conditions), reversed(choices), strict=True):
+        chosen = where(condition, choice, chosen)
+    return chosen
 
 
 def _copysign(x: Any, y: Any) -> Any:
@@ -935,6 +971,7 @@ UFUNCS: dict[Any, Callable[..., Any]] = {
 FUNCTIONS: dict[Any, Callable[..., Any]] = {
     np.where: where,
     np.clip: clip,
+    np.select: _select,
     np.real: lambda z: z.real if isinstance(z, Plane) else z,
     np.imag: lambda z: z.imag if isinstance(z, Plane) else full(0.0, z.n),
     np.angle: lambda z: _library("atan2")(z.b, z.a),

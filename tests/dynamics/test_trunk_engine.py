@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from hoof_env.dynamics.engine import TrunkEngine
 from hoof_env.dynamics.parts import TRUNKS, HoofSpring, Limb, Limits, Motor, Prescribed, Result, Trunk
 from hoof_env.dynamics.tally import tally_of
-from hoof_env.gait import FILTER, LIMITS, FilterSettings, GaitParameters, command_filters, parameter_names
+from hoof_env.gait import LIMITS, Filter, FilterSettings, GaitParameters, command_filters, parameter_names
 from hoof_env.ground.contact import Ground
 from hoof_env.ground.laws import FRICTION_LAWS
 from hoof_env.ground.terrain import Terrain
@@ -109,13 +109,14 @@ def put_somewhere(engine, rng, depth):
 def oracle(engine, horse, e):
     """`PlainHorse.at` where environment `e` is."""
     s, r = engine.state, engine.report
-    filters = np.zeros((len(engine.limbs), engine.features.gait_size), FILTER)
-    command, bounds = engine.get_state()["command"], engine.filters.to_array()
-    for k, name in enumerate(parameter_names(engine.features.harmonics)):
-        filters[:, k]["value"], filters[:, k]["rate"] = s[name][:, e], s[f"{name}_rate"][:, e]
-    for i, row in enumerate(filters):
-        command_filters(row, command[i, :, e], bounds)
-    steady = np.stack([filters["value"], filters["rate"], filters["acc"]], axis=-1)
+    names = parameter_names(engine.features.harmonics)
+    bounds = engine.filters.to_array().tolist()
+    bounds += bounds[-1:] * (len(names) - len(bounds))  # higher harmonics have the filters of the first
+    steady = np.zeros((len(engine.limbs), len(names), 3))
+    for i, command in enumerate(engine.get_state()["command"][..., e].tolist()):
+        filters = [Filter(float(s[name][i, e]), float(s[f"{name}_rate"][i, e])) for name in names]
+        command_filters(filters, command, bounds)
+        steady[i] = [(one.value, one.rate, one.acc) for one in filters]
     slowness = np.stack(
         [s["toe_inverse_approach_speed"][:, e], s["heel_inverse_approach_speed"][:, e]], axis=1
     )

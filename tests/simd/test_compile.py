@@ -16,7 +16,8 @@ import numpy as np
 import pytest
 
 from benchmarks.scenes import engine, scenes
-from hoof_env.dynamics.advance import ONE_BY_ONE, SIDE_BY_SIDE, EngineKind, new_kernel, static_of
+from hoof_env.dynamics.advance import ONE_BY_ONE, SIDE_BY_SIDE, EngineKind, new_kernel
+from hoof_env.dynamics.model import static_of
 from hoof_env.simd import (
     Matrix,
     Number,
@@ -29,8 +30,8 @@ from hoof_env.simd import (
     write,
 )
 from hoof_env.simd import compile as compile_module
-from hoof_env.simd.compile import CompilerError, Kernel, kernel, traced
-from hoof_env.simd.values import FUNCTIONS, UFUNCS, Mask, TraceError
+from hoof_env.simd.compile import CompilerError, kernel, traced
+from hoof_env.simd.values import TraceError
 from tests.simd.assembly import assembly_of, object_for, text_of
 from tests.simd.processes import ended, start_python
 
@@ -61,9 +62,9 @@ def test_a_kernel_takes_and_returns_numbers_whole_numbers_and_truths():
         assert type(run(*arguments)) is type(run.run_now(*arguments))
 
 
-@pytest.mark.parametrize("arguments", [(), (1.0, 2.0), ("x",), (None,), ([1.0],)])
+@pytest.mark.parametrize("arguments", [(), ("x",), (None,), ([1.0],)])
 def test_wrong_arguments_are_refused(arguments):
-    with pytest.raises((ValueError, ctypes.ArgumentError), match=r"argument 1|shorter|longer"):
+    with pytest.raises((TypeError, ctypes.ArgumentError), match=r"at least 1 argument|argument 1"):
         twice(*arguments)
 
 
@@ -89,13 +90,13 @@ def test_an_array_that_it_would_misread_is_refused(array):
         (lambda x: [1.0, 2.0][x], "float.., int"),
         (lambda x: sum(x), "a loop over a number"),
         (lambda x: len(x), "len.. of a number"),
-        (lambda x: np.array(x), "cannot become an array"),
-        (lambda x: np.sort(x), "np.sort of a number: kernels have np.clip"),
+        (lambda x: np.array(x), "an array of NumPy with a number"),
+        (lambda x: np.sort(x), "np.sort of a number: kernels have np.absolute"),
         (lambda x: np.add.reduce(x), "np.add.reduce of a number: kernels have"),
         (lambda x: np.add(x, 1.0, where=True), "np.add with where of a number"),
         (lambda x: where(x, 1.0, 2.0), "where.. of a number: expected a condition"),
-        (lambda x: where(x > 0.0, None, 2.0), "where.. of NoneType: expected two numbers"),
-        (lambda x: x + np.arange(3.0), "an array of NumPy with a number of a kernel: expected numbers"),
+        (lambda x: where(x > 0.0, None, 2.0), "where.. of nothing: expected two numbers"),
+        (lambda x: x + np.arange(3.0), "an array of NumPy, of shape .3,., in an operation"),
     ],
 )
 def test_what_a_kernel_cannot_do_is_refused_in_words(wrong, words):
@@ -104,60 +105,6 @@ def test_what_a_kernel_cannot_do_is_refused_in_words(wrong, words):
 
     with pytest.raises(TraceError, match=words):
         kernel(refused).compile()
-
-
-NAMES = sorted(
-    {function.__name__ for function in (*UFUNCS, *FUNCTIONS)} - {"zeros_like", "ones_like", "full_like"}
-)
-TRUTHS = ("logical_and", "logical_or", "logical_not", "bitwise_and", "bitwise_or", "invert")
-EXACT = (
-    "add", "subtract", "multiply", "divide", "negative", "positive", "absolute", "fabs", "sqrt", "square",
-    "reciprocal", "floor", "ceil", "minimum", "maximum", "sign", "copysign", "isnan", "isfinite", "less",
-    "less_equal", "greater", "greater_equal", "equal", "not_equal", "where", "clip",
-)  # fmt: skip
-
-
-@pytest.mark.parametrize("name", NAMES)
-def test_functions_of_numpy_work_in_kernels(name):
-    function = getattr(np, name)
-    count = {"where": 3, "clip": 3}.get(name) or function.nin
-    rng = np.random.default_rng(0)
-    given = rng.uniform(-0.9, 0.9, (3, 16)) if "arc" in name else rng.uniform(-3, 3, (3, 16))
-    if name in ("log", "log2", "log10", "power", "float_power"):
-        given[0] = abs(given[0])
-    if name == "log1p":
-        given = abs(given)
-    if name in EXACT:
-        given[:, :4] = [[np.nan, -0.0, np.inf, 1.0], [1.0, 0.0, -1.0, np.nan], [1.0, 1.0, 1.0, 1.0]]
-    if name == "clip":
-        given[1], given[2] = -1.0, 1.0
-
-    def result(values):
-        if name in TRUTHS or name == "where":
-            first = [value > 0.0 for value in values[: 1 if name == "where" else count]]
-            values = [*first, *values[len(first) : count]]
-        found = function(*values[:count])
-        is_truth = isinstance(found, Mask) or getattr(found, "dtype", None) == np.dtype(bool)
-        return where(found, 1.0, 0.0) if is_truth else found
-
-    for lanes in (1, 8):
-
-        def work(x: Matrix, out: Matrix, lanes=lanes) -> None:
-            for n in loop(0, x.shape[1], lanes):
-                write(result([read(x.first, n + k * 16, 1, lanes) for k in range(3)]), out.first, n, 1)
-
-        made = Kernel(work, [Matrix, Matrix])
-        out, now = np.zeros((2, 16))
-        made(given, out)
-        made.run_now(given, now)
-        assert out.tobytes() == now.tobytes() or name not in EXACT
-        np.testing.assert_array_equal(out, now)
-        with np.errstate(all="ignore"):
-            wanted = np.asarray(result(list(given)), float)
-        if name in EXACT:
-            np.testing.assert_array_equal(out, wanted)
-        else:
-            np.testing.assert_allclose(out, wanted, rtol=1e-14)
 
 
 @pytest.mark.parametrize("power", [0.5, 1, 2, 3, 7.0, 16, 17, 0, -1, 2.5, np.float64(3.0), np.int64(2)])
@@ -175,7 +122,7 @@ def test_powers(power):
 
 
 def test_a_kernel_without_an_end_is_refused_before_memory_is_gone(monkeypatch):
-    monkeypatch.setattr("hoof_env.simd.machines.MOST_LINES", 5000)
+    monkeypatch.setattr("hoof_env.simd.machines.MOST_LINES", 5000)  # of the machine that is made next
 
     @kernel
     def endless(x: Number) -> Number:
@@ -330,7 +277,7 @@ def test_an_environment_goes_on_in_a_child():
         found = env.step(action)[0].tobytes()
         again = gym.make("hoof_env/HorseLegTerrain-v0").reset(seed=0)[0].tobytes()
         name = "child" if child == 0 else "parent"
-        print(name, (found + again).hex(), flush=True)
+        os.write(1, f"{name} {(found + again).hex()}\\n".encode())  # at once, not mixed with the other's
         if child == 0:
             os._exit(0)
         assert os.waitpid(child, 0)[1] == 0
@@ -410,7 +357,7 @@ MAGIC = {"linux": b"\x7fELF", "apple": b"\xcf\xfa\xed\xfe", "windows": b"\x64\x8
 
 def real_kernel(arrangement):
     made = engine(scenes("identified")["horse"], "identified")
-    kind = EngineKind(made.features, None, static_of(made._model[0]), False)
+    kind = EngineKind(made.features, None, static_of(made.arrays[1]))
     return new_kernel(kind, arrangement)
 
 

@@ -15,8 +15,8 @@ from hoof_env.simd.values import FUNCTIONS, LIBRARY, UFUNCS, Lanes
 
 WIDTH = 16
 SPECIAL = (
-    0.0, -0.0, 1.0, -1.0, 0.5, 2.0, 3.0, np.inf, -np.inf, np.nan, 5e-324, -5e-324, 2.2e-308, 1e-310, 1e300, -1e300,
-    0.1, 1e16, 709.5, -745.0, np.pi, 1 + 2**-52,
+    0.0, -0.0, 1.0, -1.0, 0.5, 2.0, 3.0, np.inf, -np.inf, np.nan, 5e-324, -5e-324, 2.2e-308, 1e-310, 1e300,
+    -1e300, 0.1, 1e16, 709.5, -745.0, np.pi, 1 + 2**-52,
 )  # fmt: skip
 
 
@@ -119,6 +119,8 @@ EXACT = {
     "y - truth": lambda x, y: y - (x > 0),
     "1 - truth": lambda x, y: 1 - (x > 0),
     "truth / y": lambda x, y: (x > 0) / y,
+    "2 / truth": lambda x, y: 2.0 / (x > 0),
+    "np.divide by a truth": lambda x, y: np.divide(2.0, x > 0),
     "truth + truth": lambda x, y: number((x > 0) + (y > 0)),
     "truth * truth": lambda x, y: number((x > 0) * (y > 0)),
     "np.where": lambda x, y: np.where(x < y, x, y),
@@ -127,6 +129,8 @@ EXACT = {
     "np.where of a truth": lambda x, y: np.where(x > 0, y > 0, 0.5),
     "np.where known": lambda x, y: np.where(True, x, y),
     "np.where of a number known": lambda x, y: np.where(0.0, x, y) + 0.0,
+    "np.select": lambda x, y: np.select([x > 1, x > 0], [x, y], 0.5),
+    "np.select, 0 else": lambda x, y: np.select([x > 1, x > 0], [1.0, y]),
     "np.zeros_like": lambda x, y: np.zeros_like(x),
     "np.ones_like": lambda x, y: np.ones_like(x),
     "np.full_like": lambda x, y: np.full_like(x, 0.3),

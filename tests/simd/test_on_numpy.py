@@ -2,6 +2,7 @@
 
 import sys
 import threading
+from typing import Annotated
 
 import gymnasium as gym
 import numpy as np
@@ -9,9 +10,10 @@ import pytest
 
 from benchmarks.scenes import engine, scenes
 from hoof_env.dynamics import hoof
-from hoof_env.simd import Matrix, Number, loop, on_numpy, read, where, write
+from hoof_env.simd import Matrix, Number, loop, new_rows, on_numpy, read, vector, where, write
 from hoof_env.simd import compile as compile_module
-from hoof_env.simd.compile import Kernel, is_on_numpy, kernel
+from hoof_env.simd.compile import Kernel, is_on_machine, kernel
+from hoof_env.simd.layout import Block, Layout, Row, Vector
 from hoof_env.simd.machines import CURRENT, Eager
 
 
@@ -33,11 +35,11 @@ def test_a_kernel_runs_on_numpy_in_the_block_only():
     assert work(2.0) == 6.0
     call = work.call
     with on_numpy():
-        assert is_on_numpy()
+        assert is_on_machine()
         assert work(2.0) == 6.0
         assert call(2.0) == 6.0
         assert type(work(2.0)) is float
-    assert not is_on_numpy()
+    assert not is_on_machine()
     assert work(2.0) == call(2.0) == 6.0
     assert seen == ["text", "number", "number", "number"]
 
@@ -62,12 +64,12 @@ def test_blocks_inside_blocks_and_errors_leave_it_as_it_was():
     with on_numpy():
         with on_numpy(exact=False):
             assert work.call(1.0) == 3.0
-        assert is_on_numpy()
+        assert is_on_machine()
         assert type(work.call) is not plain
         with pytest.raises(ZeroDivisionError), on_numpy():
             raise ZeroDivisionError
-        assert is_on_numpy()
-    assert not is_on_numpy()
+        assert is_on_machine()
+    assert not is_on_machine()
     assert type(work.call) is plain
 
 
@@ -79,7 +81,7 @@ def test_another_thread_runs_machine_code_meanwhile():
     seen.clear()
     found = []
     with on_numpy():
-        other = threading.Thread(target=lambda: found.append((work(2.0), call(2.0), is_on_numpy())))
+        other = threading.Thread(target=lambda: found.append((work(2.0), call(2.0), is_on_machine())))
         other.start()
         other.join()
         assert seen == []
@@ -142,8 +144,6 @@ def test_errors_are_those_of_the_source_with_its_lines():
 
 
 def test_a_row_that_was_never_written_is_an_error_where_it_is_used():
-    from hoof_env.simd import new_rows
-
     @kernel
     def careless(x: Matrix) -> None:
         rows = new_rows(None, 8, 2)
@@ -194,6 +194,40 @@ def test_a_debugger_sees_arrays_in_the_contact_of_an_environments_step():
     assert all(isinstance(x, np.ndarray) and x.shape == (1,) for pair in seen for x in pair)
     assert any(depth[0] > 0 and force[0] > 0 for depth, force in seen)
     assert all(force[0] == 0 for depth, force in seen if depth[0] <= 0)
+
+
+class Point(Layout):
+    place: Vector
+    depth: Row
+
+
+class Hoof(Layout):
+    toe: Point
+    loads: Annotated[Block, 2]
+
+
+def test_values_and_rows_are_printed_with_what_they_hold():
+    """Where a kernel is traced there is nothing to print yet but names."""
+    said = []
+
+    @kernel
+    def work(x: Matrix) -> None:
+        rows = new_rows(Hoof, 2)
+        rows.toe.place = vector(read(x.first, 0, 1, 2), 1.0)
+        rows.toe.depth = 0.5
+        said.extend(map(repr, (rows, rows.toe.place, rows.toe.depth, rows.toe.depth > 0.0)))
+
+    work.run_now(np.array([3.0, 4.0]))
+    assert said == [
+        "toe: \n  place: Plane([3. 4.], [1. 1.])\n  depth: Lanes([0.5 0.5])\nloads: rows of numbers",
+        "Plane([3. 4.], [1. 1.])",
+        "Lanes([0.5 0.5])",
+        "Mask([ True  True])",
+    ]
+    said.clear()
+    work(np.array([3.0, 4.0]))
+    assert said[0] == "rows of toe, loads"
+    assert said[1].startswith("Plane(%")
 
 
 @pytest.mark.parametrize("num_threads", [1, 2])

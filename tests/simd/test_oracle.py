@@ -144,7 +144,7 @@ FEATURES = {
     "Threlfall's friction": {"ground": {"friction_law": "threlfall", "exponent": 2.25}},
     "tanh friction": {"ground": {"friction_law": "tanh", "exponent": 1.0}},
     "dashpot": {"ground": {"normal_law": "kelvin-voigt", "exponent": 1.0, "restitution": 0.5}},
-    "sampled approach": {"ground": {"approach": "sampled", "restitution": 0.6}},
+    "sampled approach": {"ground": {"approach": "sampled"}},
 }
 
 
