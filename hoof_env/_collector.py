@@ -9,8 +9,8 @@ from contextlib import contextmanager
 
 @contextmanager
 def paused() -> Iterator[None]:
-    """Keep the collector off while many objects are made that stay, as in a compilation or in the import of
-    torch: it would take a fifth of the time and find nothing. Decorates functions, too."""
+    """Keep the collector off while many objects are made that stay, as in the import of torch: it would take
+    a fifth of the time and find nothing. Decorates functions, too."""
     collects = gc.isenabled()
     gc.disable()
     try:

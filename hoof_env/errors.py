@@ -47,7 +47,7 @@ class DataFileError(HoofEnvError, ValueError):
 
 
 class OutputError(HoofEnvError, OSError):
-    """Output or compile-cache folder that cannot be written."""
+    """Output file or folder that cannot be written."""
 
 
 LEAST = 1e-12
