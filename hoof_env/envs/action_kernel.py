@@ -1,4 +1,5 @@
-"""Parts of the kernels of a step that turn actions into commands: those of the body, or of a map of one's own."""
+"""Parts of the kernels of a step that turn actions into commands: those of the body, or of a map of one's
+own."""
 
 from __future__ import annotations
 
@@ -14,8 +15,8 @@ from hoof_env.tasks.own_parts import ActionMap
 
 
 def are_numbers(scene: Scene) -> Truth:
-    """Return True if all actions are finite, including those of other threads' blocks: either all threads take the
-    step, or none does."""
+    """Return True if all actions are finite, including those of other threads' blocks: either all threads
+    take the step, or none does."""
     total = Cell(0.0)  # stays 0 unless an action is infinite or not a number
     for k in loop(scene.columns * scene.kind.action_size):
         total.value = total.value + (scene.actions[k] - scene.actions[k])

@@ -12,8 +12,8 @@ from hoof_env.tasks.reward import Outcome, Term
 
 
 def is_user_term(term: Term) -> bool:
-    """Return True for a user's term, which may not handle the NaN of a failed simulation. It may have the name of
-    a term of this package, which it replaces."""
+    """Return True for a user's term, which may not handle the NaN of a failed simulation. It may have the
+    name of a term of this package, which it replaces."""
     return is_from_outside(term.compute)
 
 
@@ -52,5 +52,5 @@ def compute_user_term(scene: Scene, term: Term, k: int, outcome: Outcome, n: Who
 
 
 def clear_failed(outcome: Outcome, episode: Any, k: int) -> None:
-    """Set a term to 0 where the engine failed, for the reports that it may read are of the point of failure."""
+    """Set a term to 0 where the engine failed: reports that it may read are of the point of failure."""
     episode.terms[k] = where(has_moved(outcome.trunk.result), episode.terms[k], 0.0)

@@ -1,4 +1,5 @@
-"""Scene of the kernels of a control step: what a task's kernels are made of, and the memory on which they work."""
+"""Scene of the kernels of a control step: what a task's kernels are made of, and the memory on which they
+work."""
 
 from __future__ import annotations
 
@@ -29,12 +30,12 @@ STEP_ARRAYS = {
     "frames": "f4",
     "mapped": "f4",
 }
-"""Types of the arrays of a step, besides those of the engine. `acted` are the actions that act now, the same array
-as `actions` where nothing delays them; `mapped` are those of the body, the same array as `acted` without a map of
-one's own."""
+"""Types of the arrays of a step, besides those of the engine. `acted` are the actions that act now, the same
+array as `actions` where nothing delays them; `mapped` are those of the body, the same array as `acted`
+without a map of one's own."""
 
 CHANGING = ("episode_steps", "substeps", "part_substeps", "is_noisy")
-"""Whole numbers and truths of a task's record that kernels read when they run, since settings may change them."""
+"""Whole numbers and truths of a task's record that kernels read when they run: settings may change them."""
 
 
 def known_of(record: Any) -> tuple[tuple[str, Any], ...]:

@@ -22,6 +22,8 @@ from weakref import WeakValueDictionary
 
 import llvmlite.binding as llvm
 import numpy as np
+from llvmlite.binding.ffi import ObjectRef
+from llvmlite.binding.newpassmanagers import NewPassManager
 
 from hoof_env.errors import HoofEnvError
 from hoof_env.simd import objects
@@ -98,7 +100,11 @@ def optimised(text: str, machine: Any = None) -> Any:
     tuning = llvm.create_pipeline_tuning_options(speed_level=LEVEL)
     tuning.loop_vectorization = tuning.slp_vectorization = False
     passes = llvm.create_pass_builder(machine, tuning)
-    passes.getModulePassManager().run(module, passes)
+    manager = passes.getModulePassManager()
+    manager.run(module, passes)
+    # llvmlite 0.50 forgets it: its class has the `_dispose` of the base that does nothing
+    if type(manager)._dispose is ObjectRef._dispose:
+        NewPassManager._dispose(manager)
     return module
 
 

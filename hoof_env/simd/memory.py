@@ -289,8 +289,8 @@ class Rows:
 
     `locked` gives the same rows to functions that may not write them: `_open` is then None, or the names of
     the fields, one inside the other, of the rows that they may set nevertheless; else it is (). `_size` is
-    the number of rows and `_legs` that of equal layouts that follow each other, each None where it is not
-    known.
+    the number of rows and `_legs` that of equal layouts that follow each other, by which indices of such
+    functions are checked; None for rows of the package itself.
     """
 
     __slots__ = ("_empty", "_first", "_layout", "_legs", "_n", "_open", "_place", "_size")
@@ -304,7 +304,7 @@ class Rows:
         put(self, "_first", first)
         put(self, "_empty", is_empty)
         put(self, "_open", ())
-        put(self, "_size", None if layout is None else layout.size)
+        put(self, "_size", None)
         put(self, "_legs", None)
 
     @property
@@ -348,6 +348,13 @@ class Rows:
 
     # by number and by name
 
+    __hash__ = object.__hash__
+
+    def __eq__(self, other: object) -> bool:
+        if self._open != ():
+            raise TraceError(f"a comparison of memory with {kind_of(other)}: expected its numbers")
+        return self is other
+
     def __len__(self) -> int:
         if self._size is None:
             raise TypeError("these rows have no length")
@@ -388,18 +395,22 @@ class Rows:
             return vector(self._read(start), self._read(start + 1))
         if isinstance(kind, Named):
             return self._inside(name, self._part(start, kind))
-        part = self._inside(name, self._part(start, None, size == 0))
-        object.__setattr__(part, "_size", size)
-        return part
+        return self._inside(name, self._part(start, None, size == 0))
 
     def _inside(self, name: str, part: Any) -> Any:
-        """Return a part that may be written if this may."""
-        if self._open != ():
-            is_named = self._open is not None and self._open[0] == name
-            object.__setattr__(part, "_open", self._open[1:] if is_named else None)
-            room = self._layout.size - self._layout.fields[name].start
-            object.__setattr__(part, "_legs", room // max(part._size or 1, 1) if part._open != () else 1)
+        """Return a part that is checked, and may be written, if this is."""
+        if self._size is not None:
+            start, size, _ = self._layout.fields[name]
+            is_open = self._open is not None and self._open[:1] in ((), (name,))
+            part._check(size, self._open[1:] if is_open else None)
+            room = (self._layout.size - start) // max(size, 1)
+            object.__setattr__(part, "_legs", 1 if part._open == () else room)
         return part
+
+    def _check(self, size: int | None, may_set: tuple[str, ...] | None) -> None:
+        """Check indices, and refuse to set rows but those of the names `may_set`."""
+        object.__setattr__(self, "_size", size)
+        object.__setattr__(self, "_open", may_set)
 
     def __delattr__(self, name: str) -> NoReturn:
         refuse_write(f"{name!r}")
@@ -438,10 +449,10 @@ def locked(rows: Any, but: tuple[str, ...] = (), legs: int = 1) -> Any:
     """
     if isinstance(rows, Rows):
         made = object.__new__(type(rows))
-        for name in ("_place", "_n", "_layout", "_first", "_empty", "_size", "_row", "_stride"):
+        for name in ("_place", "_n", "_layout", "_first", "_empty", "_row", "_stride"):
             if hasattr(type(rows), name):
                 object.__setattr__(made, name, getattr(rows, name))
-        object.__setattr__(made, "_open", but or None)
+        made._check(rows._layout and rows._layout.size, but or None)
         object.__setattr__(made, "_legs", legs)
         return made
     if isinstance(rows, Pointer):
@@ -541,21 +552,22 @@ def columns(matrix: Matrix, lanes: int, layout: Any, column: Whole, row: Whole =
     """
     width = matrix.shape[1]
     place = CURRENT.machine.at(matrix.first.x, word(row * width + column), inbounds=False)
-    return Columns(place, lanes, layout, width, stride)
+    made = Columns(place, lanes, layout, width, stride)
+    return locked(made) if matrix.first.is_locked else made
 
 
 def block_at(first: AnyLayout, number: Whole) -> AnyLayout:
     """Return the rows of the `number`-th of several equal layouts, of which the first is given."""
     rows: Any = first
-    legs = rows._legs
-    if legs is not None:
+    is_checked, legs = rows._size is not None, rows._legs
+    if is_checked:
         number = _place(number, legs)
     if isinstance(number, int) and number == 0:
         return first
     part: Any = rows._part(number * rows._layout.size, rows._layout)
-    if legs is not None or rows._open != ():
-        object.__setattr__(part, "_open", rows._open)
-        object.__setattr__(part, "_legs", 1 if isinstance(number, Index) else (legs or number + 1) - number)
+    if is_checked:
+        part._check(rows._size, rows._open)
+        object.__setattr__(part, "_legs", 1 if isinstance(number, Index) else legs - number)
     return part
 
 
@@ -563,6 +575,7 @@ def load_rows(to: AnyLayout, start: AnyLayout) -> None:
     """Read columns into rows of the same layout."""
     rows: Any = to
     read_from: Any = start
+    rows._check_open("rows")
     for k in range(rows._layout.size):
         rows._write(k, read_from._read(k))
 
@@ -576,6 +589,7 @@ def apply_to_rows(rows: Any, count: int, function: Any, width: int) -> None:
     """Set each of the first rows, which have no names, to a function of it. Rows of one lane are taken
     `width` at
     a time: `count` is a multiple of it, and there is memory for as many."""
+    rows._check_open("rows")
     if rows._n == 1 and not CURRENT.machine.runs_now:
         rows = Rows(rows._place, width, None)
         count //= width

@@ -9,6 +9,7 @@ import os
 import re
 import sysconfig
 import traceback
+from collections import deque
 from collections.abc import Callable, Iterator, Mapping
 from functools import wraps
 from pathlib import Path
@@ -28,6 +29,12 @@ LIBRARIES = tuple(Path(sysconfig.get_path(name)) for name in ("stdlib", "purelib
 
 MOST_OPERATIONS = 200_000
 """Largest number of instructions of a user's function, some thousand times those of a term."""
+
+MOST_PARTS = 10_000
+"""Largest number of parts of a variable in which a value is looked for."""
+
+MOST_WORDS = 400
+"""Largest number of letters of an error that a user's function raises."""
 
 PLAIN_FLAGS = 0x0C | 0x20 | 0x80 | 0x200
 """Flags of code that a plain function lacks: of *args, **kwargs, generators and coroutines."""
@@ -151,19 +158,31 @@ def _kept_value(function: Any) -> str:
     would read it."""
     for each in _reached(function):
         for name, x in each.variables:
-            parts: list[Any] = [x]
-            if isinstance(x, (list, tuple, set)):
-                parts += x
-            elif isinstance(x, dict):
-                parts += x.values()
-            elif not isinstance(x, (ModuleType, Value, Rows, np.ndarray)) and hasattr(x, "__dict__"):
-                parts += vars(x).values()
-            if any(isinstance(part, Value) for part in parts):
+            if _holds_value(x):
                 return (
                     f"keeps a value in {name!r}, which another kernel would read; a term keeps numbers from"
                     " step to step with `keeps`"
                 )
     return ""
+
+
+def _holds_value(x: Any) -> bool:
+    """Return True if a variable, or what is in it, is a value or memory of a kernel."""
+    waiting = [(x, 3)]
+    for part, depth in waiting:  # which grows
+        if isinstance(part, (Value, Rows)):
+            return True
+        if isinstance(part, dict):
+            inside: Any = part.values()
+        elif isinstance(part, (list, tuple, set, deque)):
+            inside = part
+        elif isinstance(part, (ModuleType, FunctionType)) or not hasattr(part, "__dict__"):
+            inside = ()
+        else:
+            inside = vars(part).values()
+        if depth and len(waiting) + len(inside) < MOST_PARTS:
+            waiting += [(one, depth - 1) for one in inside]
+    return False
 
 
 # Words and places
@@ -181,10 +200,11 @@ NAMES = {
 def _said(error: Exception) -> str:
     """Return what an error says, in one line, for the author of the function."""
     words = " ".join(str(error).split())
+    words = words if len(words) <= MOST_WORDS else f"{words[:MOST_WORDS]}..."
     if isinstance(error, RecursionError):
         return "a recursion, or a loop, whose end is not known when the kernel is made: write it without"
     if isinstance(error, TraceError):
-        return words
+        return " ".join(str(error).split())
     if isinstance(error, TypeError) and "unsupported operand" in words and re.search(r"for [&|^]", words):
         words += ": put comparisons in parentheses, as in (x > 0.0) & (y > 0.0)"
     if isinstance(error, TypeError):

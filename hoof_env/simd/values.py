@@ -37,6 +37,9 @@ class Value:
         has = f"it has {', '.join(self.fields)}" if self.fields else "it has none"
         raise AttributeError(f"{self.kind} has no field {name!r}; {has}")
 
+    def __repr__(self) -> str:
+        return f"<{self.kind} that is known when the kernel runs>"
+
     def __bool__(self) -> bool:
         raise TraceError(
             f"`if`, `while`, `and`, `or`, `not`, min() or max() of {self.kind}, which is known only when"
@@ -294,6 +297,9 @@ class Mask(Value):
     def __truediv__(self, other: Number) -> Lanes:
         return self.to_real() / other
 
+    def __rtruediv__(self, other: Number) -> Lanes:
+        return other / self.to_real()
+
     def __bool__(self) -> bool:
         if CURRENT.machine.runs_now and not self.n:
             return CURRENT.machine.truth(self.x)
@@ -416,6 +422,18 @@ class Index(Value):
 
     def __neg__(self) -> Any:
         return self._with("sub", 0, self)
+
+    def __truediv__(self, other: Number) -> Lanes:
+        return self.to_real() / other
+
+    def __rtruediv__(self, other: Number) -> Lanes:
+        return other / self.to_real()
+
+    def __pow__(self, power: Number) -> Lanes:
+        return _power(self.to_real(), power)
+
+    def __rpow__(self, base: Number) -> Lanes:
+        return _power(base, self.to_real())
 
     def __mod__(self, other: int) -> Any:
         """Return the rest of a number that is not negative."""
@@ -866,7 +884,14 @@ def _quotient_and_rest(x: Any, y: Any) -> tuple[Any, Any]:
 
 
 def _divided(x: Any, y: Any) -> Any:
-    return x / y if isinstance(x, Value) or not isinstance(y, Lanes) else y.__rtruediv__(x)
+    return x / y if isinstance(x, Value) or not isinstance(y, (Lanes, Mask)) else y.__rtruediv__(float(x))
+
+
+def _select(conditions: Any, choices: Any, default: Any = 0.0) -> Any:
+    chosen = default
+    for condition, choice in zip(reversed(conditions), reversed(choices), strict=True):
+        chosen = where(condition, choice, chosen)
+    return chosen
 
 
 def _copysign(x: Any, y: Any) -> Any:
@@ -946,6 +971,7 @@ UFUNCS: dict[Any, Callable[..., Any]] = {
 FUNCTIONS: dict[Any, Callable[..., Any]] = {
     np.where: where,
     np.clip: clip,
+    np.select: _select,
     np.real: lambda z: z.real if isinstance(z, Plane) else z,
     np.imag: lambda z: z.imag if isinstance(z, Plane) else full(0.0, z.n),
     np.angle: lambda z: _library("atan2")(z.b, z.a),

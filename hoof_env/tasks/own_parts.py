@@ -42,8 +42,8 @@ def without_scalar(kind: Part) -> Part:
     def begin(self: Any, *arguments: Any, **named: Any) -> None:
         if "scalar" in named:
             raise UnknownArgumentError(
-                f"{kind.__name__}: scalar is gone: write np.where for `if`, and NumPy's functions for those of"
-                " `math`"
+                f"{kind.__name__}: scalar is gone: write np.where for `if`, and NumPy's functions for those"
+                " of `math`"
             )
         made(self, *arguments, **named)
 

@@ -134,8 +134,8 @@ class Term:
         weight: default weight.
         unit: unit of the weight.
         meaning: quantity that is weighted, for the manual page.
-        compute: plain function of an `Outcome` and the weight that returns the term, in Python's operators and
-            NumPy's functions, with np.where instead of `if`; see docs/own_task.md.
+        compute: plain function of an `Outcome` and the weight that returns the term, in Python's operators
+            and NumPy's functions, with np.where instead of `if`; see docs/own_task.md.
         constants: further arguments of `compute`, which the setting `constants` changes.
         keeps: numbers that the term keeps in an episode: `compute` reads and sets them, as
             `step.episode.own.<term>.<name>`; entries read them, too.

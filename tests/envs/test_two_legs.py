@@ -19,7 +19,6 @@ from hoof_env.render.instant import BodyInstant, Instant, Surroundings, instants
 from hoof_env.render.picture import HorsePicture, LegPicture, LegsPicture
 from hoof_env.render.renderer import Renderer
 from hoof_env.simd import block_at, maximum, minimum, read
-from hoof_env.simd.compile import inline_llvm
 from hoof_env.simd.math import clip
 from hoof_env.tasks import registry
 from hoof_env.tasks.body import BodyKernels
@@ -29,12 +28,11 @@ from hoof_env.tasks.one_leg import OneLeg, keep_gait
 ID = "own/TwoLegs-v0"
 
 
-@inline_llvm
 def command_both(task, actions, episode, first_leg, parameters, n, scratch):
     for i in range(2):
         leg = block_at(first_leg, i)
         for k in range(ACTIONS):
-            action = clip(read(leg, actions, (2 * n + i) * ACTIONS + k, 2 * ACTIONS), 1.0)
+            action = clip(read(actions, (2 * n + i) * ACTIONS + k, 2 * ACTIONS, leg.lanes), 1.0)
             heading = leg.state.gait[k] + task.lead * leg.state.gait_rate[k]
             leg.command[k] = minimum(maximum(heading + task.reach[k] * action, task.low[k]), task.high[k])
 
