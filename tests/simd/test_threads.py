@@ -186,38 +186,38 @@ def test_an_interrupt_of_a_long_call_of_an_engine_ends_it():
 
 
 def test_threads_that_trace_and_compile_at_once_do_not_mix_what_they_write():
-    """While others trace, one computes with NumPy's machine, which each thread has for itself."""
+    """While others trace, one computes with NumPy's machine, which each thread has for itself. All meet in
+    the middle of their functions."""
+    middle = threading.Barrier(7, timeout=60)
 
-    def made(k):
+    def made(k, meets=False):
         def work(x: Matrix) -> None:
             for n in loop(0, x.shape[0], 8):
                 value = read(x.first, n, 1, 8)
-                for _ in range(60):
+                for turn in range(60):
                     value = value * 1.001 + k
+                    if meets and turn in (10, 30):
+                        middle.wait()
                 write(where(value > 0.0, value, -value), x.first, n, 1)
 
         return work
 
     errors, found = [], {}
-    gate = threading.Barrier(7)
 
     def trace(k):
         try:
             x = np.arange(8.0) - 3.5
-            gate.wait()
             for turn in range(4):
-                kernel(made(10.0 * turn + k))(x)
+                kernel(made(10.0 * turn + k, meets=turn == 1))(x)
             found[k] = x
         except Exception as error:
             errors.append(error)
 
     def compute(k):
         try:
-            gate.wait()
-            for _ in range(20):
-                x = np.arange(8.0) - 3.5
-                for turn in range(4):
-                    kernel(made(10.0 * turn + k)).run_now(x)
+            x = np.arange(8.0) - 3.5
+            for turn in range(4):
+                kernel(made(10.0 * turn + k, meets=turn == 1)).run_now(x)
             found["now", k] = x
         except Exception as error:
             errors.append(error)
