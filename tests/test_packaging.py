@@ -117,11 +117,9 @@ def test_the_wheel_alone_lists_and_plays_what_ships(wheel, tmp_path):
 USER = """
     import math
     import hoof_env
-    from hoof_env.simd.compile import inline_llvm
 
     PAY = 1.0
 
-    @inline_llvm
     def helper(x):
         return 2.0 * x
 
@@ -140,7 +138,7 @@ CALL = """
     import hoof_env
     from pathlib import Path
     import gymnasium as gym, numpy as np
-    from hoof_env.simd.cache import COMPILED
+    from hoof_env.simd.compile import COMPILED
 
     def megabytes():
         file = Path("/proc/self/smaps_rollup")
@@ -162,14 +160,14 @@ CALL = """
 
 def test_an_edit_of_the_users_file_compiles_anew_and_nothing_else_does(wheel, tmp_path):
     """In another project's folder, with the package from the wheel, and nothing compiled before. Two ids,
-    whose functions have one name, keep a kernel each, whichever has it after an edit. The second takes some
-    16 MB with what numba keeps of its kernel, and would take 42 MB were the observation compiled, too."""
+    whose functions have one name, keep a kernel each, whichever has it after an edit. The second takes a few
+    MB, most of them for LLVM to work in."""
     site = tmp_path / "site"
     wheel.extractall(site)
 
     def rewards(*ids):
         environment = {
-            **os.environ, "NUMBA_CACHE_DIR": str(tmp_path / "cache"), "PYTHONDONTWRITEBYTECODE": "1",
+            **os.environ, "HOOF_ENV_CACHE_DIR": str(tmp_path / "cache"), "PYTHONDONTWRITEBYTECODE": "1",
             "PYTHONPATH": os.pathsep.join([str(tmp_path), str(site)]),
         }  # fmt: skip
         command = [sys.executable, "-c", textwrap.dedent(CALL), *ids]
@@ -182,10 +180,10 @@ def test_an_edit_of_the_users_file_compiles_anew_and_nothing_else_does(wheel, tm
         return [(round(float(paid), 9), compiled) for paid, _, *compiled in rows]
 
     grown = []
-    every = ["advance_leg", "observe_one", "solve_all", "solve_points", "step_one"]
+    every = ["observe_one", "start_leg", "step_one"]
     (tmp_path / "mine.py").write_text(textwrap.dedent(USER))
     assert rewards("A", "B") == [(0.04, every), (0.4, ["step_one"])]
-    assert grown[0] < 25
+    assert grown[0] < 12
     assert rewards("A", "B") == [(0.04, []), (0.4, [])]
     exchanged = USER.replace('("A", 1.0), ("B", 10.0)', '("A", 10.0), ("B", 1.0)')
     assert exchanged != USER
