@@ -192,6 +192,10 @@ class RowConditions:
             if group.size:
                 yield self.all[self.which[group[0]]], group
 
+    def __getstate__(self) -> dict[str, Any]:
+        """Return the attributes for a pickle: without what belongs to one process."""
+        return vars(self.copied())
+
     def copied(self) -> RowConditions:
         """Return the conditions for a copy of the batch, which has its arrays at other addresses."""
         made = RowConditions(len(self.which))

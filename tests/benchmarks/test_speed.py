@@ -35,7 +35,7 @@ def test_quick_mode_runs_without_peers_and_writes_its_files(tmp_path, monkeypatc
     assert f"vectors of {bits} bits" in page
     late = speed.page(result | {"start": dict.fromkeys(speed.START_BARS, 0.4)})
     assert "| import hoof_env | 0.40 | under 0.3: not met |" in late
-    assert "| 0.40 | under 30: met |" in late
+    assert "| 0.40 | under 2: met |" in late
     assert f"[{bits}-bits, speed]({bits}-bits/speed.md)" in (tmp_path / "speed.md").read_text()
     assert read(tmp_path) == []  # numbers of a smoke test mean nothing
     assert "leg, one" in capsys.readouterr().out

@@ -10,8 +10,10 @@ from family import HORSE, actions, make, same
 from horses import SPEEDS, played, random_gaits
 
 from hoof_env import Sb3VecEnv
+from hoof_env.dynamics.advance import EngineKind
 from hoof_env.dynamics.layout import Features
-from hoof_env.envs import step
+from hoof_env.envs.scene import TaskKind
+from hoof_env.envs.step import step_kernels
 from hoof_env.errors import DataFileError, ParameterError
 from hoof_env.gait import PARAMETERS, WIDEST
 from hoof_env.leg.limb_masses import segment_masses, trunk_mass
@@ -269,16 +271,16 @@ def test_commands_are_drawn_as_numbers_between_their_bounds():
 
 
 def test_kernels_are_others_where_the_number_of_stored_gaits_is(monkeypatch):
-    def name_of_kernel():
+    def kernels():
         task, features = TASKS["horse"], Features(2, springs=True, has_limits=True)
         body = HORSE_KERNELS._replace(task_fields=tuple(reference.reference_type()))
-        found = step._made([], task.terms, task.entries, None, features, body, None)
-        return found.step_batch.py_func.__qualname__
+        engine = EngineKind(features, None, known=())
+        return step_kernels(TaskKind(task.terms, task.entries, body, None, engine, known=()), is_scalar=False)
 
-    before, stored = name_of_kernel(), reference._reference()
-    assert name_of_kernel() == before
+    before, stored = kernels(), reference._reference()
+    assert kernels() is before
     monkeypatch.setattr(reference, "_reference", lambda: tuple(values[::2] for values in stored))
-    assert name_of_kernel() != before
+    assert kernels() is not before
 
 
 def test_a_gait_that_is_given_lasts_while_commands_change():
