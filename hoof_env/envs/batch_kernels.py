@@ -15,7 +15,7 @@ from hoof_env.envs.batch_build import find_entries
 from hoof_env.envs.conditions import under_each
 from hoof_env.envs.infos import InfoLayout
 from hoof_env.envs.scene import ALL_ARRAYS, TaskKind, functions_of, is_from_outside, known_of
-from hoof_env.envs.step import NOT_A_NUMBER, step_kernels
+from hoof_env.envs.step import NOT_A_NUMBER, StepKernels, step_kernels
 from hoof_env.errors import ParameterError
 from hoof_env.simd.compile import Kernel
 from hoof_env.simd.layout import views
@@ -81,6 +81,8 @@ class BatchKernels:
         functions = [part for entry in (*self.entries, *self.true_entries) for part in functions_of(entry)]
         self.has_own_entries = any(map(is_from_outside, functions))
         self.measurements = InfoLayout(self.engine.features, tuple(self.body.hips))
+        # copies share them, too: kernels with a function from outside are made anew, which takes time
+        self._chosen: dict[TaskKind, StepKernels] = {}
         self.find()
 
     def _choose(self) -> None:
@@ -95,11 +97,9 @@ class BatchKernels:
             EngineKind(self.engine.features, self.task.contact_law, static_of(self.engine.arrays[1])),
             known_of(self.task_record),
         )
-        # found once for each kind: those with a function from outside are made anew, which takes time
-        chosen = vars(self).setdefault("_chosen", {})
-        if (kind, is_scalar) not in chosen:
-            chosen[kind, is_scalar] = step_kernels(kind, is_scalar)
-        self.kernels = chosen[kind, is_scalar]
+        if kind not in self._chosen:
+            self._chosen[kind] = step_kernels(kind, is_scalar)
+        self.kernels = self._chosen[kind]
         self.kernel = self._step_paper if self.paper else self.kernels.step
 
     def find(self) -> None:

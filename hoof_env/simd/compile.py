@@ -1,10 +1,9 @@
 """Kernels: plain functions that are traced once, and compiled by LLVM to machine code.
 
 A trace runs the function with values that write its instructions (`machines.Writer`). The text that results
-is all
-that the machine code depends on, besides the processor and LLVM: its digest is the name under which the
-code is found, in this process and in files (`objects`). Without fast-math, so that a result does not depend
-on how the compiler arranged a loop.
+is all that the machine code depends on, besides the processor and LLVM: its digest is the name under which
+the code is found, in this process and in files (`objects`). Without fast-math, so that a result does not
+depend on how the compiler arranged a loop.
 """
 
 from __future__ import annotations
