@@ -109,7 +109,7 @@ class BatchKernels:
         # a block of columns for each thread; the paper's solver runs on one, with all of them
         blocks = [range(self.engine.columns)] if self.paper else self.engine.blocks
         self.held = self._hold(range(self.engine.columns))
-        self._blocks = [(self._hold(block),) for block in blocks]
+        self._blocks = [(self.held.on(block),) for block in blocks]
 
     def _hold(self, columns: range, kernel: Kernel | None = None, **more: NDArray[Any]) -> Held:
         """Return the arrays as the argument of a kernel that works on some columns."""
@@ -131,7 +131,7 @@ class BatchKernels:
 
     def observe(self, columns: range | None = None) -> None:
         """Observe all rows, or those of some columns, without a step."""
-        self.kernels.observe(self.held if columns is None else self._hold(columns))
+        self.kernels.observe(self.held if columns is None else self.held.on(columns))
 
     def check_mapped(self) -> None:
         """Check that a map of actions from outside gave numbers.

@@ -192,6 +192,18 @@ class Held(int):
     numbers: NDArray[np.int64]
     columns: range
 
+    @classmethod
+    def of(cls, arrays: dict[str, NDArray[Any]], numbers: NDArray[np.int64], columns: range) -> Held:
+        """Return arrays with their addresses and shapes; the last two numbers become the columns."""
+        numbers[-2:] = columns.start, columns.stop
+        held = cls(numbers.ctypes.data)
+        held.arrays, held.numbers, held.columns = arrays, numbers, columns
+        return held
+
+    def on(self, columns: range) -> Held:
+        """Return the same arrays for a call that works on other columns."""
+        return self if columns == self.columns else Held.of(self.arrays, self.numbers.copy(), columns)
+
     def __reduce__(self) -> NoReturn:
         raise TypeError(
             "addresses hold in one process only: expected the arrays to be copied, and held again"
@@ -237,14 +249,7 @@ class Arrays:
             first = self.slots[name]
             numbers[first] = array.ctypes.data
             numbers[first + 1 : first + 1 + array.ndim] = array.shape
-        numbers[self.begin :] = columns.start, columns.stop
-        held = Held(numbers.ctypes.data)
-        held.arrays, held.numbers, held.columns = kept, numbers, columns
-        return held
-
-    def idle(self, held: Held) -> Held:
-        """Return the same arrays with no columns to work on."""
-        return self.hold(held.arrays)
+        return Held.of(kept, numbers, columns)
 
 
 class Given:

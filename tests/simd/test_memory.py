@@ -65,7 +65,7 @@ def test_arrays_and_records_are_read_and_written(flag):
 def test_without_columns_nothing_is_done():
     given = made()
     held = ARRAYS.hold(given, range(4, 8))
-    kernel()(ARRAYS.idle(held), 0.5, 3)
+    kernel()(held.on(range(0)), 0.5, 3)
     assert not given["out"].any()
     assert held.columns == range(4, 8)
 
