@@ -132,13 +132,9 @@ _RECENT: deque[Code] = deque(maxlen=RECENT)
 _LOCK = threading.RLock()
 
 
-def _renew_lock() -> None:
-    global _LOCK
-    _LOCK = threading.RLock()
-
-
-if hasattr(os, "register_at_fork"):  # another thread may have it when a process forks
-    os.register_at_fork(after_in_child=_renew_lock)
+if hasattr(os, "register_at_fork"):
+    # no fork while another thread compiles: a child would wait for ever for llvmlite's lock
+    os.register_at_fork(before=_LOCK.acquire, after_in_parent=_LOCK.release, after_in_child=_LOCK.release)
 
 
 def code_of(text: str, name: str) -> Code:
