@@ -24,7 +24,7 @@ import numpy as np
 from llvmlite.binding.ffi import ObjectRef
 from llvmlite.binding.newpassmanagers import NewPassManager
 
-from hoof_env.errors import HoofEnvError
+from hoof_env.errors import HoofEnvError, ParameterError
 from hoof_env.simd import objects
 from hoof_env.simd.machines import Eager, Place, Writer, running_on
 from hoof_env.simd.memory import AXES, Arrays, Given, Matrix, Pointer
@@ -66,7 +66,37 @@ def target() -> Any:
     """Return LLVM's machine for this processor, started at the first call."""
     llvm.initialize_native_target()
     llvm.initialize_native_asmprinter()
+    if os.environ.get(PROCESSOR):
+        _check_processor()
     return _new_target()
+
+
+def _check_processor() -> None:
+    """Check that LLVM knows the processor of the environment variable: it says so on the standard error
+    alone, and ends the process when it compiles for one that it does not know.
+
+    Raises:
+        ParameterError: it does not.
+    """
+    try:
+        error = os.dup(2)
+    except OSError:  # there is no standard error
+        return
+    reading, writing = os.pipe()
+    try:
+        os.dup2(writing, 2)
+        _new_target()
+    finally:
+        os.dup2(error, 2)
+        os.write(writing, b"\n")  # so that there is something to read
+        said = os.read(reading, 4096)
+        for number in (error, reading, writing):
+            os.close(number)
+    if b"not a recognized processor" in said:
+        raise ParameterError(
+            f"{PROCESSOR}: expected a processor in LLVM's words, such as haswell or x86-64-v3, got"
+            f" {os.environ[PROCESSOR]!r}"
+        )
 
 
 @cache

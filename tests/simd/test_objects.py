@@ -133,6 +133,16 @@ def test_all_that_machine_code_depends_on_is_in_the_identity():
         assert llvm.get_host_cpu_features().flatten() in parts
 
 
+def test_a_processor_that_llvm_does_not_know_is_refused(place):
+    process = start_python(CALL, place, **{PROCESSOR: "Haswell"})
+    said = process.communicate(timeout=120)[1].strip().splitlines()
+    assert process.returncode == 1
+    assert said[-1].endswith(
+        "expected a processor in LLVM's words, such as haswell or x86-64-v3, got 'Haswell'"
+    )
+    assert not files(place)
+
+
 def test_another_processor_has_files_of_its_own(place):
     assert ended(start_python(CALL, place))[0] == COMPILED
     import llvmlite.binding as llvm
