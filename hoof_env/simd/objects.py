@@ -81,7 +81,8 @@ def write(name: str, content: bytes) -> None:
                 file.write(hashlib.sha256(content).digest() + content)
             os.replace(new, path)
         except BaseException:
-            os.unlink(new)
+            with suppress(OSError):  # Ctrl-C may come when it has its name
+                os.unlink(new)
             raise
         _make_room(path.parent)
     except OSError:
