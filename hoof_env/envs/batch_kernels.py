@@ -162,13 +162,16 @@ class BatchKernels:
         )
 
     def _compile(self) -> None:
-        """Compile or load every kernel of a step."""
+        """Compile or load every kernel of a step, and of entries from outside the one that measures them:
+        made later, it might follow from constants that have changed since."""
         if self.paper:
             self.kernels.apply.compile()
             self.kernels.finish.compile()
         else:
             self.kernels.step.compile()
         self.kernels.observe.compile()
+        if self.has_own_entries:
+            self.kernels.measure.compile()
         self.engine.compile()
 
     def _measure(self, out: Floats) -> None:

@@ -231,6 +231,24 @@ def test_a_changed_helper_or_constant_acts_at_the_next_make():
     assert old.step(np.zeros(4, np.float32))[4]["reward_mine"] == 20.0, "what is made stays as it is"
 
 
+def test_what_is_made_measures_with_the_constants_of_its_observation():
+    space = {"__name__": "__main__"}
+    cell(
+        space,
+        """
+        from hoof_env import Entry, Scale, register
+        SIZE = 2.0
+        def size(scene):
+            return SIZE + 0.0 * scene.episode.time
+        register("own/Size-v0", entries=[Entry("size", "mine", "-", size, Scale("none"))])
+        """,
+    )
+    env = gym.make("own/Size-v0").unwrapped
+    env.reset(seed=0)
+    cell(space, "SIZE = 200.0")
+    assert env.raw_observation()["size"] == 2.0
+
+
 def test_an_edited_function_of_the_same_name_acts_when_it_is_registered_again():
     space = {"__name__": "__main__"}
     cell(space, NOTEBOOK)

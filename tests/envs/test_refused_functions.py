@@ -430,13 +430,14 @@ def with_helper(scene):
 
 
 def test_a_kernel_that_is_made_later_refuses_too(monkeypatch):
-    """`raw_observation` has a kernel of its own, made at its first call."""
+    """Ground that is no longer level has kernels of its own, made at the next start."""
     register(BAD, **registration("entry", with_helper))
     env = gym.make(BAD).unwrapped
-    env.reset(seed=0)
+    env.change_settings(terrain={"kind": "hills", "rise": 0.02})
     monkeypatch.setitem(globals(), "helper", lambda x: float(x))
-    assert "float()" in message(env.raw_observation)
+    assert "float()" in message(env.reset, seed=0)
     monkeypatch.undo()
+    env.reset(seed=0)
     assert env.raw_observation()["mine"] == 0.0
 
 
