@@ -147,8 +147,10 @@ def functions_of(entry: Entry) -> list[Callable[..., Any]]:
 
 
 def is_from_outside(function: Callable[..., Any]) -> bool:
-    """Return True for a function that is not of this package."""
-    return not str(function.__module__).startswith("hoof_env.")
+    """Return True for a function that is not of this package. `functools.wraps` gives a function the
+    `__module__` of another one, but not its globals."""
+    space = getattr(function, "__globals__", {})
+    return not str(space.get("__name__", function.__module__)).startswith("hoof_env.")
 
 
 class Scene:

@@ -64,7 +64,7 @@ def foreign(
         given = tuple(locked(rounded(argument), own, legs) for argument in arguments)
         check_imports(what, function, UserFunctionError)
         try:
-            found = rounded(_steady(function, given))
+            found = rounded(_plain(_steady(function, given)))
         except UserFunctionError:
             raise
         except Exception as error:  # the user's code may raise anything
@@ -112,7 +112,7 @@ def _text(x: Any) -> Any:
         return x.a.x, x.b.x
     if isinstance(x, (tuple, list)):
         return [_text(part) for part in x]
-    return repr(x) if isinstance(x, (int, float, np.generic)) else type(x)
+    return repr(x) if isinstance(x, (int, float, np.generic, np.ndarray)) else type(x)
 
 
 # Results
@@ -129,6 +129,13 @@ def _wrong(x: Any, count: int | None) -> str:
         return f"returns a tuple of {len(x)}; {expected}"
     wrong = [k for k, one in enumerate(x) if _is_wrong(one)]
     return f"returns {_result(x[wrong[0]])} at [{wrong[0]}]; {expected}" if wrong else ""
+
+
+def _plain(x: Any) -> Any:
+    """Return arrays of no axes, such as np.where makes of two numbers, as numbers."""
+    if type(x) in (tuple, list):
+        return type(x)(map(_plain, x))
+    return x.item() if isinstance(x, np.ndarray) and not x.ndim else x
 
 
 def _is_wrong(x: Any) -> bool:
@@ -168,8 +175,8 @@ def _kept_value(function: Any) -> str:
 
 def _holds_value(x: Any) -> bool:
     """Return True if a variable, or what is in it, is a value or memory of a kernel."""
-    waiting = [(x, 3)]
-    for part, depth in waiting:  # which grows
+    waiting, seen = [x], {id(x)}
+    for part in waiting:  # which grows
         if isinstance(part, (Value, Rows)):
             return True
         if isinstance(part, dict):
@@ -180,8 +187,10 @@ def _holds_value(x: Any) -> bool:
             inside = ()
         else:
             inside = vars(part).values()
-        if depth and len(waiting) + len(inside) < MOST_PARTS:
-            waiting += [(one, depth - 1) for one in inside]
+        if len(waiting) + len(inside) < MOST_PARTS:
+            new = {id(one): one for one in inside if id(one) not in seen}
+            waiting += new.values()
+            seen |= new.keys()
     return False
 
 

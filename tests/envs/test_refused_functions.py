@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+import functools
 import itertools
 import linecache
 import textwrap
@@ -18,6 +19,7 @@ import hoof_env
 from hoof_env import ActionMap, Constant, Entry, Kept, Scale, Term, TrunkEngine, register
 from hoof_env.dynamics.parts import Limb, Trunk
 from hoof_env.errors import ParameterError, UnknownArgumentError
+from hoof_env.simd.values import perpendicular
 from hoof_env.tasks import registry as tasks
 
 pytestmark = pytest.mark.usefixtures("registered")
@@ -225,6 +227,8 @@ CASES = [
      "keeps a value in 'State'"),
     ("term", "kept = {'a': []}\ndef compute(step, weight):\n    kept['a'][:] = [(step.leg,)]\n    return weight",
      "keeps a value in 'kept'"),
+    ("term", "kept = {'a': {'b': [{'c': {'d': []}}]}}\nkept['itself'] = kept\ndef compute(step, weight):\n"
+     "    kept['a']['b'][0]['c']['d'][:] = [step.progress]\n    return weight", "keeps a value in 'kept'"),
     ("term", "all_of = []\ndef compute(step, weight):\n    all_of.append(step.progress)\n    return sum(all_of)",
      "something else at each call"),
     # without end
@@ -304,6 +308,16 @@ def test_refused_with_place_and_advice(kind, text, words):
         assert word in found
     if "plain function" not in words:
         assert place in found
+
+
+def test_a_wrapper_of_a_function_of_the_package_is_the_users():
+    @functools.wraps(perpendicular)
+    def wrong(step, weight):
+        step.leg.report.crank_torque = 0.0
+        return weight
+
+    assert wrong.__module__.startswith("hoof_env.")
+    assert "assignment to 'crank_torque'" in message(made_from, "term", wrong)
 
 
 def changes_another(step, weight):
@@ -478,6 +492,7 @@ def test_constants_are_numbers(value):
 ALLOWED = [
     ("term", "return 3"), ("term", "return 0.5"), ("term", "return np.float32(2.0)"), ("term", "return np.int64(2)"),
     ("term", "return step.progress * np.float64(2.0) + np.int32(1)"),
+    ("term", "return np.where(True, 1.0, 2.0)"), ("map", "return np.array(1.0), 0.0, np.where(True, 0.5, 0.0), 0.0"),
     ("term", "return np.where(True, 1.0, 2.0) * step.progress"),
     ("term", "return np.array(2.0) * step.progress"), ("term", "return step.progress * np.array(2.0)"),
     ("term", "return sum(x * x for x in step.leg.state.gait)"),
