@@ -48,7 +48,8 @@ def foreign(
     what: str, function: Callable[..., Any], count: int | None = None, keeps: str = "", legs: int = 1
 ) -> Callable[..., Any]:
     """Return a function from outside this package as a part of kernels: it cannot write what it takes, which
-    enters sums rounded, as does what it returns; what it raises becomes a `UserFunctionError`.
+    enters sums rounded, as does what it returns; what it raises while a kernel is traced becomes a
+    `UserFunctionError`.
 
     Args:
         what: the function, for messages.
@@ -68,6 +69,8 @@ def foreign(
         except UserFunctionError:
             raise
         except Exception as error:  # the user's code may raise anything
+            if CURRENT.machine.runs_now:  # a debugger wants to know where
+                raise
             raise UserFunctionError(f"{what}: {_said(error)}{_place(error)}") from None
         wrong = _wrong(found, count) or _kept_value(function)
         if wrong:

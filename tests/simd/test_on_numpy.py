@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from benchmarks.scenes import engine, scenes
+from hoof_env import Limb, Trunk, TrunkEngine, load_gait, load_geometry
 from hoof_env.dynamics import hoof
 from hoof_env.simd import Matrix, Number, loop, new_rows, on_numpy, read, vector, where, write
 from hoof_env.simd import compile as compile_module
@@ -141,6 +142,22 @@ def test_errors_are_those_of_the_source_with_its_lines():
     with on_numpy(), pytest.raises(ValueError, match="at 1") as seen:
         Kernel(refuse, [arrays])(held)
     assert seen.traceback[-1].name == "refuse"
+
+
+def test_an_error_in_a_users_function_keeps_its_traceback():
+    failing = []
+
+    def law(penetration, rate, inverse_approach_speed, ground):
+        if failing:
+            raise ArithmeticError("of mine")
+        return ground.stiffness * penetration
+
+    made = TrunkEngine(Limb(load_geometry("identified")), Trunk("fixed"), contact_law=law)
+    made.reset(load_gait("walk", "identified"), 0.3)
+    failing.append(1)
+    with on_numpy(), pytest.raises(ArithmeticError, match="of mine") as seen:
+        made.run(steps=1000)
+    assert seen.traceback[-1].name == "law"
 
 
 def test_a_row_that_was_never_written_is_an_error_where_it_is_used():
