@@ -8,8 +8,6 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
-import numpy as np
-
 from hoof_env.dynamics.advance import ARRAYS, LANES, EngineKind
 from hoof_env.simd import Lanes, Pointer, Whole, columns, full_like
 from hoof_env.simd.memory import Arrays, Given, RecordType
@@ -230,9 +228,3 @@ class Scene:
     def zeros(self, n: Whole) -> Lanes:
         """Return 0 in each lane."""
         return full_like(self.episode(n), 0.0)
-
-
-def array_type(name: str, kind: TaskKind) -> np.dtype[Any]:
-    """Return NumPy's type of an array of a step."""
-    found = kind.arrays.types[name]
-    return found.kind if isinstance(found, RecordType) else np.dtype(found)
