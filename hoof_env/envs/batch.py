@@ -35,11 +35,9 @@ from hoof_env.envs.conditions import (
     keep_others,
     under_each,
 )
-from hoof_env.envs.outcome import MOVED
 from hoof_env.envs.step import NOT_A_NUMBER, SOME_ENDED, SOME_PUSHED, SOME_SWITCHED
 from hoof_env.errors import ParameterError, check_number
 from hoof_env.simd.threads import run_together
-from hoof_env.simd.user_functions import UserFunctionError, user_error
 from hoof_env.tasks.delays import Delay
 from hoof_env.tasks.disturbances import Push
 from hoof_env.tasks.episode import episode_layout
@@ -149,12 +147,8 @@ class EpisodeBatch(BatchKernels, BatchChanges):
         # Columns without an environment never switch, so that they cause no draw.
         self.episode_rows.switch[:] = np.inf
         self.episode_rows.push_at[:] = np.inf
-        if not runs:
-            return
-        try:
-            self._compile()
-        except UserFunctionError as error:
-            raise user_error(task.id, error, MOVED) from None
+        if runs:
+            self._compile(self.kernels)
 
     def _check_settings(self) -> None:
         """Check the settings, and set the attributes that follow from them."""

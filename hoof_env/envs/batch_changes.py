@@ -35,6 +35,9 @@ class BatchChanges:
     def limit(self, steps: int) -> None:
         """Truncate episodes, see `EpisodeBatch`."""
 
+    def prepare(self, conditions: Conditions) -> None:
+        """Compile the kernels of conditions, see `BatchKernels`."""
+
     def change(self, asked: Sequence[Settings], rows: Sequence[Sequence[int]]) -> None:
         """Start episodes from now on with other settings, of those that `conditions.CHANGEABLE` names.
 
@@ -43,9 +46,12 @@ class BatchChanges:
             rows: these groups.
 
         Raises:
-            ParameterError: a setting is out of range; nothing has changed then.
+            ParameterError: a setting is out of range, or a function from outside cannot be part of kernels
+                for other ground; nothing has changed then.
         """
         made = [self.conditions_under(settings) for settings in asked]
+        for conditions in made:
+            self.prepare(conditions)
         for conditions, group in zip(made, rows, strict=True):
             self.conditions.add(conditions_of(self), conditions, np.array(group))
 

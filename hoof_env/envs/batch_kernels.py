@@ -12,14 +12,16 @@ from hoof_env.dynamics.engine import TrunkEngine
 from hoof_env.dynamics.form import engine_layout
 from hoof_env.dynamics.model import static_of
 from hoof_env.envs.batch_build import find_entries
-from hoof_env.envs.conditions import under_each
+from hoof_env.envs.conditions import Conditions, under_each
 from hoof_env.envs.infos import InfoLayout
+from hoof_env.envs.outcome import MOVED
 from hoof_env.envs.scene import ALL_ARRAYS, TaskKind, functions_of, is_from_outside, known_of
 from hoof_env.envs.step import NOT_A_NUMBER, StepKernels, step_kernels
 from hoof_env.errors import ParameterError
 from hoof_env.simd.compile import Kernel
 from hoof_env.simd.layout import views
 from hoof_env.simd.memory import Held
+from hoof_env.simd.user_functions import UserFunctionError, user_error
 
 Floats = NDArray[np.float64]
 
@@ -85,8 +87,8 @@ class BatchKernels:
         self._chosen: dict[TaskKind, StepKernels] = {}
         self.find()
 
-    def _choose(self) -> None:
-        """Find the kernels for what is known of the present records of engine and task."""
+    def _kernels_for(self, record: NDArray[Any], model: NDArray[Any]) -> StepKernels:
+        """Return the kernels for what is known of records of the task and of the engine's model."""
         # few environments, or the paper's solver, which works on the engine's memory between two kernels
         is_scalar = bool(self.engine.runs_scalar or self.paper)
         kind = TaskKind(
@@ -94,18 +96,26 @@ class BatchKernels:
             self.task.entries,
             self.body.kernels,
             self.task.action_map,
-            EngineKind(self.engine.features, self.task.contact_law, static_of(self.engine.arrays[1])),
-            known_of(self.task_record),
+            EngineKind(self.engine.features, self.task.contact_law, static_of(model)),
+            known_of(record),
         )
         if kind not in self._chosen:
             self._chosen[kind] = step_kernels(kind, is_scalar)
-        self.kernels = self._chosen[kind]
-        self.kernel = self._step_paper if self.paper else self.kernels.step
+        return self._chosen[kind]
+
+    def prepare(self, conditions: Conditions) -> None:
+        """Compile or load the kernels of conditions that rows will be under.
+
+        Raises:
+            ParameterError: a function from outside cannot be part of them.
+        """
+        self._compile(self._kernels_for(conditions["task_record"], conditions["_model"][0]))
 
     def find(self) -> None:
         """Find kernels and arrays for calls, after any of them was replaced."""
         self.episode_rows = views(self.layout, self.episode)
-        self._choose()
+        self.kernels = self._kernels_for(self.task_record, self.engine.arrays[1])
+        self.kernel = self._step_paper if self.paper else self.kernels.step
         # a block of columns for each thread; the paper's solver runs on one, with all of them
         blocks = [range(self.engine.columns)] if self.paper else self.engine.blocks
         self.held = self._hold(range(self.engine.columns))
@@ -161,18 +171,22 @@ class BatchKernels:
             f" {self.episode_rows.steps[env]:g} steps"
         )
 
-    def _compile(self) -> None:
+    def _compile(self, kernels: StepKernels) -> None:
         """Compile or load every kernel of a step, and of entries from outside the one that measures them:
-        made later, it might follow from constants that have changed since."""
-        if self.paper:
-            self.kernels.apply.compile()
-            self.kernels.finish.compile()
-        else:
-            self.kernels.step.compile()
-        self.kernels.observe.compile()
-        if self.has_own_entries:
-            self.kernels.measure.compile()
-        self.engine.compile()
+        made later, it might follow from constants that have changed since.
+
+        Raises:
+            ParameterError: a function from outside cannot be part of them.
+        """
+        try:
+            for kernel in (kernels.apply, kernels.finish) if self.paper else (kernels.step,):
+                kernel.compile()
+            kernels.observe.compile()
+            if self.has_own_entries:
+                kernels.measure.compile()
+            self.engine.compile()
+        except UserFunctionError as error:
+            raise user_error(self.task.id, error, MOVED) from None
 
     def _measure(self, out: Floats) -> None:
         self.kernels.measure(self._hold(range(out.shape[1]), self.kernels.measure, measured=out))

@@ -198,7 +198,7 @@ class Kernel:
         parameters: what each of its arguments is, see `Parameter`.
         name: name for messages and files.
         threads: True if several threads may run it at once, without Python's lock; a call takes a little
-        longer.
+            longer.
 
     Attributes:
         call: the machine code as a function of ctypes, which checks no types; None before the first call.
@@ -224,6 +224,8 @@ class Kernel:
             self.compile()
         if Matrix not in self.parameters:
             return self.call(*arguments)
+        if len(arguments) != len(self.parameters):
+            raise TypeError(f"{self.name}: expected {len(self.parameters)} arguments, got {len(arguments)}")
         given: list[Any] = []
         for kind, argument in zip(self.parameters, arguments, strict=True):
             given += _array(argument) if kind is Matrix else [argument]
@@ -256,9 +258,17 @@ _CTYPES: dict[Any, list[Any]] = {
 
 
 def _array(array: Any) -> list[Any]:
-    """Return an array of the caller as arguments of machine code."""
-    if array.dtype != np.float64 or not array.flags.c_contiguous or array.ndim > AXES:
-        raise TypeError(f"expected a contiguous array of doubles, got {array.dtype} of shape {array.shape}")
+    """Return an array of the caller as arguments of machine code.
+
+    Raises:
+        TypeError: it is no contiguous array of doubles that may be written.
+    """
+    expected = "expected a contiguous array of doubles that may be written"
+    if not isinstance(array, np.ndarray):
+        raise TypeError(f"{expected}, got {type(array).__name__}")
+    flags = array.flags
+    if array.dtype != np.float64 or not (flags.c_contiguous and flags.writeable) or array.ndim > AXES:
+        raise TypeError(f"{expected}, got {array.dtype} of shape {array.shape}, {flags}")
     return [array.ctypes.data, *array.shape, *[0] * (AXES - array.ndim)]
 
 

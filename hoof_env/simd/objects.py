@@ -105,7 +105,7 @@ def _is_own(place: Path) -> bool:
             f"hoof-env: {place} belongs to others, or others may write there: machine code in it is not"
             f" used, and kernels are compiled in each process; run `chmod go-w {place}` if it is yours, or"
             f" let {FOLDER} name a folder of your own",
-            stacklevel=2,
+            stacklevel=1,
         )
     return False
 

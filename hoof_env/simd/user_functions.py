@@ -324,7 +324,10 @@ def check_function(name: str, function: Any, arguments: int) -> None:
     """Raise ParameterError unless something is a plain function of `arguments` arguments that imports
     nothing."""
     if not isinstance(function, FunctionType) or function.__code__.co_flags & PLAIN_FLAGS:
-        raise ParameterError(f"{name}: expected a plain function of {arguments} arguments, got {function!r}")
+        raise ParameterError(
+            f"{name}: expected a plain function of {arguments} arguments, made by def or lambda, which may"
+            f" call methods and objects, got {function!r}"
+        )
     code = function.__code__
     least = code.co_argcount - len(function.__defaults__ or ())
     if not least <= arguments <= code.co_argcount or code.co_kwonlyargcount:

@@ -444,13 +444,17 @@ def with_helper(scene):
 
 
 def test_a_kernel_that_is_made_later_refuses_too(monkeypatch):
-    """Ground that is no longer level has kernels of its own, made at the next start."""
+    """Ground that is no longer level has kernels of its own; where they are refused nothing has changed."""
     register(BAD, **registration("entry", with_helper))
     env = gym.make(BAD).unwrapped
-    env.change_settings(terrain={"kind": "hills", "rise": 0.02})
+    env.reset(seed=0)
+    hills = {"kind": "hills", "rise": 0.02}
     monkeypatch.setitem(globals(), "helper", lambda x: float(x))
-    assert "float()" in message(env.reset, seed=0)
+    assert "float()" in message(env.change_settings, terrain=hills)
+    env.reset(seed=0)
+    env.step(env.action_space.sample())
     monkeypatch.undo()
+    env.change_settings(terrain=hills)
     env.reset(seed=0)
     assert env.raw_observation()["mine"] == 0.0
 
