@@ -27,6 +27,7 @@ if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
     signal.signal(signal.SIGINT, signal.default_int_handler)
 
 LONGEST = (
+    "simd/test_oracle.py",
     "envs/test_bits.py",
     "test_packaging.py",
     "envs/test_own_task.py",
