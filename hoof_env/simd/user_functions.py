@@ -325,8 +325,8 @@ def check_function(name: str, function: Any, arguments: int) -> None:
     nothing."""
     if not isinstance(function, FunctionType) or function.__code__.co_flags & PLAIN_FLAGS:
         raise ParameterError(
-            f"{name}: expected a plain function of {arguments} arguments, made by def or lambda, which may"
-            f" call methods and objects, got {function!r}"
+            f"{name}: expected a plain function of {arguments} arguments, got {function!r};"
+            " write one with def or lambda, which may call methods and objects"
         )
     code = function.__code__
     least = code.co_argcount - len(function.__defaults__ or ())
