@@ -2,7 +2,7 @@
 
 import llvmlite.binding as llvm
 
-from hoof_env.simd.compile import LEVEL, compiled, optimised, target, traced
+from hoof_env.simd.compile import CODE_MODEL, LEVEL, compiled, optimised, relocation, target, traced
 
 
 def text_of(kernel):
@@ -20,5 +20,7 @@ def object_for(kernel, triple, cpu=""):
     llvm.initialize_all_targets()
     llvm.initialize_all_asmprinters()
     made = llvm.Target.from_triple(triple)
-    machine = made.create_target_machine(cpu=cpu, opt=LEVEL, reloc="pic", codemodel="small", jit=True)
+    machine = made.create_target_machine(
+        cpu=cpu, opt=LEVEL, reloc=relocation(made.name), codemodel=CODE_MODEL, jit=True
+    )
     return compiled(text_of(kernel), machine)

@@ -6,6 +6,7 @@ import gc
 import inspect
 import os
 import pickle
+import platform
 import subprocess
 import sys
 import weakref
@@ -404,3 +405,16 @@ def test_the_same_function_has_the_same_text_at_each_trace():
 
 def test_assembly_is_that_of_the_processor():
     assert "kernel" in assembly_of(twice)
+
+
+@pytest.mark.skipif(platform.machine() not in ("x86_64", "AMD64"), reason="reads assembly of x86")
+def test_machine_code_reaches_constants_anywhere():
+    """Memory for code and for constants may be far from each other: no distance of 32 bits between them."""
+
+    @kernel
+    def scaled(x: Matrix) -> None:
+        write(read(x.first, 0, 1, 8) * 1.7 + 0.3, x.first, 0, 1)
+
+    code = assembly_of(scaled)
+    assert "LCPI" in code
+    assert "(%rip)" not in code
