@@ -48,7 +48,7 @@ PROCESSOR = "HOOF_ENV_CPU"
 """Environment variable: the processor to compile for, in LLVM's words, such as x86-64 or haswell."""
 
 RECENT = 64
-"""Number of kernels whose machine code stays loaded although nothing uses it, for what is made again."""
+"""Number of unused kernels whose machine code stays loaded, in case an environment is made again."""
 
 COMPILED: list[str] = []
 """Names of the kernels that this process has compiled, not read from files."""

@@ -1,6 +1,6 @@
 """NumPy's functions on values: `np.where`, `np.exp` and others, which a user's function calls as on arrays.
 
-What is not here is refused with the list of what is (`values.Value`). Functions of the C library are called
+Any other function is refused with a list of these (`values.Value`). Functions of the C library are called
 lane by lane, so that a lane has the bits that it would have alone.
 """
 

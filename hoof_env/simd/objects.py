@@ -1,7 +1,7 @@
 """Machine code of kernels in files: plain objects of the processor, in a folder of the user's.
 
 A file's name is the digest of all that its code follows from, so that no file is ever out of date. A file
-begins with the digest of its content. What others could write is not read, because it is run.
+begins with the digest of its content. A file that other users could write is not read, because it is run.
 """
 
 from __future__ import annotations

@@ -573,7 +573,7 @@ def product(one: Any, other: Any) -> Any:
 
 
 def _no_match(one: Any, other: Any) -> Any:
-    """Refuse `==` and `!=` of what is never equal, of which Python would make False and True."""
+    """Refuse `==` and `!=` of two kinds that are never equal: Python would answer False and True."""
     raise TraceError(f"a comparison of {kind_of(one)} with {kind_of(other)}")
 
 
@@ -592,7 +592,7 @@ MOST_PRODUCTS = 16
 
 
 def power(base: Any, exponent: Any) -> Any:
-    """Return a exponent: of whole numbers by products, of halves by roots, of others by the C library."""
+    """Return a power: a small whole exponent by products, one half by a root, any other by the C library."""
     if isinstance(exponent, (int, float, np.integer, np.floating)):
         exponent = float(exponent)
         if exponent == 2.0:
