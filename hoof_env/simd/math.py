@@ -20,7 +20,6 @@ from hoof_env.simd.values import (
     Number,
     absolute,
     maximum,
-    minimum,
     quarter_turns,
     rounded,
     sqrt,
@@ -121,5 +120,7 @@ def cos_sin(angle: Lanes) -> tuple[Lanes, Lanes]:
 
 
 def clip(x: Lanes, bound: Number) -> Lanes:
-    """Return `x` limited to [-bound, bound]."""
-    return minimum(maximum(x, -bound), bound)
+    """Return `x` limited to [-bound, bound], where `bound` is a number; NaN stays NaN."""
+    # one comparison each: `minimum` and `maximum` would look whether the bound is NaN, too
+    above = where(x < -bound, -bound, x)
+    return where(above > bound, bound, above)
