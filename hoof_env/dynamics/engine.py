@@ -10,38 +10,57 @@ a batch of any size.
 from __future__ import annotations
 
 import copy
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from typing import Any
 
-from numpy.typing import ArrayLike
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
 
 from hoof_env.constants import GRAVITY
 from hoof_env.dynamics import layout, memory
-from hoof_env.dynamics.advance import LANES, ONE_BY_ONE, RESET_REQUESTED, SIDE_BY_SIDE
-from hoof_env.dynamics.engine_motion import MOST_STEPS, EngineMotion
+from hoof_env.dynamics import state as state_parts
+from hoof_env.dynamics.advance import ARRAYS, LANES, ONE_BY_ONE, RESET_REQUESTED, SIDE_BY_SIDE, EngineKind
+from hoof_env.dynamics.engine_calls import EngineCalls
+from hoof_env.dynamics.form import engine_layout
+from hoof_env.dynamics.limits import CHECK_EVERY
+from hoof_env.dynamics.model import static_of
+from hoof_env.dynamics.names import NamedColumns
 from hoof_env.dynamics.parts import (
+    MOST_IMPULSE,
+    Drive,
     Limb,
     Limits,
+    Mechanics,
+    Motor,
+    Reactions,
+    Result,
     Trunk,
+    broken,
 )
+from hoof_env.dynamics.push import push_kernel
 from hoof_env.dynamics.step_length import StepLength
 from hoof_env.dynamics.stepping import SCHEMES
 from hoof_env.errors import (
     Floats,
+    NotStartedError,
     ParameterError,
     all_of,
     check_choice,
     check_number,
     count,
+    finite,
     flag,
     one_of,
+    spread,
 )
 from hoof_env.gait import MOST_HARMONICS, FilterSettings, GaitParameters
 from hoof_env.ground.contact import Ground
 from hoof_env.ground.terrain import Terrain
-from hoof_env.leg.profile import leg_profile
+from hoof_env.leg.profile import LegProfile, leg_profile
+from hoof_env.simd.layout import views
 from hoof_env.simd.threads import blocks, check_threads, limit_threads
-from hoof_env.simd.user_functions import check_function
+from hoof_env.simd.user_functions import UserFunctionError, check_function, user_error
 
 HEIGHT = layout.TrunkSettings.fields["height"].start
 """Row of a trunk's height at rest among its settings."""
@@ -53,8 +72,18 @@ empty."""
 MOST_LEGS = 32
 """Largest number of legs: kernels work on the stack, where a leg takes 15 kB with eight lanes."""
 
+MOST_STEPS = 10**12
+"""Largest number of substeps of a call: they are counted in 64 bits."""
 
-class TrunkEngine(EngineMotion):
+PART = 2_000_000
+"""Number of substeps, those of all legs added up, that a long call runs in machine code at a time: at most
+about a second. Ctrl-C takes effect between two parts. Sums have other last digits than in one part."""
+
+LEAST_PART = 1000
+"""Least number of substeps of each environment in such a part."""
+
+
+class TrunkEngine:
     """Legs on a trunk over the ground; see the module docstring.
 
     Args:
@@ -81,12 +110,8 @@ class TrunkEngine(EngineMotion):
     Attributes:
         runs_scalar: true if environments are run one by one in one thread, not side by side.
         blocks: columns of the memory that each thread works on.
-        step_limits: longest step [s] for each cause, see `step_length`. The limit of friction is reported and
-            not used, because nothing diverges beyond it: on the ground of `HorseLeg-v0` it is 0.14 ms for a
-            horse of 349 kg. There forces at 1 ms agree with those at 16 us to 1 % under hooves that slide;
-            under hooves that stand friction is off by 2.7 times its size and the normal force by half, at 0.5
-            ms by 0.4 % and 0.1 %. For clean forces at rest use `substeps` of sim_dt /
-            step_limits["friction"], or a larger `friction_fast`.
+        mechanics: legs, trunk, ground and scheme. Mechanics that share the features of these may take their
+            place between two calls.
 
     Raises:
         ParameterError: a value is out of range or of the wrong type; or, at the first reset, the contact law
@@ -120,42 +145,49 @@ class TrunkEngine(EngineMotion):
         if contact_law is not None:
             check_function("contact_law", contact_law, 4)
         self.contact_law = contact_law
-        self.limbs = all_of("limbs", limbs, Limb)
-        if len(self.limbs) > MOST_LEGS:
-            raise ParameterError(f"limbs: expected at most {MOST_LEGS}, got {len(self.limbs)}")
-        self.trunk = one_of("trunk", trunk, Trunk)
-        self.motion_limits = None if limits is None else one_of("limits", limits, Limits)
+        legs = all_of("limbs", limbs, Limb)
+        if len(legs) > MOST_LEGS:
+            raise ParameterError(f"limbs: expected at most {MOST_LEGS}, got {len(legs)}")
+        trunk = one_of("trunk", trunk, Trunk)
+        limits = None if limits is None else one_of("limits", limits, Limits)
         order = count("harmonics", harmonics, most=MOST_HARMONICS)
         self.reacts = flag("reactions", reactions)
-        self.features = memory.features_of(self.limbs, order, limits is not None, self.reacts)
-        memory.check_limbs(self.trunk, self.limbs, self.features.springs)
-        if contact_law is not None and self.features.springs:
+        features = memory.features_of(legs, order, limits is not None, self.reacts)
+        memory.check_limbs(trunk, legs, features.springs)
+        if contact_law is not None and features.springs:
             raise ParameterError(
                 "contact_law: expected none beside springs of the hoofs, whose speed follows from a law that "
                 f"is linear in it, got {contact_law!r}"
             )
-        self.ground = Ground() if ground is None else one_of("ground", ground, Ground)
-        self.terrain = Terrain.flat() if terrain is None else one_of("terrain", terrain, Terrain)
+        ground = Ground() if ground is None else one_of("ground", ground, Ground)
+        terrain = Terrain.flat() if terrain is None else one_of("terrain", terrain, Terrain)
         self.filters = FilterSettings() if filters is None else one_of("filters", filters, FilterSettings)
-        self.integrator = check_choice("integrator", integrator, SCHEMES)
+        integrator = check_choice("integrator", integrator, SCHEMES)
         self.sim_dt = check_number("sim_dt", sim_dt, low=1e-7, high=self.filters.longest_step)
         self.num_envs = count("num_envs", num_envs)
         self.num_threads = check_threads(num_threads)
-        self.profiles = [leg_profile(limb.geometry) for limb in self.limbs]
-        self.step_error = check_number("step_error", step_error, low=0, high=1, exclusive_low=True)
+        profiles = [leg_profile(limb.geometry) for limb in legs]
+        step_error = check_number("step_error", step_error, low=0, high=1, exclusive_low=True)
         length = StepLength(
-            self.limbs,
-            self.profiles,
-            self.trunk,
-            self.ground,
-            self.terrain,
-            self.integrator,
-            step_error=self.step_error,
+            legs, profiles, trunk, ground, terrain, integrator, features, limits, step_error=step_error
         )
-        self.step_limits = length.limits
         asked = None if substeps is None else count("substeps", substeps, most=MOST_STEPS)
-        self.substeps = length.choose(self.sim_dt, asked)
+        chosen = length.choose(self.sim_dt, asked)
         self.counts_strides = flag("strides", strides)
+        self.mechanics = Mechanics(
+            legs,
+            profiles,
+            trunk,
+            ground,
+            terrain,
+            integrator,
+            features,
+            limits,
+            step_error,
+            chosen,
+            length.limits,
+            memory.new_model(length, self.filters, self.counts_strides),
+        )
         self._allocate()
 
     def _allocate(self) -> None:
@@ -163,10 +195,10 @@ class TrunkEngine(EngineMotion):
         self.runs_scalar = len(self.limbs) in ONE_BY_ONE and self.num_envs <= MAX_SCALAR_ENVS
         columns = self.num_envs if self.runs_scalar else memory.columns_for(self.num_envs)
         self.blocks = [range(columns)] if self.runs_scalar else blocks(columns, LANES, self.num_threads)
-        self._memory = memory.new_memory(self, self.num_envs, columns, self.reacts)
-        self._model = memory.new_model(self, self.filters, self.counts_strides)
+        self._memory = memory.new_memory(self.mechanics, self.num_envs, columns, self.reacts)
         self._arrangement = ONE_BY_ONE[len(self.limbs)] if self.runs_scalar else SIDE_BY_SIDE
-        self._calls = None
+        self._calls: EngineCalls | None = None
+        self._identity: tuple[Mechanics, dict[str, Any]] | None = None
 
     def __repr__(self) -> str:
         legs = f"{len(self.limbs)} leg{'s' * (len(self.limbs) > 1)}"
@@ -193,7 +225,68 @@ class TrunkEngine(EngineMotion):
         """Return a copy that shares what never changes, such as the legs' tables."""
         return copy.copy(self)
 
-    # Properties
+    # Mechanics, memory and arguments of the kernels, for callers with kernels of their own
+
+    @property
+    def limbs(self) -> Sequence[Limb]:
+        """Legs in their places."""
+        return self.mechanics.limbs
+
+    @property
+    def profiles(self) -> Sequence[LegProfile]:
+        """Tables of the legs' motion."""
+        return self.mechanics.profiles
+
+    @property
+    def trunk(self) -> Trunk:
+        """Trunk that holds the legs."""
+        return self.mechanics.trunk
+
+    @property
+    def ground(self) -> Ground:
+        """Laws of contact."""
+        return self.mechanics.ground
+
+    @property
+    def terrain(self) -> Terrain:
+        """Heights of the ground, and where it is softer or more slippery."""
+        return self.mechanics.terrain
+
+    @property
+    def integrator(self) -> str:
+        """Scheme of a step, one of `stepping.SCHEMES`."""
+        return self.mechanics.integrator
+
+    @property
+    def features(self) -> layout.Features:
+        """Features on which the layout of the memory depends."""
+        features: layout.Features = self.mechanics.features
+        return features
+
+    @property
+    def motion_limits(self) -> Limits | None:
+        """Limits where the motion should end."""
+        return self.mechanics.motion_limits
+
+    @property
+    def step_error(self) -> float:
+        """Error of the state after a contact [-] for which the number of substeps is chosen."""
+        return self.mechanics.step_error
+
+    @property
+    def substeps(self) -> int:
+        """Number of substeps of `sim_dt`."""
+        return self.mechanics.substeps
+
+    @property
+    def step_limits(self) -> dict[str, float]:
+        """Longest step [s] for each cause, see `step_length`. The limit of friction is reported and not used,
+        because nothing diverges beyond it: on the ground of `HorseLeg-v0` it is 0.14 ms for a horse of 349
+        kg. There forces at 1 ms agree with those at 16 us to 1 % under hooves that slide; under hooves that
+        stand friction is off by 2.7 times its size and the normal force by half, at 0.5 ms by 0.4 % and 0.1
+        %. For clean forces at rest use `substeps` of sim_dt / step_limits["friction"], or a larger
+        `friction_fast`."""
+        return self.mechanics.step_limits
 
     @property
     def total_mass(self) -> float:
@@ -205,7 +298,22 @@ class TrunkEngine(EngineMotion):
         """Weight of trunk and legs [N]."""
         return self.total_mass * GRAVITY
 
-    # Arguments of the kernels, for callers with kernels of their own
+    @property
+    def arrays(self) -> tuple[NDArray[Any], ...]:
+        """First arguments of the kernels of `advance`; their memory stays in place, but a copy has its
+        own."""
+        m = self._memory
+        return (m.data, *self.mechanics.model, m.constants, m.reactions)
+
+    @property
+    def columns(self) -> int:
+        """Number of columns of the memory: environments, idle ones included."""
+        return int(self._memory.data.shape[1])
+
+    @property
+    def results(self) -> NDArray[np.int64]:
+        """Results of the last call, values of `parts.Result`, shape (num_envs,)."""
+        return self._memory.result.astype(np.int64)
 
     def alone(self) -> TrunkEngine:
         """Return a new engine like this one for one environment."""
@@ -226,7 +334,7 @@ class TrunkEngine(EngineMotion):
             contact_law=self.contact_law,
         )
 
-    # State
+    # Starts and motion
 
     def reset(
         self,
@@ -269,10 +377,395 @@ class TrunkEngine(EngineMotion):
         height = heights if y is None else y
         trunk = {"x": x, "y": height, "pitch": pitch, "vx": vx, "vy": vy, "pitch_rate": pitch_rate}
         m.trunk[:, where], m.limbs[:, :, where] = memory.start(
-            self, values, crank_angle, crank_angle_rate, trunk, heights
+            self.mechanics, values, crank_angle, crank_angle_rate, trunk, heights
         )
         m.command[:, :, where] = values
         m.account[:, where] = 0.0
         m.strides[:, :, where] = 0.0
         m.result[where] = RESET_REQUESTED
         self._go(-1)
+
+    def command(self, command: ArrayLike, envs: ArrayLike | None = None) -> None:
+        """Command gaits from the next `advance` on, as after a `reset` of some environments.
+
+        Args:
+            command: gait parameters, P = 2 + 2 harmonics of them, of shape (P,), (legs, P) or (legs, P, n),
+                where n is the number of environments that are commanded.
+            envs: environments that are commanded, as indices or as a mask of shape (num_envs,); None is all.
+
+        Raises:
+            ParameterError: the command has a wrong shape or is not finite, or there are no such environments.
+        """
+        gaits = finite("command", command)
+        where = memory.which(envs, self.num_envs)
+        legs = len(self.limbs)
+        size = self.features.gait_size
+        if gaits.shape == (size,) or gaits.shape == (legs, size):
+            gaits = gaits[..., None]
+        elif gaits.shape != (legs, size, where.size):
+            raise ParameterError(
+                f"command: expected shape ({size},), ({legs}, {size}) or {(legs, size, where.size)}, "
+                f"got {gaits.shape}"
+            )
+        self._memory.command[:, :, where] = gaits
+
+    @property
+    def substep(self) -> float:
+        """Length of a substep [s]."""
+        return self.sim_dt / self.substeps
+
+    def advance(
+        self, command: ArrayLike | None = None, steps: int = 1, *, account: bool = True
+    ) -> NDArray[np.int64]:
+        """Advance by `steps` of `sim_dt` under a command.
+
+        Args:
+            command: gait parameters as `command` takes them, for all environments; None keeps the last.
+            steps: number of steps; 0 evaluates forces and accelerations at the present state.
+            account: true to update `account`.
+
+        Returns:
+            Results of the environments, values of `parts.Result`, shape (num_envs,). An environment that
+            could not be simulated has its state and its report from before this call.
+
+        Raises:
+            ParameterError: the command has a wrong shape or is not finite.
+            NotStartedError: no environment was ever reset.
+            KeyboardInterrupt: Ctrl-C during a long call, which then ends after a part of the steps.
+        """
+        steps = count("steps", steps, 0, MOST_STEPS // self.substeps)
+        if command is not None:
+            self.command(command)
+        self._go_on(steps, account)
+        if self._memory.result.any():
+            if np.isnan(self._memory.trunk).all():
+                raise NotStartedError("the engine was asked to move before reset(): expected reset() first")
+            if steps:
+                self.observe()
+        return self._memory.result.astype(np.int64)
+
+    def run(
+        self,
+        command: ArrayLike | None = None,
+        steps: int = 1,
+        every: int = 1,
+        *,
+        continue_past_limits: bool = False,
+    ) -> dict[str, NDArray[Any]]:
+        """Advance and record `state` and `report` at the start and after each `every` steps, for plots.
+
+        Args:
+            command, steps: as in `advance`.
+            every: number of steps from one instant of the record to the next.
+            continue_past_limits: true to continue beyond a limit, as `advance` does.
+
+        Returns:
+            Arrays by name, time on the first axis, and "result", values of `parts.Result`, shape (num_envs,).
+            Once an environment does not end OK all stop, and the record ends there: with the instant where a
+            limit was passed, without one that could not be simulated.
+
+        Raises:
+            ParameterError, NotStartedError: as `advance`.
+        """
+        steps = count("steps", steps, low=0)
+        every = count("every", every)
+        self.advance(command, 0)
+        m = self._memory
+        times = 1 + -(-steps // every)
+        whole = np.empty((*m.data.shape, times))
+        whole[..., 0] = m.data
+        for k in range(1, times):
+            self._go(min(every, steps - (k - 1) * every), True)
+            if not m.result.any():
+                whole[..., k] = m.data
+                continue
+            if lost := broken(m.result).any():
+                self.observe()
+            whole[..., k] = m.data
+            if lost or not continue_past_limits:
+                times = k if lost else k + 1
+                break
+        kept = memory.memory_of(whole[..., :times], self.num_envs, m.constants, m.reactions, m.features)
+        # `np.moveaxis` would do the same, and takes longer than the motion of one environment.
+        time_first = {2: (1, 0), 3: (2, 0, 1)}
+        named = {
+            name: values.transpose(time_first[values.ndim])
+            for name, values in memory.named_rows(kept).items()
+        }
+        return NamedColumns(named | {"result": self.results})
+
+    def _go_on(self, steps: int, account: bool) -> None:
+        """Advance as `_go`, a long call in parts, so that Ctrl-C takes effect."""
+        left = steps * self.substeps
+        part = max(PART // (self.columns * len(self.limbs)), LEAST_PART) // CHECK_EVERY * CHECK_EVERY
+        if left <= part:
+            self._go(steps, account)
+            return
+        m = self._memory
+        kept = self._copy((*state_parts.STATE, "stride_sums", "result"))
+        first = np.zeros(self.num_envs)
+        sums = np.zeros_like(m.stride_sums)
+        are_peaks = np.array(layout.stride_peaks(self.features))
+        while left and not broken(first).all():
+            # the short part first: limits are checked at steps counted from the end
+            length = left % part or part
+            self._go_substeps(length, account)
+            left -= length
+            # a failure stays, and so does a limit unless a failure follows
+            first = np.where(broken(first) | ((first != 0) & ~broken(m.result)), first, m.result)
+            peaks = np.maximum(sums[:, are_peaks], m.stride_sums[:, are_peaks])
+            sums += m.stride_sums
+            sums[:, are_peaks] = peaks
+        lost = broken(first)
+        m.stride_sums[:] = sums
+        # an environment that fails has its state from before the call, not from before the part
+        for name, values in kept.items():
+            getattr(m, name)[..., lost] = values[..., lost]
+        m.result[:] = first
+
+    def _go(self, steps: int, account: bool = False) -> None:
+        self._go_substeps(steps * self.substeps, account)
+
+    def _go_substeps(self, substeps: int, account: bool) -> None:
+        """Advance by substeps; a negative number starts the environments that are to be started."""
+        calls = self._present_calls()
+        try:
+            calls.run(substeps < 0, self.substep, max(substeps, 0), account)
+        except UserFunctionError as error:
+            raise user_error("contact_law", error) from None
+
+    def compile(self) -> None:
+        """Trace and compile the kernel that starts environments, or load it.
+
+        Raises:
+            ParameterError: the law of contact cannot be part of a kernel.
+        """
+        try:
+            self._present_calls().kernel(is_start=True).compile()
+        except UserFunctionError as error:
+            raise user_error("contact_law", error) from None
+
+    def _present_calls(self) -> EngineCalls:
+        """Return kernels and arguments for the present model, which other conditions may have replaced."""
+        if self._calls is None or self._calls.model is not self.mechanics.model:
+            kind = EngineKind(
+                self.features, self.contact_law, static_of(self.mechanics.model[0]), self.reacts
+            )
+            self._calls = EngineCalls(
+                kind, self._arrangement, self.mechanics.model, self.arrays, self.blocks, self.num_threads
+            )
+        return self._calls
+
+    def push(self, forward: ArrayLike, upward: ArrayLike = 0.0, envs: ArrayLike | None = None) -> None:
+        """Push trunks at their centres of mass, and so motors' cranks. Reports show it from the next call on.
+
+        Args:
+            forward, upward: impulses [N s], one number, or one for each environment that is pushed.
+            envs: environments that are pushed, as indices or as a mask of shape (num_envs,); None is all.
+
+        Raises:
+            ParameterError: an impulse beyond `MOST_IMPULSE` or of wrong shape, bad `envs`, or a fixed trunk.
+            NotStartedError: no environment was ever reset.
+        """
+        where = memory.each_once(envs, self.num_envs)
+        if np.isnan(self._memory.trunk).all():
+            raise NotStartedError("the engine was asked to push before reset(): expected reset() first")
+        if self.trunk.kind == "fixed":
+            raise ParameterError("push: expected a trunk that moves, got a fixed one")
+        pushed = {"forward": forward, "upward": upward}
+        push = np.array([spread(name, given, where.shape, MOST_IMPULSE) for name, given in pushed.items()])
+        m = self._memory
+        moving = views(layout.Moving, m.trunk[layout.TrunkState.rows("moving")])
+        place = views(layout.TrunkReport, m.trunk_report).place[:, where]
+        if self.trunk.kind == "rail":
+            push[1] = 0.0
+        if any(isinstance(limb.drive, Motor) for limb in self.limbs):
+            named = dict(zip(ARRAYS, self.arrays, strict=True))
+            which = np.ascontiguousarray(where, np.int64)
+            run = push_kernel(EngineKind(self.features, None, static_of(self.mechanics.model[0])))
+            run(run.parameters[0].hold({**named, "impulses": push, "which": which}))
+        moving.momentum[:, where] += push
+        if self.trunk.kind == "free":
+            off = place - moving.centre[:, where]
+            moving.spin[where] += off[0] * push[1] - off[1] * push[0]
+
+    def vary(
+        self,
+        env: int,
+        trunk: Trunk | None = None,
+        ground: Ground | None = None,
+        drive: Drive | None = None,
+        limbs: Sequence[Limb] | None = None,
+    ) -> None:
+        """Give one environment its own masses, springs, ground, motors or legs; it must be reset afterwards.
+
+        Args:
+            env: index of the environment.
+            trunk, ground, drive: those of this environment, with the kinds, exponent and laws of the
+                engine's; None is the engine's own. `total_mass`, `weight` and `step_limits` stay
+                those of the engine.
+            limbs: legs of this environment, in other places, with other springs of the hooves or, in an
+                engine with `limits`, of other sizes, similar to the engine's (`Geometry.scaled`); their trunk
+                needs another height, too. None is the engine's own. Joint reactions are not computed for legs
+                of another size. The step stays the one that the engine's own legs and springs need.
+
+        Raises:
+            ParameterError: a setting that environments share differs, or there is no such environment.
+        """
+        env = self._env(env)
+        trunk = self.trunk if trunk is None else one_of("trunk", trunk, Trunk)
+        ground = self.ground if ground is None else one_of("ground", ground, Ground)
+        varied = self.limbs if limbs is None else all_of("limbs", limbs, Limb)
+        varied = [limb if drive is None else replace(limb, drive=drive) for limb in varied]
+        memory.check_shared(self.mechanics, trunk, ground, varied)
+        if self.reacts and any(
+            limb.geometry != mine.geometry for limb, mine in zip(varied, self.limbs, strict=True)
+        ):
+            raise ParameterError("limbs: expected the engine's own geometries where it computes reactions")
+        m = self._memory
+        m.trunk_settings[:, env], m.limb_settings[:, :, env] = memory.settings_of(
+            self.mechanics, trunk, ground, varied
+        )
+
+    # Reports
+
+    @property
+    def state(self) -> dict[str, Floats]:
+        """State by name: rows of `layout.TRUNK_STATE`, shape (num_envs,), and of `leg_state`, shape (legs,
+        num_envs)."""
+        return self._named(layout.TRUNK_STATE + layout.leg_state(self.features))
+
+    @property
+    def report(self) -> dict[str, Floats]:
+        """Forces, torques and motion at the present instant by name: `layout.TRUNK_REPORT`, shape
+        (num_envs,), and `LEG_REPORT`, shape (legs, num_envs)."""
+        return self._named(layout.TRUNK_REPORT + layout.LEG_REPORT)
+
+    def _named(self, names: Sequence[str]) -> dict[str, Floats]:
+        named = memory.named_rows(self._memory)
+        return NamedColumns({name: named[name].copy() for name in names})
+
+    @property
+    def account(self) -> dict[str, Floats]:
+        """Integrals since the reset by name, `layout.account`, shape (num_envs,)."""
+        return {name: self._memory.account[k].copy() for k, name in enumerate(layout.account(self.features))}
+
+    @property
+    def strides(self) -> dict[str, Floats]:
+        """Open stance and sums of the last call by name, `layout.STRIDES` and `stride_sums`, shape (legs,
+        num_envs); see `observables`. Zeros unless the engine was made with `strides=True`."""
+        m = self._memory
+        whole = np.concatenate([m.strides, m.stride_sums], axis=1)
+        return {
+            name: whole[:, k] for k, name in enumerate(layout.STRIDES + layout.stride_sums(self.features))
+        }
+
+    def reactions(self) -> Reactions:
+        """Return the joint reactions at the present instant: of joints, shape (legs, 20, 2, num_envs), and
+        the moments, shape (legs, num_envs).
+
+        Raises:
+            ParameterError: the engine was not made with `reactions=True`.
+        """
+        if not self.reacts:
+            raise ParameterError("reactions: expected an engine made with reactions=True, got one without")
+        rows = self._memory.reactions[:, :, : self.num_envs]
+        legs, _, n = rows.shape
+        form = layout.reactions_layout(self.features.structure)
+        parts = {name: rows[:, form.rows(name)].copy() for name in form.fields}
+        joints = parts.pop("joints").reshape(legs, -1, 2, n)
+        # of one weld or moment the axis is left out
+        moments = {name: part[:, 0] if part.shape[1] == 1 else part for name, part in parts.items()}
+        return Reactions(joints, **moments)
+
+    def messages(self) -> list[str]:
+        """Return a sentence for each environment: how it ended."""
+        never = np.isnan(self._memory.trunk).all(0)
+        return [
+            "this environment was never reset" if new else Result(int(code)).message
+            for code, new in zip(self._memory.result, np.atleast_1d(never), strict=True)
+        ]
+
+    # States
+
+    def get_state(self) -> dict[str, Any]:
+        """Return copies of all arrays that change; a run that continues from them has the same bits."""
+        return self._copy(state_parts.STATE) | {"layout": dict(self._layout)}
+
+    def set_state(self, state: Mapping[str, Any]) -> None:
+        """Restore what `get_state` returned, and evaluate forces and accelerations there.
+
+        Raises:
+            ParameterError: the state belongs to an engine that would continue differently, lacks a part, or
+                has numbers that are not finite or beyond `layout.MAX_STATE` in environments that were reset
+                once.
+        """
+        arrays, reset = state_parts.read_state(self._layout, self._memory, state)
+        result = np.where(reset, 0.0, self._memory.result)
+        self._put(arrays)
+        self._memory.result[:] = result
+        self._go(0)
+        # again, because the evaluation also stores contacts and counts stances
+        self._put(arrays)
+        self._memory.result[:] = result
+        self._memory.stride_sums[:] = 0.0
+
+    @property
+    def _layout(self) -> dict[str, Any]:
+        """Settings that a state must share with the engine. Stored for the present mechanics, because its
+        digests take as long as ten steps."""
+        if self._identity is None or self._identity[0] is not self.mechanics:
+            identity = state_parts.identity_of(
+                self.mechanics,
+                self.filters,
+                num_envs=self.num_envs,
+                sim_dt=self.sim_dt,
+                substeps=self.substeps,
+            )
+            self._identity = (self.mechanics, identity)
+        return self._identity[1]
+
+    def observe(self) -> None:
+        """Evaluate forces and accelerations at the present state; change only `report` and `reactions`."""
+        kept = self._copy((*state_parts.STATE, "stride_sums", "result"))
+        self._go(0)
+        self._put(kept)
+
+    def column(self, env: int) -> Floats:
+        """Return a copy of all memory of one environment: state, settings, command, report; shape (rows,)."""
+        return self._memory.data[:, self._env(env)].copy()
+
+    def set_column(self, env: int, column: Floats) -> None:
+        """Restore what `column` returned, of an engine like this one.
+
+        Raises:
+            ParameterError: another shape, or numbers that are not finite or beyond `layout.MAX_STATE` in an
+                environment that was reset.
+        """
+        m = self._memory
+        env = self._env(env)
+        try:
+            values = np.array(column, dtype=np.float64)
+        except (TypeError, ValueError):
+            raise ParameterError(f"column: expected numbers, got {column!r}") from None
+        if values.shape != m.data.shape[:1]:
+            raise ParameterError(f"column: expected shape {m.data.shape[:1]}, got {values.shape}")
+        parts = memory.memory_of(values[:, None], 1, m.constants, m.reactions[..., :1], m.features)
+        state_parts.check_column(parts, m.limb_settings[..., env : env + 1])
+        m.data[:, env] = values
+
+    def _env(self, env: Any) -> int:
+        return count("env", env, low=0, most=self.num_envs - 1)
+
+    def command_in(self, column: Floats) -> Floats:
+        """Return the command in such a column, shape (legs, 2 + 2 harmonics)."""
+        form = engine_layout(self.features)
+        legs = column[form.trunk_rows :].reshape(len(self.limbs), form.leg_rows)
+        return legs[:, form.leg_memory.rows("command")].copy()
+
+    def _copy(self, names: Sequence[str]) -> dict[str, NDArray[Any]]:
+        return {name: getattr(self._memory, name).copy() for name in names}
+
+    def _put(self, arrays: Mapping[str, NDArray[Any]]) -> None:
+        for name, values in arrays.items():
+            getattr(self._memory, name)[:] = values

@@ -371,6 +371,18 @@ def which(envs: ArrayLike | None, num_envs: int) -> NDArray[np.int64]:
     )
 
 
+def each_once(envs: ArrayLike | None, num_envs: int) -> NDArray[np.int64]:
+    """Return indices as `which` does, of environments that are named once.
+
+    Raises:
+        ParameterError: other environments, or one twice: NumPy would add the last of its two values alone.
+    """
+    where = which(envs, num_envs)
+    if np.unique(where).size < where.size:
+        raise ParameterError(f"envs: expected each environment once, got {envs!r}")
+    return where
+
+
 def gaits_of(gaits: Any, legs: int, n: int, harmonics: int) -> Floats:
     """Return `gaits` of `TrunkEngine.reset` as an array of shape (legs, 2 + 2 harmonics, n)."""
     if isinstance(gaits, np.ndarray):

@@ -243,9 +243,9 @@ class Limb:
         object.__setattr__(self, "hip", (float(x), float(y)))
 
 
-@dataclass(eq=False, repr=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Mechanics:
-    """Legs on a trunk over the ground, and the scheme that moves them."""
+    """Legs on a trunk over the ground, and the scheme that moves them, as settings ask for."""
 
     limbs: Sequence[Limb]
     profiles: Sequence[LegProfile]  # of each leg
@@ -256,6 +256,9 @@ class Mechanics:
     features: Any = None  # `layout.Features`, of an engine
     motion_limits: Limits | None = None
     step_error: float = 0.01  # of the state after a contact, with which steps are chosen [-]
+    substeps: int = 1
+    step_limits: dict[str, float] = field(default_factory=dict)  # longest step [s] for each cause
+    model: tuple[NDArray[Any], ...] = ()  # constant arrays of the kernels, see `memory.new_model`
 
 
 class Reactions(NamedTuple):

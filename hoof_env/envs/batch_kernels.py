@@ -109,7 +109,7 @@ class BatchKernels:
         Raises:
             ParameterError: a function from outside cannot be part of them.
         """
-        self._compile(self._kernels_for(conditions["task_record"], conditions["_model"][0]))
+        self._compile(self._kernels_for(conditions["task_record"], conditions["mechanics"].model[0]))
 
     def find(self) -> None:
         """Find kernels and arrays for calls, after any of them was replaced."""

@@ -63,7 +63,7 @@ OF_BATCH = (
     "strength",
     "task_record",
 )
-OF_ENGINE = ("trunk", "ground", "limbs", "terrain", "substeps", "step_limits", "_model")
+OF_ENGINE = ("mechanics",)
 """Attributes of a batch, and of its engine, that follow from these settings."""
 
 KERNEL = "kernel mark"
@@ -82,11 +82,12 @@ def conditions_of(batch: Any) -> Conditions:
 
 def _act_alike(one: Conditions, other: Conditions) -> bool:
     """True if kernels read the same numbers under both conditions."""
-    models = zip(one["_model"], other["_model"], strict=True)
+    mine, others = one["mechanics"], other["mechanics"]
+    models = zip(mine.model, others.model, strict=True)
     return bool(
-        one["substeps"] == other["substeps"]
+        mine.substeps == others.substeps
         and one["task_record"].tobytes() == other["task_record"].tobytes()
-        and all(np.array_equal(mine, others) for mine, others in models)
+        and all(np.array_equal(array, same) for array, same in models)
     )
 
 
@@ -213,8 +214,6 @@ def enter(batch: Any, conditions: Conditions) -> None:
         setattr(batch, name, conditions[name])
     for name in OF_ENGINE:
         setattr(batch.engine, name, conditions[name])
-    # The engine keeps the description of its states, in which the terrain is, after the first state.
-    vars(batch.engine).pop("_layout", None)
     # Addresses are found once for each conditions: a step enters all of them.
     if PLACES[0] in conditions:
         for name in PLACES:

@@ -140,7 +140,7 @@ def test_a_state_goes_on_as_if_it_had_never_been_away(kind, n):
 def test_tables_begin_with_a_line_of_the_cache():
     for legs in range(1, 6):  # NumPy's own arrays do by chance
         limbs = [Limb(LEG.replace(linear_density=1.0 + i)) for i in range(legs)]
-        assert TrunkEngine(limbs, Trunk("free"), Ground())._model[1].ctypes.data % 64 == 0
+        assert TrunkEngine(limbs, Trunk("free"), Ground()).mechanics.model[1].ctypes.data % 64 == 0
 
 
 @pytest.mark.parametrize(("n", "place"), [(16, 64), (4000, 2**21)])

@@ -6,15 +6,16 @@ import numpy as np
 import pytest
 
 from hoof_env import Limb, ParameterError, Trunk, TrunkEngine, load_gait, load_geometry
-from hoof_env.dynamics import engine_motion, layout
+from hoof_env.dynamics import engine as engine_module
+from hoof_env.dynamics import layout
 from hoof_env.dynamics.layout import PLAIN, Quantity, StrideSums, stride_peaks, stride_sums
 from hoof_env.simd.layout import Row
 
 
 def run(steps, part=None, monkeypatch=None, mass=100.0, **options):
     if part:
-        monkeypatch.setattr(engine_motion, "PART", part)
-        monkeypatch.setattr(engine_motion, "LEAST_PART", part)
+        monkeypatch.setattr(engine_module, "PART", part)
+        monkeypatch.setattr(engine_module, "LEAST_PART", part)
     leg = load_geometry("identified")
     engine = TrunkEngine(
         [Limb(leg)], Trunk("rail", mass=mass, height=leg.hip_height), strides=True, **options

@@ -57,7 +57,7 @@ def test_a_copy_shares_the_tables_and_goes_its_own_way(env_id, many):
     for action in taken[:4]:
         env.step(action)
     twin, third = copy.deepcopy(env), copy.deepcopy(env)
-    for one, other in zip(twin.engine._model, env.engine._model, strict=True):
+    for one, other in zip(twin.engine.mechanics.model, env.engine.mechanics.model, strict=True):
         assert one is other
     assert twin.geometry is env.geometry
     assert not np.shares_memory(twin.engine.arrays[0], env.engine.arrays[0])
