@@ -16,13 +16,19 @@ from dataclasses import dataclass
 from functools import lru_cache, partial
 from typing import Any
 
-from hoof_env.dynamics.form import EngineLayout, engine_layout
 from hoof_env.dynamics.hoof import level_ground, lift_heel, remember_contacts
-from hoof_env.dynamics.layout import Features, LegMemory, LegRows, TrunkMemory, TrunkRows
+from hoof_env.dynamics.layout import (
+    EngineLayout,
+    Features,
+    LegMemory,
+    LegRows,
+    TrunkMemory,
+    TrunkRows,
+    engine_layout,
+)
 from hoof_env.dynamics.limits import CHECK_EVERY, check_joints, check_trunk, clear_limits
-from hoof_env.dynamics.mechanics import evaluate, keep_still
+from hoof_env.dynamics.mechanics import evaluate, keep_still, velocities_to_momenta
 from hoof_env.dynamics.model import MODEL, unpack_model
-from hoof_env.dynamics.momenta import velocities_to_momenta
 from hoof_env.dynamics.observables import count_stride, keep_account, report_leg, report_trunk
 from hoof_env.dynamics.parts import FIXED, Result
 from hoof_env.dynamics.reactions import find_reactions

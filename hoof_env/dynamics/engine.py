@@ -22,7 +22,7 @@ from hoof_env.dynamics import layout, memory
 from hoof_env.dynamics import state as state_parts
 from hoof_env.dynamics.advance import ARRAYS, LANES, ONE_BY_ONE, RESET_REQUESTED, SIDE_BY_SIDE, EngineKind
 from hoof_env.dynamics.engine_calls import EngineCalls
-from hoof_env.dynamics.form import engine_layout
+from hoof_env.dynamics.layout import engine_layout
 from hoof_env.dynamics.limits import CHECK_EVERY
 from hoof_env.dynamics.model import static_of
 from hoof_env.dynamics.names import NamedColumns

@@ -30,6 +30,7 @@ from hoof_env.simd import (
     Lanes,
     Number,
     Plane,
+    Truth,
     Whole,
     absolute,
     block_at,
@@ -436,3 +437,32 @@ def accelerate_crank(trunk: TrunkRows, leg: LegRows, motors: bool) -> None:
         coupling = leg.crank_pitch_coupling
         pull = dot(u, trunk.acceleration) + coupling * trunk.pitch_acceleration
         leg.theta_acceleration = leg.free_theta_acceleration - leg.crank_mobility * pull  # (E9)
+
+
+def velocities_to_momenta(
+    trunk: TrunkRows, legs: LegRows, leg_count: Whole, model: Model, starts: Truth
+) -> None:
+    """Compute centre of mass, momentum and spin of all bodies at a start, as `move_trunk` inverts it (E7).
+
+    Their rows hold the trunk's place, velocity and pitch rate before, and keep them in lanes not in `starts`.
+    """
+    gather_legs(trunk, legs, leg_count, model)
+    place = trunk.state.moving.centre
+    velocity = trunk.state.moving.momentum
+    rate = trunk.state.moving.spin
+    moment = trunk.first_moment
+    drift = trunk.relative_momentum
+    per_mass = trunk.settings.inverse_mass
+    centre = place + per_mass * moment
+    momentum = trunk.settings.total_mass * velocity + drift
+    spin = full_like(trunk, 0.0)
+    if model.kind == RAIL:
+        centre = vector(centre.real, place.imag)
+        momentum = vector(momentum.real, 0.0)
+    if model.kind == FREE:
+        momentum = momentum + rate * perpendicular(moment)
+        about = trunk.composite_inertia - dot(moment, moment) * per_mass
+        spin = rate * about + trunk.relative_angular_momentum - cross(moment, drift) * per_mass
+    trunk.state.moving.centre = where(starts, centre, place)
+    trunk.state.moving.momentum = where(starts, momentum, velocity)
+    trunk.state.moving.spin = where(starts, spin, rate)

@@ -12,7 +12,6 @@ from numpy.typing import ArrayLike, NDArray
 from hoof_env.constants import GRAVITY
 from hoof_env.dynamics import layout
 from hoof_env.dynamics.advance import LANES
-from hoof_env.dynamics.form import engine_layout
 from hoof_env.dynamics.layout import (
     MAX_STATE,
     Features,
@@ -21,6 +20,7 @@ from hoof_env.dynamics.layout import (
     Moving,
     TrunkSettings,
     TrunkState,
+    engine_layout,
 )
 from hoof_env.dynamics.leg_constants import PAPER_STRUCTURE, leg_constants, structure_of
 from hoof_env.dynamics.model import MODEL
@@ -409,7 +409,7 @@ def start(
     n), and of the legs, (legs, rows of a `LegState`, n). `heights` are those of the trunks at rest.
 
     The rows for centre of mass, momentum and spin of all hold the trunk's place, velocity and pitch rate,
-    from which the kernels compute the former (`momenta.velocities_to_momenta`). `TrunkEngine.reset` says
+    from which the kernels compute the former (`mechanics.velocities_to_momenta`). `TrunkEngine.reset` says
     what `trunk` holds and what is refused.
     """
     legs = len(scene.limbs)

@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from hoof_env.dynamics.form import EngineLayout
+from hoof_env.dynamics.layout import EngineLayout
 from hoof_env.simd import Lanes, Matrix, Pointer
 from hoof_env.simd.memory import Record
 

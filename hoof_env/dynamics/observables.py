@@ -21,10 +21,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from hoof_env.dynamics.form import EngineLayout
 from hoof_env.dynamics.layout import (
     Account,
     Contact,
+    EngineLayout,
     LegReport,
     LegRows,
     PointReport,

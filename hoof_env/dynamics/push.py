@@ -5,8 +5,7 @@ from __future__ import annotations
 from functools import lru_cache
 
 from hoof_env.dynamics.advance import EngineKind, leg_memory_of, read_leg, read_trunk
-from hoof_env.dynamics.form import engine_layout
-from hoof_env.dynamics.layout import LegRows, TrunkRows
+from hoof_env.dynamics.layout import LegRows, TrunkRows, engine_layout
 from hoof_env.dynamics.mechanics import (
     accelerate_crank,
     accelerate_trunk,

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from hoof_env.dynamics.advance import EngineKind
 from hoof_env.dynamics.engine import TrunkEngine
-from hoof_env.dynamics.form import engine_layout
+from hoof_env.dynamics.layout import engine_layout
 from hoof_env.dynamics.model import static_of
 from hoof_env.envs.batch_build import find_entries
 from hoof_env.envs.conditions import Conditions, under_each

@@ -13,13 +13,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from hoof_env.dynamics.form import engine_layout
 from hoof_env.dynamics.layout import (
     LEG_REPORT,
     PLAIN,
     STRIDES,
     TRUNK_REPORT,
     Features,
+    engine_layout,
     leg_state,
     stride_sums,
 )

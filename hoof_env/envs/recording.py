@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hoof_env.dynamics.engine import TrunkEngine
-from hoof_env.dynamics.form import engine_layout
+from hoof_env.dynamics.layout import engine_layout
 from hoof_env.dynamics.memory import LIFT_OFF
 from hoof_env.dynamics.names import NamedColumns
 from hoof_env.dynamics.parts import broken

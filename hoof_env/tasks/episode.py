@@ -8,8 +8,7 @@ from typing import Annotated, Any, NamedTuple
 
 import numpy as np
 
-from hoof_env.dynamics.form import engine_layout
-from hoof_env.dynamics.layout import PLAIN, Features, StrideSums, stride_peaks
+from hoof_env.dynamics.layout import PLAIN, Features, StrideSums, engine_layout, stride_peaks
 from hoof_env.gait import PARAMETERS
 from hoof_env.simd.layout import Block, Layout, Row, Size, Vector, extended
 from hoof_env.tasks.own_parts import Own
