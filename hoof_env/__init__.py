@@ -28,7 +28,6 @@ if TYPE_CHECKING:
     from hoof_env.envs.policies import make_policy as make_policy
     from hoof_env.envs.sb3 import Sb3VecEnv as Sb3VecEnv
     from hoof_env.envs.vector import HorseLegVectorEnv as HorseLegVectorEnv
-    from hoof_env.eq8.solver import ConstrainedLeg as ConstrainedLeg
     from hoof_env.errors import DataFileError as DataFileError
     from hoof_env.errors import GeometryError as GeometryError
     from hoof_env.errors import HoofEnvError as HoofEnvError
@@ -43,6 +42,7 @@ if TYPE_CHECKING:
     from hoof_env.leg.geometry import Geometry as Geometry
     from hoof_env.leg.geometry import load_geometry as load_geometry
     from hoof_env.leg.presets import read_preset as read_preset
+    from hoof_env.paper_solver.solver import ConstrainedLeg as ConstrainedLeg
     from hoof_env.policies.find import load_policy as load_policy
     from hoof_env.policies.onnx_file import stamp_onnx as stamp_onnx
     from hoof_env.tasks.horse_gaits import HorseGait as HorseGait
@@ -55,7 +55,7 @@ if TYPE_CHECKING:
     from hoof_env.tasks.reward import Term as Term
 
 _MODULES = {
-    "eq8.solver": "ConstrainedLeg",
+    "paper_solver.solver": "ConstrainedLeg",
     "dynamics.engine": "TrunkEngine",
     "dynamics.parts": "HoofSpring Limb Limits Motor Prescribed Result Trunk",
     "dynamics.step_length": "StepWarning",

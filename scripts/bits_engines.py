@@ -119,12 +119,13 @@ def solvers() -> Cases:
     """The paper's own solver, and the leg that the package has."""
     from hoof_env import ConstrainedLeg, Ground, load_gait, load_geometry
 
-    # the solver had no room of its own before
+    # the solver's room had another name in an earlier commit
     try:
-        from hoof_env.eq8.integrators import INTEGRATORS
-        from hoof_env.eq8.solver import new_trace
+        from hoof_env.paper_solver.integrators import INTEGRATORS
+        from hoof_env.paper_solver.solver import new_trace
     except ModuleNotFoundError:
-        from hoof_env.dynamics.constrained import INTEGRATORS, new_trace
+        from hoof_env.eq8.integrators import INTEGRATORS  # type: ignore[import-not-found,no-redef]
+        from hoof_env.eq8.solver import new_trace  # type: ignore[import-not-found,no-redef]
 
     leg = load_geometry("identified")
     digests = Digests()

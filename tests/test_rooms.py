@@ -17,7 +17,7 @@ FLOORS = (
     ("hoof_env/leg",),
     ("hoof_env/ground", "hoof_env/gait.py"),
     ("hoof_env/dynamics",),
-    ("hoof_env/eq8",),
+    ("hoof_env/paper_solver",),
     ("hoof_env/render",),
     ("hoof_env/tasks",),
     ("hoof_env/envs", "hoof_env/__init__.py"),

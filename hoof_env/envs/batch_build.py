@@ -16,10 +16,10 @@ from hoof_env.dynamics.parts import LARGEST
 from hoof_env.dynamics.step_length import StepLength
 from hoof_env.dynamics.stepping import SCHEMES
 from hoof_env.envs.scene import Slots
-from hoof_env.eq8.episodes import PaperSolver, Scheme
-from hoof_env.eq8.integrators import INTEGRATORS
 from hoof_env.errors import ParameterError, check_choice, check_number
 from hoof_env.leg.profile import leg_profile
+from hoof_env.paper_solver.episodes import PaperSolver, Scheme
+from hoof_env.paper_solver.integrators import INTEGRATORS
 from hoof_env.tasks.delays import check_delay, check_kept, parts_of
 from hoof_env.tasks.episode import ACTIONS, task_type
 from hoof_env.tasks.observation import check_groups, groups_of, observed

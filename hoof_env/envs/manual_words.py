@@ -11,10 +11,10 @@ from typing import Any
 from hoof_env.dynamics.parts import ONE_LEG
 from hoof_env.dynamics.stepping import SCHEMES
 from hoof_env.envs.batch_reports import SUMMARY
-from hoof_env.eq8.integrators import INTEGRATORS
 from hoof_env.gait import WIDEST, FilterSettings
 from hoof_env.ground.laws import FRICTION_LAWS, NORMAL_LAWS
 from hoof_env.leg.presets import preset_names, presets_of_paper
+from hoof_env.paper_solver.integrators import INTEGRATORS
 from hoof_env.tasks import horse, leg_starts
 from hoof_env.tasks.body_settings import About
 from hoof_env.tasks.horse_gaits import FASTEST, FOLLOWED, SIZES, horse_gaits

@@ -14,8 +14,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from hoof_env.eq8.solver import TRACE
 from hoof_env.errors import ParameterError
+from hoof_env.paper_solver.solver import TRACE
 
 Interval = tuple[float, float]
 """Start and end [s]."""

@@ -8,13 +8,13 @@ from hypothesis import strategies as st
 
 from hoof_env.dynamics.engine import TrunkEngine
 from hoof_env.dynamics.parts import Limb, Limits, Motor, Prescribed, Result, Trunk
-from hoof_env.eq8.constraints import Constraints, closed_form
-from hoof_env.eq8.solver import ConstrainedLeg, new_trace
 from hoof_env.gait import GaitParameters, Motion
 from hoof_env.ground.terrain import Terrain
 from hoof_env.leg.geometry import load_geometry
 from hoof_env.leg.kinematics import FrameMotion, pose
 from hoof_env.leg.mechanism import FRAME
+from hoof_env.paper_solver.constraints import Constraints, closed_form
+from hoof_env.paper_solver.solver import ConstrainedLeg, new_trace
 from tests.dynamics.scenes import NATURAL, drives_less_losses, energy, inertia, loads
 from tests.leg.mechanisms import leg_with_everything, random_leg
 

@@ -6,11 +6,11 @@ import pytest
 from hoof_env.constants import GRAVITY
 from hoof_env.dynamics.engine import TrunkEngine
 from hoof_env.dynamics.parts import Limb, Motor, Prescribed, Trunk
-from hoof_env.eq8.solver import ConstrainedLeg
 from hoof_env.gait import load_gait
 from hoof_env.ground.terrain import Terrain
 from hoof_env.leg.geometry import load_geometry
 from hoof_env.leg.kinematics import FrameMotion, pose
+from hoof_env.paper_solver.solver import ConstrainedLeg
 from tests.dynamics.scenes import LEG, NATURAL, RUN, WALK, horse, inertia, loads
 from tests.legs import PRESETS, load_ensemble
 from tests.linkage import FRAME, JOINTS

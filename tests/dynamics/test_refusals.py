@@ -9,10 +9,10 @@ import pytest
 
 from hoof_env.dynamics.engine import TrunkEngine
 from hoof_env.dynamics.parts import HoofSpring, Limb, Limits, Motor, Prescribed, Result, Trunk
-from hoof_env.eq8.solver import ConstrainedLeg, new_trace
 from hoof_env.errors import NotStartedError, ParameterError
 from hoof_env.gait import HarmonicGait
 from hoof_env.ground.contact import Ground
+from hoof_env.paper_solver.solver import ConstrainedLeg, new_trace
 from tests.dynamics.scenes import HIPS, LEG, LOWEST, NATURAL, RUN, WALK, horse
 
 LIMBS = (Limb(LEG, (0.4, 0.0), Motor()), Limb(LEG, (-0.4, 0.0), Prescribed()))

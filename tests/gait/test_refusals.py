@@ -5,7 +5,6 @@ import json
 import numpy as np
 import pytest
 
-from hoof_env.eq8.solver import ConstrainedLeg
 from hoof_env.errors import DataFileError, ParameterError
 from hoof_env.gait import (
     FASTEST_CRANK,
@@ -19,6 +18,7 @@ from hoof_env.gait import (
 )
 from hoof_env.ground.contact import Ground
 from hoof_env.leg.geometry import load_geometry
+from hoof_env.paper_solver.solver import ConstrainedLeg
 from tests.legs import FIRST_FIT
 
 GAIT = dict(zip(PARAMETERS, (1.0, 0.5, 0.0, 0.0), strict=True))

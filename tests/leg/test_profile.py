@@ -7,7 +7,6 @@ import mpmath
 import numpy as np
 import pytest
 
-from hoof_env.eq8.solver import ConstrainedLeg
 from hoof_env.ground.contact import Ground
 from hoof_env.leg import profile as profile_module
 from hoof_env.leg.assembly import transmission_margin
@@ -21,6 +20,7 @@ from hoof_env.leg.profile import (
     functions,
     leg_profile,
 )
+from hoof_env.paper_solver.solver import ConstrainedLeg
 from tests.legs import FIRST_FIT, PRESETS
 
 LEG = load_geometry(FIRST_FIT)

@@ -10,7 +10,6 @@ import pytest
 
 from hoof_env.dynamics.engine import TrunkEngine
 from hoof_env.dynamics.parts import Limb, Motor, Trunk
-from hoof_env.eq8.solver import ConstrainedLeg
 from hoof_env.errors import GeometryError, OutputError, ParameterError
 from hoof_env.ground.contact import Ground
 from hoof_env.leg.geometry import Geometry, load_geometry
@@ -18,6 +17,7 @@ from hoof_env.leg.kinematics import FrameMotion, pose
 from hoof_env.leg.limb_masses import segment_masses, trunk_mass, with_limb_masses
 from hoof_env.leg.mechanism_list import PAPER, read_mechanism
 from hoof_env.leg.profile import LegProfile
+from hoof_env.paper_solver.solver import ConstrainedLeg
 from tests.leg.mechanisms import leg_with_everything
 from tests.legs import FIRST_FIT, FOUR_BAR, FOUR_BAR_LEG
 

@@ -5,11 +5,11 @@ import pytest
 
 from benchmarks.common import ALL, RIGID, Start
 from hoof_env.dynamics.parts import Limb, Motor, Prescribed, Trunk
-from hoof_env.eq8.solver import ConstrainedLeg
 from hoof_env.gait import GaitParameters
 from hoof_env.ground.contact import Ground
 from hoof_env.leg.geometry import load_geometry
 from hoof_env.leg.kinematics import FrameMotion, pose
+from hoof_env.paper_solver.solver import ConstrainedLeg
 from tests.linkage import POINTS
 
 mujoco = pytest.importorskip("mujoco")

@@ -8,9 +8,9 @@ import sympy
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from hoof_env.eq8.constraints import Constraints, closed_form
 from hoof_env.gait import Motion
 from hoof_env.leg.geometry import load_geometry
+from hoof_env.paper_solver.constraints import Constraints, closed_form
 from tests.legs import FIRST_FIT
 from tests.linkage import BODY_LENGTHS, SIZE
 

@@ -16,14 +16,14 @@ from hypothesis import strategies as st
 from hoof_env.dynamics.engine import TrunkEngine
 from hoof_env.dynamics.parts import Limb, Prescribed, Result, Trunk
 from hoof_env.dynamics.step_length import StepWarning
-from hoof_env.eq8.constraints import closed_form
-from hoof_env.eq8.integrators import INTEGRATORS
-from hoof_env.eq8.solver import TRACE, ConstrainedLeg, new_trace
 from hoof_env.gait import LIMITS, GaitParameters
 from hoof_env.ground.contact import Ground
 from hoof_env.leg.geometry import load_geometry
 from hoof_env.leg.kinematics import FrameMotion, pose
 from hoof_env.leg.profile import CELLS, leg_profile
+from hoof_env.paper_solver.constraints import closed_form
+from hoof_env.paper_solver.integrators import INTEGRATORS
+from hoof_env.paper_solver.solver import TRACE, ConstrainedLeg, new_trace
 from tests.dynamics.scenes import LEG as GEOMETRY
 from tests.dynamics.scenes import RUN, WALK, inertia, loads
 from tests.linkage import FRAME, POINTS

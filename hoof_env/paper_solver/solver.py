@@ -28,8 +28,6 @@ from numpy.typing import NDArray
 from hoof_env.constants import GRAVITY
 from hoof_env.dynamics.layout import LEG_REPORT, LEG_STATE, TRUNK_REPORT, TRUNK_STATE
 from hoof_env.dynamics.parts import Reactions, Result, Trunk
-from hoof_env.eq8.constraints import Closure, Constraints, Vector, closed_form
-from hoof_env.eq8.integrators import INTEGRATORS
 from hoof_env.errors import ParameterError, check_choice, check_number, finite, one_of
 from hoof_env.gait import (
     PARAMETERS,
@@ -48,6 +46,8 @@ from hoof_env.leg.assembly import body_coordinate, check_full_revolution
 from hoof_env.leg.geometry import Geometry
 from hoof_env.leg.kinematics import mirror
 from hoof_env.leg.profile import cross
+from hoof_env.paper_solver.constraints import Closure, Constraints, Vector, closed_form
+from hoof_env.paper_solver.integrators import INTEGRATORS
 
 MOTION_NAMES = LEG_STATE[:2] + LEG_REPORT[:4]
 """Names of the fields of `Motion`, whose own are the symbols of Eq. 8's motion law."""

@@ -4,11 +4,11 @@ the tables of those."""
 import numpy as np
 import pytest
 
-from hoof_env.eq8.solver import ConstrainedLeg, new_trace
 from hoof_env.errors import ParameterError
 from hoof_env.gait import load_gait
 from hoof_env.ground.contact import Ground
 from hoof_env.leg.geometry import load_geometry
+from hoof_env.paper_solver.solver import ConstrainedLeg, new_trace
 
 LEG = load_geometry()
 RUN = load_gait("run")

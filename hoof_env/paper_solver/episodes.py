@@ -1,4 +1,4 @@
-"""The paper's solver (Eq. 8, `eq8.solver`) in place of the engine's kernels.
+"""The paper's solver (Eq. 8, `paper_solver.solver`) in place of the engine's kernels.
 
 It reads commands from the engine's memory and writes there the values that reward and observation read, so
 that these are the same for both. It solves one environment after the other and is some ten thousand times
@@ -20,9 +20,9 @@ from hoof_env.dynamics.memory import LIFT_OFF, Memory, memory_of
 from hoof_env.dynamics.names import NamedColumns
 from hoof_env.dynamics.observables import StanceCounter
 from hoof_env.dynamics.parts import Result
-from hoof_env.eq8.solver import TRACE, ConstrainedLeg, ConstrainedState, new_trace
 from hoof_env.errors import ParameterError
 from hoof_env.gait import GaitParameters
+from hoof_env.paper_solver.solver import TRACE, ConstrainedLeg, ConstrainedState, new_trace
 
 Floats = NDArray[np.float64]
 Records = NDArray[np.void]
