@@ -10,7 +10,7 @@ from __future__ import annotations
 import json
 import sys
 import time
-from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
@@ -33,7 +33,6 @@ from hoof_env.errors import (
     check_number,
     parse_pairs,
 )
-from hoof_env.gait import PARAMETERS
 from hoof_env.lab.c3d import ezc3d, write_c3d
 from hoof_env.lab.forces import THRESHOLD, above_threshold, in_units, limbs_of, onto_surface
 from hoof_env.lab.forces import UNITS as FORCE_UNITS
@@ -41,11 +40,8 @@ from hoof_env.lab.opensim import check_bodies, loads_path, write_mot
 from hoof_env.lab.reactions import JointReactions, reaction_units
 from hoof_env.policies.find import default_policy as default_policy
 from hoof_env.policies.find import find_policy as find_policy
-from hoof_env.render.instant import UNITS, Columns, Surroundings, body_units, columns_of
-
-RECORD = {name: unit for name, unit in UNITS.items() if name not in PARAMETERS[1:]} | {"free_moment": "N m"}
-"""Units of a record's columns: fields of `Instant` without the swing's parameters, which are known at the
-end of a control step only. The free moment about the centre of pressure is 0."""
+from hoof_env.record.columns import RECORD, Columns, body_units, columns_of, joined
+from hoof_env.record.surroundings import Surroundings
 
 TELL_SECONDS = 5.0
 """Time between two lines about the progress of an episode [s]."""
@@ -190,19 +186,11 @@ def record_episode(
     return onto_surface(joined(parts, units), surroundings(env).terrain)
 
 
-def joined(parts: Sequence[Columns], units: Collection[str]) -> Columns:
-    """Return the parts of an episode as one record with the columns of `units_of`, in their order; the free
-    moment, which is no column of an episode, comes last."""
-    record = {name: np.concatenate([part[name] for part in parts]) for name in units if name in parts[0]}
-    moments = [name for name in units if name.endswith("free_moment")]
-    return record | {name: np.zeros(len(record["time"])) for name in moments}
-
-
 def units_of(env: gym.Env[Any, Any], reactions: bool = False) -> dict[str, str]:
     """Return the units of a record by column.
 
-    The columns are those of `RECORD`, with `reactions` also those of `reaction_units`. A horse has columns of
-    its trunk, and those of each leg with its name as prefix: `left_fore_force_y`.
+    The columns are `record.columns.RECORD`, and with `reactions` also `reaction_units`. A horse has columns
+    of its trunk, and the columns of each leg with its name as prefix: `left_fore_force_y`.
     """
     of_leg = RECORD | (reaction_units(surroundings(env).geometry.mechanism) if reactions else {})
     return body_units(of_leg, surroundings(env).hips)

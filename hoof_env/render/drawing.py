@@ -13,7 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hoof_env.leg.mechanism_list import flesh_of
-from hoof_env.render.instant import BodyInstant, Instant, Surroundings
+from hoof_env.record.instant import BodyInstant, Instant
+from hoof_env.record.surroundings import Surroundings
 from hoof_env.render.outline import (
     AROUND_M,
     ARROW_M,

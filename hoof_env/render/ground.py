@@ -11,9 +11,9 @@ import pygame
 from numpy.typing import NDArray
 
 from hoof_env.ground.terrain import Terrain
+from hoof_env.record.instant import Instant
 from hoof_env.render.brush import Brush
 from hoof_env.render.colours import SOIL_LINE, Colour
-from hoof_env.render.instant import Instant
 from hoof_env.render.kinds import ALIKE, BODY, SKIN, find_patches, kinds_of, shade
 
 FLANK_M = 0.09  # how far from the hoof the footprint draws the ground down; the model has no width [m]

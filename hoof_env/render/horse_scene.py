@@ -14,10 +14,10 @@ import pygame
 
 from hoof_env.ground.terrain import Terrain
 from hoof_env.leg.geometry import Geometry
+from hoof_env.record.instant import BodyInstant
 from hoof_env.render.brush import FINE, Brush, arrow, bar
 from hoof_env.render.colours import COAT, COAT_EDGE, CRANK, FORCE, GREY, HEEL, TOE
 from hoof_env.render.ground import GroundPainter
-from hoof_env.render.instant import BodyInstant
 from hoof_env.render.outline import AROUND_M, ARROW_M, BODY, EAR, FAR, HORSE_HIP_M, TAIL, LegOutline
 from hoof_env.render.scene import LegScene
 

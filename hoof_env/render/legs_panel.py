@@ -11,9 +11,9 @@ from typing import Any
 
 import pygame
 
+from hoof_env.record.instant import BodyInstant
 from hoof_env.render.brush import FINE, Brush
 from hoof_env.render.colours import FAINT, FORCE, GREY, INK, OF_LEGS, PAPER, Colour
-from hoof_env.render.instant import BodyInstant
 from hoof_env.render.panel import SECONDS, SMALLEST_SCALE, Stances, interval_of, nice
 
 NUMBERS = (

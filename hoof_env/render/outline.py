@@ -12,7 +12,7 @@ from hoof_env.gait import LIMITS
 from hoof_env.leg.assembly import solve
 from hoof_env.leg.geometry import Geometry
 from hoof_env.leg.kinematics import pose
-from hoof_env.render.instant import Instant
+from hoof_env.record.instant import Instant
 
 TRUNK_M = (1.05, 0.42, 0.16)  # the trunk about O: half its length, its height above and below [m]
 USUAL_HIP_M = 1.5

@@ -12,9 +12,9 @@ import numpy as np
 import pygame
 
 from hoof_env.dynamics.observables import StanceCounter
+from hoof_env.record.instant import BodyInstant, Instant
 from hoof_env.render.brush import FINE, Brush
 from hoof_env.render.colours import CRANK, FAINT, FORCE, GREY, INK, PAPER
-from hoof_env.render.instant import BodyInstant, Instant
 
 SECONDS = 3  # time shown [s]
 RESOLUTION = 0.01  # the curve keeps the largest force of every such interval [s]

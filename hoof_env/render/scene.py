@@ -18,6 +18,8 @@ import pygame
 from hoof_env.ground.terrain import Terrain
 from hoof_env.leg.geometry import Geometry
 from hoof_env.leg.mechanism_list import flesh_of
+from hoof_env.record.instant import BodyInstant, Instant
+from hoof_env.record.surroundings import ONE_HIP, Hips
 from hoof_env.render.brush import FINE, Brush, arrow, bar
 from hoof_env.render.colours import (
     COAT,
@@ -39,7 +41,6 @@ from hoof_env.render.colours import (
     mix,
 )
 from hoof_env.render.ground import GroundPainter
-from hoof_env.render.instant import ONE_HIP, BodyInstant, Hips, Instant
 from hoof_env.render.outline import (
     AROUND_M,
     ARROW_M,

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hoof_env.dynamics.observables import StanceCounter
-from hoof_env.render.instant import Columns
+from hoof_env.record.columns import Columns
 from hoof_env.view.simulation import Chunk
 
 KEPT = 30.0

@@ -13,9 +13,9 @@ from jinja2 import Environment, FileSystemLoader, Template
 from numpy.typing import NDArray
 
 from hoof_env.leg.presets import preset_names
+from hoof_env.record.columns import Columns
 from hoof_env.records import default_policy
 from hoof_env.render.drawing import HEAD
-from hoof_env.render.instant import Columns
 from hoof_env.render.outline import ARROW_M
 from hoof_env.view import controls, figures
 from hoof_env.view.history import RESOLUTION, STANCE

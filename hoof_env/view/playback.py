@@ -17,9 +17,9 @@ from numpy.typing import NDArray
 
 from hoof_env._output import staged
 from hoof_env.errors import ParameterError, check_number
+from hoof_env.record.columns import Columns
 from hoof_env.render import colours
 from hoof_env.render.colours import Colour
-from hoof_env.render.instant import Columns
 from hoof_env.view import figures
 from hoof_env.view.layout import legend_of, scene_arguments, script, template
 from hoof_env.view.player import Player

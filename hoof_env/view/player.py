@@ -8,7 +8,9 @@ import time
 import numpy as np
 from numpy.typing import NDArray
 
-from hoof_env.render.instant import Columns, instants
+from hoof_env.record.columns import Columns
+from hoof_env.record.instant import instants
+from hoof_env.render.picture import picture_of
 from hoof_env.view.history import STANCE, History, StanceNumbers, curves_of, path_columns, thinned
 from hoof_env.view.recording import Recording
 from hoof_env.view.simulation import Chunk, Simulation
@@ -48,7 +50,7 @@ class Player:
         of_legs = [(f"{name} {k}", n) for k in range(len(self.legs)) for name, n in LEG_NUMBERS.items()]
         terms = [(name, TERM_DIGITS) for name in simulation.terms]
         self.numbers = [*FIRST_NUMBERS.items(), *of_legs, *terms]
-        self.drawing = simulation.setting.picture.drawing(simulation.setting, len(self.numbers))
+        self.drawing = picture_of(simulation.setting).drawing(simulation.setting, len(self.numbers))
         self.recording: Recording | None = None
         self.clock = 0.0
         self.shown = 0.0

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 from hoof_env import film, records
 from hoof_env.errors import check_choice
 from hoof_env.lab.forces import THRESHOLD
-from hoof_env.render.instant import Columns
+from hoof_env.record.columns import Columns, joined
 from hoof_env.view.words import words_of
 
 if TYPE_CHECKING:
@@ -123,7 +123,7 @@ class Recording:
                 reactions=[],
                 parameters=self._parameters,
             )
-            record = records.joined([c.columns for c in self._chunks], records.units_of(simulation.env))
+            record = joined([c.columns for c in self._chunks], records.units_of(simulation.env))
             records.write(record, about, self.path)
 
 

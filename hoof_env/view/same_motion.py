@@ -10,7 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hoof_env.ground.laws import REGULAR_LAWS, SMALLEST_RESTITUTION
-from hoof_env.render.instant import POINTS, Columns
+from hoof_env.record.columns import Columns
+from hoof_env.record.instant import POINTS
 
 EXTREMES = {"elastic": 1.0, "inelastic": 0.0}
 """Restitutions of the paper's two conditions [-]."""

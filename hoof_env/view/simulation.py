@@ -14,7 +14,7 @@ from hoof_env.envs.policies import constant_gait, start_of
 from hoof_env.errors import HoofEnvError, ParameterError, check_choice, check_number, count
 from hoof_env.gait import PARAMETERS, GaitParameters, limits_of
 from hoof_env.lab.forces import THRESHOLD, above_threshold, onto_surface
-from hoof_env.render.instant import Columns
+from hoof_env.record.columns import Columns
 from hoof_env.tasks.settings import ABOUT, PER_EPISODE
 from hoof_env.view.same_motion import SameMotion
 
@@ -54,7 +54,7 @@ class Simulation:
     Attributes:
         env_id, arguments, policy, seed: arguments; they change with the calls below.
         env: environment.
-        setting: its surroundings, see `instant.Surroundings`.
+        setting: its surroundings, see `record.surroundings.Surroundings`.
         legs: prefixes of the columns of each leg, ("",) of a single one.
         dt: control step [s].
         parameters: physical parameters that were touched, by name.

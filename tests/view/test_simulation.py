@@ -14,7 +14,7 @@ from hoof_env.errors import HoofEnvError, ParameterError
 from hoof_env.gait import PARAMETERS
 from hoof_env.ground.laws import FACTORS
 from hoof_env.lab.forces import THRESHOLD, above_threshold
-from hoof_env.render.instant import instants
+from hoof_env.record.instant import instants
 from hoof_env.render.outline import ARROW_M, LEAST_FORCE
 from hoof_env.view import history
 from hoof_env.view.history import RESOLUTION, thinned
