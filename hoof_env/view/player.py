@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import time
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,7 +13,6 @@ from hoof_env.record.columns import Columns
 from hoof_env.record.instant import instants
 from hoof_env.render.picture import picture_of
 from hoof_env.view.history import STANCE, History, StanceNumbers, curves_of, path_columns, thinned
-from hoof_env.view.recording import Recording
 from hoof_env.view.simulation import Chunk, Simulation
 
 FIRST_NUMBERS = {"time": 2, "speed": 2, "target": 2, "return": 2}
@@ -23,6 +23,26 @@ LONGEST_WORK = 0.1
 """Time after which no further step is taken before the page has the last one [s]."""
 TERM_DIGITS = 2
 """Digits of the terms of the reward."""
+
+
+class Recorder(Protocol):
+    """Interface of recordings that take the chunks of a player, see `recording.Recording`.
+
+    Attributes:
+        is_over: True after the end of the recorded episode.
+        is_full: True if the recording takes no more chunks.
+    """
+
+    is_over: bool
+
+    @property
+    def is_full(self) -> bool: ...
+
+    def add(self, chunk: Chunk) -> None:
+        """Take the substeps of a control step."""
+
+    def write(self) -> Any:
+        """Write the file in a thread of its own; return the thread."""
 
 
 class Player:
@@ -51,7 +71,7 @@ class Player:
         terms = [(name, TERM_DIGITS) for name in simulation.terms]
         self.numbers = [*FIRST_NUMBERS.items(), *of_legs, *terms]
         self.drawing = picture_of(simulation.setting).drawing(simulation.setting, len(self.numbers))
-        self.recording: Recording | None = None
+        self.recording: Recorder | None = None
         self.clock = 0.0
         self.shown = 0.0
 

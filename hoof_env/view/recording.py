@@ -7,16 +7,14 @@ import threading
 from collections.abc import Callable
 from datetime import datetime
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from hoof_env import film, records
 from hoof_env.errors import check_choice
 from hoof_env.lab.forces import THRESHOLD
 from hoof_env.record.columns import Columns, joined
+from hoof_env.view.simulation import Chunk, Simulation
 from hoof_env.view.words import words_of
-
-if TYPE_CHECKING:
-    from hoof_env.view.simulation import Chunk, Simulation
 
 FORMATS = (".html", ".mp4", ".gif", ".csv", ".mot")
 """Formats by suffix."""

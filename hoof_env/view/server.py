@@ -70,8 +70,8 @@ class Pages:
         A tab counts from here on, before its browser is connected, until Bokeh lets its session go: the
         server's one thread does nothing else between the count and the new tab.
         """
-        from hoof_env.view.layout import template
         from hoof_env.view.tab import Tab
+        from hoof_env.view.templates import template
 
         wait = False
         asked = doc.session_context.request.arguments.get("setup", [b""])[0].decode("ascii", "replace")
