@@ -113,7 +113,7 @@ def variables(player: Player, shown: list[figures.Curves]) -> dict[str, Any]:
         "simulation": simulation,
         "summary": env.task.summary,
         "figures": [legend_of(each) for each in shown],
-        "refusal": simulation.same_motion.refusal,
+        "refusal": simulation.other_ground.refusal,
         "has_heel": drawing.has_heel,
         "legs": [figures.leg_name(leg) for leg in player.legs],
         "stance": STANCE,

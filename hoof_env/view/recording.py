@@ -13,8 +13,8 @@ from hoof_env import film, records
 from hoof_env.errors import check_choice
 from hoof_env.lab.forces import THRESHOLD
 from hoof_env.record.columns import Columns, joined
+from hoof_env.view.messages import error_text
 from hoof_env.view.simulation import Chunk, Simulation
-from hoof_env.view.words import words_of
 
 FORMATS = (".html", ".mp4", ".gif", ".csv", ".mot")
 """Formats by suffix."""
@@ -92,7 +92,7 @@ class Recording:
         try:
             self._write()
         except Exception as error:
-            self._tell(f"{self.path}: {words_of(error)}", "error")
+            self._tell(f"{self.path}: {error_text(error)}", "error")
             return
         seconds = self._chunks[-1].columns["time"][-1] - self._chunks[0].columns["time"][0]
         self._tell(f"Wrote {self.path}: {seconds:.2f} s.", "note")

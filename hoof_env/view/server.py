@@ -18,7 +18,7 @@ from typing import Any
 
 from hoof_env._output import check_folder
 from hoof_env.errors import MissingExtraError, ParameterError, count, parse_pairs
-from hoof_env.view.words import words_of
+from hoof_env.view.messages import error_text
 
 MOST_TABS = 8
 """Largest number of tabs, each with a simulation of its own."""
@@ -90,7 +90,7 @@ class Pages:
             doc.clear()
             doc.title = "hoof-env view"
             doc.template = template("refused.html")
-            doc.template_variables.update(reason=words_of(error), wait=wait)
+            doc.template_variables.update(reason=error_text(error), wait=wait)
 
 
 def is_own_name(name: str, address: str, hosts: Collection[str] = ()) -> bool:
@@ -182,7 +182,7 @@ def start(
     from tornado.ioloop import IOLoop
     from tornado.netutil import bind_sockets
 
-    from hoof_env.view.answers import try_out
+    from hoof_env.view.session import try_out
 
     count("port", port, low=0, most=65535)
     if ":" in address:

@@ -16,7 +16,7 @@ from hoof_env.gait import PARAMETERS, GaitParameters, limits_of
 from hoof_env.lab.forces import THRESHOLD, above_threshold, onto_surface
 from hoof_env.record.columns import Columns
 from hoof_env.tasks.settings import ABOUT, PER_EPISODE
-from hoof_env.view.same_motion import SameMotion
+from hoof_env.view.other_ground import OtherGround
 
 DRIVES = {"crank_torque": "N m", "crank_power": "W"}
 """Unit of each measurement of a leg's drive that a page shows next to the columns of a record."""
@@ -30,7 +30,7 @@ class Chunk(NamedTuple):
         drives: measurements of `DRIVES` by column, behind the names of a horse's legs, shape (n,).
         normals: normal force of elastic and of inelastic ground for the same motion, by "elastic" and
             "inelastic" behind the names of a horse's legs, shape (n,) [N]; empty where there is none, see
-            `SameMotion.refusal`.
+            `OtherGround.refusal`.
         terms: terms of the reward of this step by name; empty at a start.
     """
 
@@ -59,7 +59,7 @@ class Simulation:
         dt: control step [s].
         parameters: physical parameters that were touched, by name.
         hand: gait that drives the leg instead of the policy, None for the policy.
-        same_motion: forces that other ground would give.
+        other_ground: forces that other ground would give.
         ended: how the episode ended, "" while it runs.
         is_asking: True while the policy is asked for an action.
 
@@ -86,7 +86,7 @@ class Simulation:
         self._player = self._find(policy, self.seed)
         self.parameters: dict[str, float] = {}
         self.hand: dict[str, float] | None = None
-        self.same_motion = SameMotion(self._leg.batch)  # type: ignore[attr-defined]
+        self.other_ground = OtherGround(self._leg.batch)  # type: ignore[attr-defined]
         self.ended = ""
         self.is_asking = False
         self._observation: Any = None
@@ -141,7 +141,7 @@ class Simulation:
             self.hand = None
         self.ended = ""
         self._starts = True
-        self.same_motion.begin(self._leg.record())
+        self.other_ground.begin(self._leg.record())
         return self._chunk({})
 
     def step(self) -> Chunk | None:
@@ -196,7 +196,7 @@ class Simulation:
         for i, prefix in enumerate(self.legs):
             for name in DRIVES:
                 drives[prefix + name] = np.array(record[name][:, i, 0], float)
-        return Chunk(shown, drives, self.same_motion.columns(record, self.legs), terms)
+        return Chunk(shown, drives, self.other_ground.columns(record, self.legs), terms)
 
     # Touching
 
@@ -225,7 +225,7 @@ class Simulation:
         vary(batch, 0, changed)
         batch.has_overrides[0] = True
         self.parameters = changed
-        self.same_motion.set_ground(changed)
+        self.other_ground.set_ground(changed)
         if self._observation is not None:
             # The last instant with the new parameters: from it the next substeps are recorded.
             self._leg.set_state(self._leg.get_state())

@@ -18,9 +18,9 @@ from hoof_env.record.instant import instants
 from hoof_env.render.outline import ARROW_M, LEAST_FORCE
 from hoof_env.view import history
 from hoof_env.view.history import RESOLUTION, thinned
+from hoof_env.view.other_ground import OtherGround
 from hoof_env.view.player import Player
 from hoof_env.view.recording import Recording
-from hoof_env.view.same_motion import SameMotion
 from hoof_env.view.simulation import Simulation
 
 LEG, HORSE, TERRAIN = "hoof_env/HorseLeg-v0", "hoof_env/Horse-v0", "hoof_env/HorseLegTerrain-v0"
@@ -100,7 +100,7 @@ def test_the_law_gives_the_simulated_force_for_the_simulated_ground(env_id, argu
     simulation = Simulation(env_id, arguments)
     simulation.reset()
     env = simulation.env.unwrapped
-    same = SameMotion(env.batch, (arguments["restitution"],))
+    same = OtherGround(env.batch, (arguments["restitution"],))
     same.begin(env.record())
     worst, most, seen = 0.0, 0.0, 0
     for _ in range(60):
@@ -126,8 +126,8 @@ def test_a_law_from_outside_has_no_such_curve_and_the_page_says_so():
     batch = Simulation(LEG).env.unwrapped.batch
     task = replace(batch.task, contact_law=max)
     others = SimpleNamespace(task=task, settings=batch.settings, body=batch.body)
-    assert "outside the package" in SameMotion(others).refusal
-    assert SameMotion(batch).refusal == ""
+    assert "outside the package" in OtherGround(others).refusal
+    assert OtherGround(batch).refusal == ""
 
 
 def test_a_touch_acts_at_once_as_an_environment_made_so_would():
@@ -155,7 +155,7 @@ def test_a_touch_acts_at_once_as_an_environment_made_so_would():
         changed += np.any(chunk.columns["toe_normal"][same] != before["toe_normal"][rows])
     assert changed
     record = simulation.env.unwrapped.record()
-    same = SameMotion(simulation.env.unwrapped.batch, (0.9,))
+    same = OtherGround(simulation.env.unwrapped.batch, (0.9,))
     same.set_ground(simulation.parameters)
     np.testing.assert_allclose(
         same.forces(record)[0], (record["toe_normal"] + record["heel_normal"])[..., 0], atol=1e-6
@@ -367,7 +367,7 @@ def test_elastic_and_inelastic_are_the_forces_of_the_papers_restitutions():
     for _ in range(60):
         chunk = simulation.step()
         env = simulation.env.unwrapped
-        by_law = SameMotion(env.batch, (1.0, 0.0)).forces(env.record())[..., 0]
+        by_law = OtherGround(env.batch, (1.0, 0.0)).forces(env.record())[..., 0]
         np.testing.assert_array_equal([chunk.normals["elastic"], chunk.normals["inelastic"]], by_law)
         # Elastic ground is a spring: K depth^n, without a loss.
         depth = np.array([chunk.columns[f"{point}_depth"] for point in ("toe", "heel")])

@@ -19,7 +19,7 @@ EXTREMES = {"elastic": 1.0, "inelastic": 0.0}
 Floats = NDArray[np.float64]
 
 
-class SameMotion:
+class OtherGround:
     """Normal forces of other ground, for the simulated motion of the legs.
 
     A rigid hoof is where its leg has it, and the force is Eq. 14 there. A spring in the hoof gives way to the
