@@ -19,17 +19,17 @@ if TYPE_CHECKING:
     from hoof_env.render.drawing import Drawing
     from hoof_env.render.panel import Stances
 
-# Scenes and panels need pygame, which a server or a cluster may lack: they are imported where they are made.
+# Scenes and panels need pygame, which a server may lack: methods that make them import them.
 
 
 class Scene(Protocol):
     """Interface of scenes: the body on its ground."""
 
     def reset(self) -> None:
-        """Forget what was shown: an episode begins."""
+        """Forget the instants of the last episode."""
 
     def add(self, instants: Sequence[BodyInstant]) -> None:
-        """Take what happened since the last call, in the order of time."""
+        """Add the instants since the last call, in the order of time."""
 
     def draw(self, canvas: Any, now: BodyInstant, full_scale: float) -> None:
         """Draw an instant on a surface of pygame; `full_scale` is the force of the longest arrow [N]."""
@@ -46,13 +46,13 @@ class Panel(Protocol):
 
     @property
     def stances(self) -> Stances:
-        """Stances of the episode and their peaks; of several legs those of the one that bears most."""
+        """Stances of the episode and their peaks; of several legs, of the leg with the highest force."""
 
     def reset(self) -> None:
-        """Forget what was shown: an episode begins."""
+        """Forget the instants of the last episode."""
 
     def add(self, instants: Sequence[BodyInstant]) -> None:
-        """Take what happened since the last call, in the order of time."""
+        """Add the instants since the last call, in the order of time."""
 
     def draw(self, canvas: Any, now: BodyInstant) -> None:
         """Draw an instant on a surface of pygame, over the scene."""
@@ -115,10 +115,10 @@ class LegsPicture(LegPicture):
 
     def panel(self, brush: Brush, box: tuple[int, int, int, int], here: Surroundings) -> Panel:
         """Make the panel, see `Picture`."""
-        from hoof_env.render.legs_panel import MOST_LEGS, LegsPanel
+        from hoof_env.render.legs_panel import MAX_LEGS, LegsPanel
 
-        if len(here.hips) > MOST_LEGS:
-            raise ParameterError(f"picture: expected at most {MOST_LEGS} legs, got {len(here.hips)}")
+        if len(here.hips) > MAX_LEGS:
+            raise ParameterError(f"picture: expected at most {MAX_LEGS} legs, got {len(here.hips)}")
         return LegsPanel(brush, box, tuple(here.hips), here.weight_n, here.lift_off_n)
 
 

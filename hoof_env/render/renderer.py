@@ -1,4 +1,4 @@
-"""Pictures of the leg at work: an off-screen RGB array, or a window for people.
+"""Pictures of a body in motion: an off-screen RGB array, or a window.
 
 Drawing is done in software on an off-screen surface; only render mode "human" opens a display. Every
 number in the picture is read from instants (`record.instant`); it computes no mechanics of its own.
@@ -68,7 +68,7 @@ class Renderer:
 
         self._pygame = pygame
         self._canvas = pygame.Surface(self.size, 0, 32)
-        # laid out in memory as a frame is, so that the copy is quick
+        # In the layout of a frame, which makes the copy fast.
         self._packed = pygame.Surface(self.size, 0, 24, (0xFF, 0xFF00, 0xFF0000, 0))
         self.brush = brush = Brush(self.size)
         edge = round(16 * brush.unit)
@@ -88,7 +88,7 @@ class Renderer:
 
     @property
     def latest(self) -> Any:
-        """The instant that is drawn next; `ResetNeeded` if there is none."""
+        """The instant that is drawn next; raise `ResetNeeded` if there is none."""
         if self._now is None:
             raise ResetNeeded("nothing to draw yet: reset the environment first")
         return self._now
@@ -98,13 +98,13 @@ class Renderer:
         return self._now is None
 
     def reset(self) -> None:
-        """A new episode: forget the force history and the paths of the hoof."""
+        """Forget the forces and the paths of the last episode."""
         self._now = None
         self._scene.reset()
         self._panel.reset()
 
     def add(self, news: Sequence[BodyInstant]) -> None:
-        """Take what happened since the last call, in the order of time; what is not finite is left out."""
+        """Add the instants since the last call, in the order of time; skip instants that are not finite."""
         seen = [now for now in news if _is_finite(now)]
         if seen:
             self._now = seen[-1]
@@ -132,7 +132,7 @@ class Renderer:
             self._pygame.display.quit()
 
     def draw(self) -> Any:
-        """Draw the latest instant; returns the surface, which the next call paints over."""
+        """Draw the latest instant; return the surface, which the next call paints over."""
         now = self.latest
         self._scene.draw(self._canvas, now, self._panel.full_scale)
         self._panel.draw(self._canvas, now)
@@ -182,6 +182,6 @@ def open_window(size: tuple[int, int], title: str) -> Any:
 
 
 def _is_finite(now: BodyInstant) -> bool:
-    """Return True if all that places the picture is finite."""
+    """Return True if all numbers that the picture needs are finite."""
     of_legs = (sum(leg[:9]) + leg.force_x + leg.force_y for leg in now.legs)
     return math.isfinite(now.x + now.y + now.vx + now.vy + now.pitch + sum(of_legs))

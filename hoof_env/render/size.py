@@ -6,20 +6,20 @@ from typing import Any
 
 from hoof_env.errors import ParameterError, count
 
-SMALLEST_SIZE = (480, 270)  # below this the lettering is not readable [pixels]
+MIN_SIZE = (480, 270)  # below this the lettering is not readable [pixels]
 USUAL_SIZE = 960, 540  # [pixels]
-LARGEST_SIDE = 8192  # largest width and height [pixels]; a canvas of both takes 270 MB
+MAX_SIDE = 8192  # largest width and height [pixels]; a canvas of both takes 270 MB
 
 
 def check_side(name: str, pixels: Any) -> int:
     """Return the "width" or "height" of a picture [pixels]; raise `ParameterError` if it is out of range."""
-    return count(name, pixels, SMALLEST_SIZE[name == "height"], LARGEST_SIDE)
+    return count(name, pixels, MIN_SIZE[name == "height"], MAX_SIDE)
 
 
 def check_size(size: Any) -> tuple[int, int]:
     """Return the width and height of a picture [pixels]; raise `ParameterError` if they are out of range."""
-    low_w, low_h = SMALLEST_SIZE
-    high = LARGEST_SIDE
+    low_w, low_h = MIN_SIZE
+    high = MAX_SIDE
     try:
         width, height = size
         good = high >= width == int(width) >= low_w and high >= height == int(height) >= low_h

@@ -1,4 +1,4 @@
-"""Clock of a page: how far the simulation is shown, at any speed, and what is new since the last look."""
+"""Player of a page: its clock, which runs at any speed, and the news since the last state."""
 
 from __future__ import annotations
 
@@ -19,8 +19,8 @@ FIRST_NUMBERS = {"time": 2, "speed": 2, "target": 2, "return": 2}
 """Digits of the numbers of a page that belong to the whole body."""
 LEG_NUMBERS = {"grf": 0, **dict(zip(STANCE, (0, 0, 1, 2, 1), strict=True))}
 """Digits of the numbers of each leg."""
-LONGEST_WORK = 0.1
-"""Time after which no further step is taken before the page has the last one [s]."""
+MAX_WORK_SECONDS = 0.1
+"""Longest work before the page gets a state [s]."""
 TERM_DIGITS = 2
 """Digits of the terms of the reward."""
 
@@ -112,13 +112,13 @@ class Player:
 
         Returns:
             How an episode ended meanwhile, "" if none did; the next one has begun then. Where a step takes
-            long, as with a slow policy, the clock goes on by less than asked, to the end of the step.
+            long, as with a slow policy, the clock advances by less than `seconds`, to the end of the step.
 
         Raises:
             HoofEnvError: the policy or the environment cannot go on; the clock has not moved.
         """
         until = self.clock + seconds
-        late = time.monotonic() + LONGEST_WORK
+        late = time.monotonic() + MAX_WORK_SECONDS
         simulation = self.simulation
         while self._simulated < until - 1e-9 and not simulation.ended:
             chunk = simulation.step()

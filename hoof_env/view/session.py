@@ -17,7 +17,7 @@ from hoof_env.view.recording import Recording
 from hoof_env.view.simulation import Simulation
 
 CURVES_EVERY = 2  # states between two pieces of the curves
-MOST_SUBSTEPS = 10_000  # of a control step: during one, Python does nothing else
+MAX_SUBSTEPS = 10_000  # of a control step: during one, Python does nothing else
 
 Setup = dict[str, Any]
 """Arguments of `Simulation`, by name."""
@@ -301,9 +301,9 @@ def try_out(setup: Setup) -> None:
         simulation = Simulation(**setup)
     env: Any = simulation.env.unwrapped
     substeps = env.engine.substeps * env.dt / env.sim_dt
-    if substeps > MOST_SUBSTEPS:
+    if substeps > MAX_SUBSTEPS:
         raise ParameterError(
-            f"sim_dt, dt: expected at most {MOST_SUBSTEPS} substeps in a control step, got {substeps:.6g}"
+            f"sim_dt, dt: expected at most {MAX_SUBSTEPS} substeps in a control step, got {substeps:.6g}"
         )
     simulation.reset()
     simulation.env.close()

@@ -1,4 +1,4 @@
-"""Simulation of a page: one episode after the other, step by step, which can be touched while it runs."""
+"""Simulation of a page: one episode after the other, step by step, with settings that change as it runs."""
 
 from __future__ import annotations
 
@@ -176,8 +176,8 @@ class Simulation:
         except HoofEnvError:
             raise
         except (Exception, SystemExit) as error:
-            said = f"{type(error).__name__}: {error}"
-            raise ParameterError(f"policy {self.policy_name}: expected actions, it raised {said}") from error
+            cause = f"{type(error).__name__}: {error}"
+            raise ParameterError(f"policy {self.policy_name}: expected actions, it raised {cause}") from error
         finally:
             self.is_asking = False
         if not is_finite:
@@ -186,7 +186,7 @@ class Simulation:
         return action
 
     def _chunk(self, terms: dict[str, float]) -> Chunk:
-        """Return the last substeps as they are shown and written."""
+        """Return the last substeps as the page shows and recordings have them."""
         leg = self._leg
         record = leg.record()
         columns = records.substeps(self.env, record)
@@ -208,8 +208,9 @@ class Simulation:
             value: the value, in the setting's unit.
 
         Returns:
-            False if a running episode cannot take it, as the exponent, or stiffness that needs shorter
-            substeps: nothing has changed then, and an environment with this argument takes it.
+            True if the running episode has the value now. False if it cannot change within an episode, such
+            as the exponent, or stiffness that needs shorter substeps: nothing has changed, and the value must
+            be an argument of a new environment.
 
         Raises:
             ParameterError: the setting is unknown, has no effect, or is out of range.
@@ -246,7 +247,7 @@ class Simulation:
             raise ParameterError(f"gait: expected one of {', '.join(limits) or 'no parameter'}, got {name!r}")
         low, high = limits[name]
         wanted = (self.hand or self.gait_now()) | {name: check_number(name, value, low=low, high=high)}
-        constant_gait(GaitParameters(*wanted.values()), self.env)  # refuses what cannot be commanded
+        constant_gait(GaitParameters(*wanted.values()), self.env)  # raises for a gait beyond the limits
         self.hand = wanted
 
     def gait_now(self) -> dict[str, float]:

@@ -13,9 +13,9 @@ from hoof_env.view import layout
 from hoof_env.view.session import RUN_IN_NEW_TAB, Session, Setup
 from hoof_env.view.worker import Worker
 
-TICK = 1 / 30  # time between two states that are sent [s]
+TICK = 1 / 30  # time between two states [s]
 LOOK = 8  # time after which a tick that came too early looks again [ms]
-LONGEST_TICK = 0.1  # time of which a late tick makes up [s]
+MAX_TICK_SECONDS = 0.1  # longest time that one tick simulates [s]
 PATIENCE = 2.0  # time after which a page says what it waits for [s]
 
 LATE_POLICY = f"The policy has not answered for {PATIENCE:g} s. Pause, or choose another one; the page waits."
@@ -25,8 +25,8 @@ LATE = "This takes a while, as when kernels are compiled or a policy is loaded."
 class Tab:
     """The page of one tab.
 
-    Its methods run in the server's thread, which serves all tabs and never waits: what may take long is done
-    by the tab's own thread, and fetched at the next tick.
+    Its methods run in the server's thread, which serves all tabs and never waits: the tab's own thread does
+    slow work, and the next tick sends the results.
 
     Args:
         doc: Bokeh's document of the tab.
@@ -61,7 +61,7 @@ class Tab:
         return self.session.is_open
 
     def _tick(self) -> None:
-        """Send what is new, and let time pass."""
+        """Send messages, and let time pass."""
         is_busy = self._worker.is_busy
         if not is_busy and self._late_since is not None:
             took = f"It took {time.monotonic() - self._late_since:.1f} s."
@@ -75,7 +75,7 @@ class Tab:
                 self._doc.add_timeout_callback(self._look, LOOK)
             return
         now = time.monotonic()
-        passed = min(now - self._last, LONGEST_TICK)
+        passed = min(now - self._last, MAX_TICK_SECONDS)
         self._last = now
         self._answer()
         if self.session.playing:
@@ -87,7 +87,7 @@ class Tab:
         self._tick()
 
     def _send(self) -> None:
-        """Send what is new."""
+        """Send the messages of the session."""
         while self.session.outbox:
             part, value = self.session.outbox.popleft()
             if part == "told":
@@ -95,19 +95,19 @@ class Tab:
             setattr(self.wire, part, value)
 
     def _on_asked(self, attr: str, old: Any, new: Any) -> None:
-        """Hear what the page asks."""
+        """Take a request of the page."""
         self._asked.append({name: value for name, value in new.items() if name != "count"})
         if not self._worker.is_busy:
             self._answer()
 
     def _answer(self) -> None:
-        """Do what the page has asked."""
+        """Let the tab's thread handle the requests."""
         if self._asked:
             self._worker.do(partial(self.session.answer, self._asked))
             self._asked = []
 
     def _wait(self) -> None:
-        """Say what the page waits for if it takes long, and do what is possible meanwhile."""
+        """Tell the cause of a long wait, and handle requests that need not wait."""
         session = self.session
         if self._worker.busy_for < PATIENCE:
             return
@@ -127,7 +127,7 @@ class Tab:
                 self._asked.append(request)
 
     def close(self) -> None:
-        """Let the simulation go when the tab's thread is free, or after a while if it is not."""
+        """Close the simulation when the tab's thread is free, or after `PATIENCE` if it is not."""
         self.session.is_open = False
         is_busy = self._worker.is_busy
         self._worker.do(self.session.close)
@@ -136,7 +136,7 @@ class Tab:
             threading.Timer(PATIENCE, self._leave).start()
 
     def _leave(self) -> None:
-        """End a policy that does not answer, and close without it."""
+        """Interrupt a policy that does not return, and close the session."""
         if self.session.player.simulation.is_asking:
             self._worker.interrupt(PATIENCE)
             self.session.close()
