@@ -1,7 +1,7 @@
 """Recording of the substeps between two control steps, by running them again on another engine.
 
-The kernels keep the sums of a control step, not its substeps. A recording only copies the memory at the end
-of each step. When substeps are asked for, they are run again from there, and have the same bits.
+The kernels keep the sums of a control step, not its substeps. A recording copies the memory at the end of
+each step and runs the substeps again from there when they are needed; they have the same bits.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ Record = dict[str, NDArray[np.float64]]
 
 
 def surroundings_of(batch: EpisodeBatch, env: int = 0) -> Surroundings:
-    """Return what surrounds the motion of an environment of a batch."""
+    """Return the surroundings of an environment of a batch."""
     weight = float(batch.episode_rows.weight[env])
     return Surroundings(
         batch.body.geometry,
@@ -99,12 +99,12 @@ class Recording:
     def last(self) -> Record:
         """Return state and report by name at each substep of the last control step; after a reset, or a step
         that could not be simulated, of the present instant only."""
-        if not self._ends:
-            self.begin()
         return self._record(-1)
 
     def _record(self, k: int) -> Record:
         """Return the substeps that led to the k-th end, counted from the last one, -1."""
+        if not self._ends:
+            self.begin()
         end = self._ends[k]
         if self.batch.paper:
             of_solver: Record = end
@@ -152,10 +152,12 @@ class Recording:
         record.pop("result")
         return record
 
-    def columns(self, k: int = -1) -> Columns:
-        """Return the columns of the substeps that led to the k-th end, commands included."""
+    def columns(self, k: int = -1, record: Record | None = None) -> Columns:
+        """Return the columns of the substeps that led to the k-th end, commands included. A known `record` of
+        them saves the time to run them again."""
         here = surroundings_of(self.batch, self.env)
-        return columns_of(self._record(k), here.hips, here.terrain, commands=self.commands(k))
+        known = self._record(k) if record is None else record
+        return columns_of(known, here.hips, here.terrain, commands=self.commands(k))
 
     def close(self) -> None:
         """Release the engine; the next record makes another one."""
