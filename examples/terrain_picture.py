@@ -6,7 +6,9 @@ from PIL import Image
 
 from hoof_env import Limb, Prescribed, Terrain, Trunk, TrunkEngine, load_gait, load_geometry
 from hoof_env.ground.contact import load_ground
-from hoof_env.render.instant import Surroundings, columns_of_engine, instants
+from hoof_env.record.columns import columns_of_engine
+from hoof_env.record.instant import instants
+from hoof_env.record.surroundings import Surroundings
 from hoof_env.render.renderer import Renderer
 
 leg = load_geometry("identified")

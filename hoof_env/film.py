@@ -17,7 +17,8 @@ from numpy.typing import NDArray
 from hoof_env import records
 from hoof_env._output import staged
 from hoof_env.errors import HoofEnvError, MissingExtraError, ParameterError, check_number, parse_pairs
-from hoof_env.render.instant import Columns, instants
+from hoof_env.record.columns import Columns
+from hoof_env.record.instant import instants
 
 if TYPE_CHECKING:
     from hoof_env.render.renderer import Renderer

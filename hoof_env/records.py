@@ -1,8 +1,7 @@
 """Episodes of any policy on any environment of the package, substep by substep, for pictures and files.
 
-Only `surroundings` and `substeps` read the inside of an environment; all other functions use these two. Files
-are CSV, Parquet, OpenSim's .mot and .sto, and .c3d; `write` chooses by the suffix. Frame, signs and centre of
-pressure are those of `hoof_env.lab`.
+Files are CSV, Parquet, OpenSim's .mot and .sto, and .c3d; `write` chooses by the suffix. `hoof_env.lab`
+defines frame, signs and centre of pressure.
 """
 
 from __future__ import annotations
@@ -10,7 +9,7 @@ from __future__ import annotations
 import json
 import sys
 import time
-from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
@@ -33,7 +32,6 @@ from hoof_env.errors import (
     check_number,
     parse_pairs,
 )
-from hoof_env.gait import PARAMETERS
 from hoof_env.lab.c3d import ezc3d, write_c3d
 from hoof_env.lab.forces import THRESHOLD, above_threshold, in_units, limbs_of, onto_surface
 from hoof_env.lab.forces import UNITS as FORCE_UNITS
@@ -41,11 +39,8 @@ from hoof_env.lab.opensim import check_bodies, loads_path, write_mot
 from hoof_env.lab.reactions import JointReactions, reaction_units
 from hoof_env.policies.find import default_policy as default_policy
 from hoof_env.policies.find import find_policy as find_policy
-from hoof_env.render.instant import UNITS, Columns, Surroundings, body_units, columns_of
-
-RECORD = {name: unit for name, unit in UNITS.items() if name not in PARAMETERS[1:]} | {"free_moment": "N m"}
-"""Units of a record's columns: fields of `Instant` without the swing's parameters, which are known at the
-end of a control step only. The free moment about the centre of pressure is 0."""
+from hoof_env.record.columns import RECORD, Columns, body_units, joined
+from hoof_env.record.surroundings import Surroundings
 
 TELL_SECONDS = 5.0
 """Time between two lines about the progress of an episode [s]."""
@@ -68,10 +63,9 @@ def surroundings(env: Any) -> Surroundings:
 
 def substeps(env: Any, record: Columns | None = None) -> Columns:
     """Return the columns of the last control step of an environment of this package, commands included: one
-    row for each substep, or one row after a reset. `record` is that of the environment, if it is known."""
-    leg = env.unwrapped
-    said = leg.record() if record is None else record
-    return columns_of(said, leg.batch.body.hips, leg.terrain, commands=leg.recording().commands())
+    row for each substep, or one row after a reset. `record` is `env.record()`, if it is known."""
+    columns: Columns = env.unwrapped.recording().columns(record=record)
+    return columns
 
 
 def make_env(env_id: str, arguments: Mapping[str, Any] | None = None) -> gym.Env[Any, Any]:
@@ -82,9 +76,12 @@ def make_env(env_id: str, arguments: Mapping[str, Any] | None = None) -> gym.Env
     """
     arguments = dict(arguments or {})
     if "render_mode" in arguments:
-        raise ParameterError("render_mode: expected none here, where the environment need not draw itself")
+        raise ParameterError(
+            f"render_mode: expected none, as recordings and films need no mode, got "
+            f"{arguments['render_mode']!r}"
+        )
     env = made.make_env(env_id, **arguments)
-    # Refuses environments of other packages, which have no substeps to read.
+    # Raises for environments of other packages, which record no substeps.
     surroundings(env)
     return env
 
@@ -177,9 +174,9 @@ def record_episode(
 ) -> Columns:
     """Play an episode and return its record at every substep: columns of shape (n,), see `units_of`.
 
-    Arguments and errors are those of `episode`, and `ParameterError` if the record does not fit into the
-    memory. `reactions` adds the forces in the joints, see `lab.reactions`; `tell` prints the progress to
-    stderr.
+    `reactions` adds the forces in the joints, see `lab.reactions`; `tell` prints the progress to stderr. For
+    other arguments and errors see `episode`; a record that does not fit into the memory raises
+    `ParameterError`.
     """
     units = units_of(env, reactions)
     longest = longest_of(env, seconds)
@@ -190,19 +187,11 @@ def record_episode(
     return onto_surface(joined(parts, units), surroundings(env).terrain)
 
 
-def joined(parts: Sequence[Columns], units: Collection[str]) -> Columns:
-    """Return the parts of an episode as one record with the columns of `units_of`, in their order; the free
-    moment, which is no column of an episode, comes last."""
-    record = {name: np.concatenate([part[name] for part in parts]) for name in units if name in parts[0]}
-    moments = [name for name in units if name.endswith("free_moment")]
-    return record | {name: np.zeros(len(record["time"])) for name in moments}
-
-
 def units_of(env: gym.Env[Any, Any], reactions: bool = False) -> dict[str, str]:
     """Return the units of a record by column.
 
-    The columns are those of `RECORD`, with `reactions` also those of `reaction_units`. A horse has columns of
-    its trunk, and those of each leg with its name as prefix: `left_fore_force_y`.
+    The columns are `record.columns.RECORD`, and with `reactions` also `reaction_units`. A horse has columns
+    of its trunk, and the columns of each leg with its name as prefix: `left_fore_force_y`.
     """
     of_leg = RECORD | (reaction_units(surroundings(env).geometry.mechanism) if reactions else {})
     return body_units(of_leg, surroundings(env).hips)
@@ -243,7 +232,7 @@ def write_csv(record: Columns, about: Mapping[str, Any], path: Path) -> None:
     Numbers keep their bits. With forces in body weights there is a column `weight` [N], the same in all rows.
     """
     units = dict(about["units"])
-    # A CSV file has no other place for the weight, by which a reader gets newtons.
+    # A CSV file has no other place for the weight, which converts body weights to newtons.
     if "BW" in units.values():
         record = record | {"weight": np.full(len(record["time"]), about["weight_n"])}
         units["weight"] = "N"
@@ -254,8 +243,8 @@ def write_csv(record: Columns, about: Mapping[str, Any], path: Path) -> None:
 
 
 def write_parquet(record: Columns, about: Mapping[str, Any], path: Path) -> None:
-    """Write a Parquet file of float64; the metadata of a field have its "unit", and those of the schema have
-    `about` as JSON under "hoof_env"."""
+    """Write a Parquet file of float64. The metadata of a field have its "unit", the schema's have `about` as
+    JSON under "hoof_env"."""
     import pyarrow as pa
     from pyarrow import parquet
 
@@ -283,7 +272,7 @@ NEWTONS = (*OPENSIM, ".c3d")
 
 
 def check_export(path: Path) -> None:
-    """Check that `write` can write to a path, before an episode is played; errors are those of `check_place`,
+    """Check that `write` can write to a path, before an episode is played. Raise the errors of `check_place`,
     and `MissingExtraError` if the format needs a package that is not installed."""
     check_place(path, WRITERS)
     if path.suffix.lower() == ".c3d":

@@ -79,7 +79,7 @@ REQUESTS = {
         ([*MP4, "--size", "10", "10"], "size: expected .* got"),
         ([*MP4, "--policy", "gallop"], "policy: expected .* got 'gallop'"),
         (["--out", "{}/a/b/x.mp4", "--policy", "gallop"], "policy: expected .* got 'gallop'"),
-        ([*MP4, "--args", "render_mode=human"], "render_mode: expected none here"),
+        ([*MP4, "--args", "render_mode=human"], "render_mode: expected none, as"),
     ],
     "mjcf": [
         (["--out", "{}/x.urdf"], "expected a file that ends in .xml, got"),

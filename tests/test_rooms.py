@@ -1,9 +1,12 @@
-"""The house has one direction: what stands further down may import what stands further up, and nothing else.
+"""The house has one direction: a room imports only rooms above it in the table, and no modules import each
+other in a circle.
 
-Imports within functions and for types count as well.
+Imports within functions count as well. Between rooms imports for types alone count, too; inside a room they
+do not, as a function may name the type of its argument in a module that calls the function.
 """
 
 import ast
+from graphlib import CycleError, TopologicalSorter
 from pathlib import Path
 
 import pytest
@@ -17,9 +20,10 @@ FLOORS = (
     ("hoof_env/leg",),
     ("hoof_env/ground", "hoof_env/gait.py"),
     ("hoof_env/dynamics",),
+    ("hoof_env/record",),
     ("hoof_env/paper_solver",),
-    ("hoof_env/render",),
     ("hoof_env/tasks",),
+    ("hoof_env/render",),
     ("hoof_env/envs", "hoof_env/__init__.py"),
     ("hoof_env/paper", "hoof_env/policies"),
     ("hoof_env/lab",),
@@ -58,6 +62,47 @@ def imported(path):
             yield from ((f"{node.module}.{alias.name}", node.lineno) for alias in node.names)
 
 
+def is_for_types(node):
+    """True for `if TYPE_CHECKING:`."""
+    return isinstance(node, ast.If) and ast.unparse(node.test).endswith("TYPE_CHECKING")
+
+
+def run_time_imports(path):
+    """Modules that a file imports anywhere but for types alone."""
+    tree = ast.parse(path.read_text(encoding="utf-8"))
+    for_types = {line for node in ast.walk(tree) if is_for_types(node) for line in lines_of(node.body)}
+    return {module for module, line in imported(path) if line not in for_types}
+
+
+def lines_of(body):
+    """Line numbers of the statements of a block."""
+    return range(body[0].lineno, body[-1].end_lineno + 1)
+
+
+def circle_of(files):
+    """Names of modules that import each other in a circle, [] if there is none.
+
+    Args:
+        files: paths by the dotted name of the module.
+    """
+    arrows = {name: run_time_imports(path) for name, path in files.items()}
+    # An imported name is a module, or an attribute of the module before it.
+    graph = {
+        name: {each if each in files else each.rpartition(".")[0] for each in found} & files.keys() - {name}
+        for name, found in arrows.items()
+    }
+    try:
+        TopologicalSorter(graph).prepare()
+    except CycleError as error:
+        return error.args[1]
+    return []
+
+
+def module_name(path):
+    """Dotted name of a file of this repository."""
+    return ".".join(path.relative_to(ROOT).with_suffix("").parts).removesuffix(".__init__")
+
+
 def files_of(room):
     path = ROOT / room
     return [path] if path.is_file() else sorted(path.rglob("*.py"))
@@ -77,6 +122,11 @@ def test_a_room_imports_what_stands_above_it(room):
         assert [wrong for path in files_of(room) for wrong in wrong_imports(path, room)] == []
 
 
+@pytest.mark.parametrize("room", FLOOR)
+def test_modules_of_a_room_import_each_other_in_no_circle(room):
+    assert circle_of({module_name(path): path for path in files_of(room)}) == []
+
+
 def test_every_file_has_its_room():
     tops = ("hoof_env", "agents", "benchmarks", "examples")
     files = {path for top in tops for path in (ROOT / top).rglob("*.py")}
@@ -91,3 +141,15 @@ def test_it_can_fail(tmp_path):
         "module.py:3 imports agents.train",
     ]
     assert not list(wrong_imports(path, "agents"))
+
+
+def test_circles_are_found_also_within_functions_but_not_for_types(tmp_path):
+    one, other = tmp_path / "one.py", tmp_path / "other.py"
+    one.write_text("from room.other import f\n")
+    for text, circle in (
+        ("def f():\n    import room.one\n", {"room.one", "room.other"}),
+        ("from room import one\n", {"room.one", "room.other"}),
+        ("if TYPE_CHECKING:\n    from room.one import A\n", set()),
+    ):
+        other.write_text(text)
+        assert {*circle_of({"room.one": one, "room.other": other})} == circle

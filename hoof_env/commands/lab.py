@@ -130,8 +130,8 @@ def average(args: Annotated[AverageArgs, arg(name="")]) -> None:
     """Write the mean stance of several trials, and its standard deviation, as a table."""
     from hoof_env._output import check_folder, check_new, new_file
     from hoof_env.lab import average as mean
+    from hoof_env.lab.axis_checks import for_one
     from hoof_env.lab.columns import parse_mapping
-    from hoof_env.lab.doubts import for_one
     from hoof_env.lab.read import read_record
 
     made = check_new(args.out, args.overwrite)

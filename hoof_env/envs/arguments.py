@@ -13,7 +13,7 @@ from typing import Any, Concatenate, ParamSpec, TypeVar, get_type_hints
 
 from gymnasium.vector import AutoresetMode
 
-from hoof_env.render.renderer import USUAL_SIZE
+from hoof_env.render.size import USUAL_SIZE
 from hoof_env.tasks.settings import Settings
 
 Parameters = ParamSpec("Parameters")

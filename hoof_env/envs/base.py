@@ -19,12 +19,13 @@ from hoof_env.envs.batch_pushes import push_now
 from hoof_env.envs.batch_reports import summaries_of
 from hoof_env.envs.batch_states import state_of
 from hoof_env.envs.conditions import CHANGEABLE
+from hoof_env.envs.drawn_recording import DrawnRecording
 from hoof_env.envs.properties import LegProperties
 from hoof_env.envs.recording import Recording
 from hoof_env.envs.settings_changes import SettingsChanges
 from hoof_env.errors import FixedSettingError, ParameterError, check_choice
 from hoof_env.gait import GaitParameters
-from hoof_env.render.renderer import check_side
+from hoof_env.render.size import check_side
 from hoof_env.tasks.plain import as_plain, json_value, to_json
 from hoof_env.tasks.registry import Task, task_of
 from hoof_env.tasks.settings import PER_EPISODE, SETTINGS, Settings
@@ -80,7 +81,7 @@ class LegBase(LegProperties, SettingsChanges):
     metadata: dict[str, Any]
     render_mode: str | None
     _size: tuple[int, int]
-    _watched: dict[int, Recording]  # recordings by environment, of those that are drawn or recorded
+    _watched: dict[int, DrawnRecording]  # recordings by environment, of those that are drawn or recorded
     _spec: EnvSpec | None = None
     _as_json: tuple[Settings | None, dict[str, Any], list[str]] = (None, {}, [])
     _phase = "new"
@@ -232,7 +233,7 @@ class LegBase(LegProperties, SettingsChanges):
         there is no episode yet."""
         self._check_started("record")
         if env not in self._watched:
-            self._watched[env] = Recording(self.batch, env)
+            self._watched[env] = DrawnRecording(self.batch, env)
         return self._watched[env]
 
     def _check_started(self, call: str) -> None:

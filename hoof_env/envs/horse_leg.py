@@ -19,11 +19,11 @@ from hoof_env.envs.base import LegBase, array_of, generator_of
 from hoof_env.envs.batch_reports import ending_of
 from hoof_env.envs.batch_starts import check_options
 from hoof_env.envs.batch_states import check_single, set_state
+from hoof_env.envs.drawn_recording import DrawnRecording
 from hoof_env.envs.infos import name_columns
-from hoof_env.envs.recording import Recording
 from hoof_env.envs.step import SOME_SWITCHED
 from hoof_env.errors import ParameterError, count, flag
-from hoof_env.render.renderer import USUAL_SIZE
+from hoof_env.render.size import USUAL_SIZE
 from hoof_env.simd.compile import BLOCKS
 from hoof_env.tasks.episode import FAILED
 from hoof_env.tasks.reward import OBJECTIVES, TERMS, Term, failure
@@ -63,7 +63,7 @@ class HorseLegEnv(LegBase, gym.Env[NDArray[np.float32], NDArray[np.float32]]):
         spaces_of = self._make(task, settings, 1, render_mode, (width, height))
         self.observation_space, self.action_space = spaces_of
         self._began_with = b"", 0.0
-        self._watched = {0: Recording(self.batch, 0, self._size)} if render_mode else {}
+        self._watched = {0: DrawnRecording(self.batch, 0, self._size)} if render_mode else {}
         self._attach()
 
     def _attach(self) -> None:

@@ -28,7 +28,7 @@ from hoof_env.envs.policies import STANDS_FOR
 from hoof_env.envs.shipped import is_one_episode, shipped_returns
 from hoof_env.envs.shown import Markdown
 from hoof_env.errors import DataFileError, OutputError, check_choice
-from hoof_env.render.renderer import USUAL_SIZE
+from hoof_env.render.size import USUAL_SIZE
 from hoof_env.tasks import observation
 from hoof_env.tasks.body import Body
 from hoof_env.tasks.own_parts import ActionMap, constants_of

@@ -1,7 +1,7 @@
 """Recording of the substeps between two control steps, by running them again on another engine.
 
-The kernels keep the sums of a control step, not its substeps. A recording only copies the memory at the end
-of each step. When substeps are asked for, they are run again from there, and have the same bits.
+The kernels keep the sums of a control step, not its substeps. A recording copies the memory at the end of
+each step and runs the substeps again from there when they are needed; they have the same bits.
 """
 
 from __future__ import annotations
@@ -18,16 +18,17 @@ from hoof_env.dynamics.memory import LIFT_OFF
 from hoof_env.dynamics.names import NamedColumns
 from hoof_env.dynamics.parts import broken
 from hoof_env.envs.batch import EpisodeBatch
-from hoof_env.render.instant import Surroundings, columns_of, instants
-from hoof_env.render.renderer import USUAL_SIZE, Renderer
+from hoof_env.record.columns import Columns, columns_of
+from hoof_env.record.surroundings import Surroundings
 
-SHOWN = 4.0  # longest time before a picture that it can show [s]
+KEPT_SECONDS = 4.0
+"""Time back to which substeps can be run again [s]."""
 
 Record = dict[str, NDArray[np.float64]]
 
 
 def surroundings_of(batch: EpisodeBatch, env: int = 0) -> Surroundings:
-    """Return what surrounds the motion of an environment of a batch."""
+    """Return the surroundings of an environment of a batch."""
     weight = float(batch.episode_rows.weight[env])
     return Surroundings(
         batch.body.geometry,
@@ -52,23 +53,18 @@ def commands_of_step(
 
 
 class Recording:
-    """Substeps of one environment of a batch, and pictures of them.
+    """Substeps of one environment of a batch.
 
     Attributes:
         batch: batch of episodes.
         env: index of the environment.
-        size: width and height of pictures [pixels].
-        renderer: renderer of the pictures, None before the first one.
     """
 
-    def __init__(self, batch: EpisodeBatch, env: int = 0, size: tuple[int, int] = USUAL_SIZE) -> None:
+    def __init__(self, batch: EpisodeBatch, env: int = 0) -> None:
         self.batch = batch
         self.env = env
-        self.size = size
-        # Memory at the end of control steps; the first one is a start, or the last end before what is shown.
-        self._ends: deque[Any] = deque(maxlen=round(SHOWN / batch.dt) + 2)
-        self._unseen = 0  # number of the last ends that no picture shows yet
-        self.renderer: Any = None
+        # Memory at the end of control steps; the first one is a start, or precedes the oldest step.
+        self._ends: deque[Any] = deque(maxlen=round(KEPT_SECONDS / batch.dt) + 2)
         self._engine: TrunkEngine | None = None
         self._conditions = batch.conditions.of(env)
         self._find()
@@ -84,19 +80,16 @@ class Recording:
     def begin(self) -> None:
         """Begin anew after a reset or another state, to which earlier steps did not lead."""
         conditions = self.batch.conditions.of(self.env)
-        # Other settings: engine and renderer may have another ground.
+        # With other settings the engine may have another ground.
         if conditions is not self._conditions and (conditions or self._conditions):
             self.close()
             self._conditions = conditions
-            self._engine = None
         self._ends.clear()
-        self._unseen = 0
         self.add()
 
     def add(self) -> None:
         """Keep the end of a control step."""
         self._ends.append(self._end())
-        self._unseen += 1
 
     def replace(self) -> None:
         """Keep the present memory in place of the last end: a push changed it between two steps."""
@@ -106,12 +99,12 @@ class Recording:
     def last(self) -> Record:
         """Return state and report by name at each substep of the last control step; after a reset, or a step
         that could not be simulated, of the present instant only."""
-        if not self._ends:
-            self.begin()
         return self._record(-1)
 
     def _record(self, k: int) -> Record:
         """Return the substeps that led to the k-th end, counted from the last one, -1."""
+        if not self._ends:
+            self.begin()
         end = self._ends[k]
         if self.batch.paper:
             of_solver: Record = end
@@ -159,43 +152,20 @@ class Recording:
         record.pop("result")
         return record
 
-    def frame(self, mode: str, fps: float) -> Any:
-        """Draw what happened since the last picture, at most the last `SHOWN` seconds. Return an array of
-        shape (H, W, 3), None if it is drawn into a window.
-
-        Args:
-            mode: render mode, "rgb_array" or "human".
-            fps: pictures per second.
-        """
-        if self.renderer is None:
-            self.renderer = Renderer(surroundings_of(self.batch, self.env), mode, fps, self.size)
-        here = self.renderer.here
-        if not self._ends:
-            self.begin()
-        # A new episode, or more steps than are kept: the lines of the picture begin anew.
-        if self._unseen >= len(self._ends):
-            self.renderer.reset()
-        unseen = min(self._unseen, len(self._ends))
-        if self.renderer.is_empty:
-            unseen = max(unseen, 1)
-        for k in range(-unseen, 0):
-            columns = columns_of(self._record(k), here.hips, here.terrain, commands=self.commands(k))
-            self.renderer.add(instants(columns, here.hips))
-        self._unseen = 0
-        return self.renderer.frame()
+    def columns(self, k: int = -1, record: Record | None = None) -> Columns:
+        """Return the columns of the substeps that led to the k-th end, commands included. A known `record` of
+        them saves the time to run them again."""
+        here = surroundings_of(self.batch, self.env)
+        known = self._record(k) if record is None else record
+        return columns_of(known, here.hips, here.terrain, commands=self.commands(k))
 
     def close(self) -> None:
-        """Close the window, if any."""
-        if self.renderer is not None:
-            self.renderer.close()
-            self.renderer = None
+        """Release the engine; the next record makes another one."""
+        self._engine = None
 
     def __getstate__(self) -> dict[str, Any]:
-        """Return the attributes without engine and window, which belong to this process and environment."""
-        return {name: value for name, value in vars(self).items() if name != "_end"} | {
-            "renderer": None,
-            "_engine": None,
-        }
+        """Return the attributes without the engine, which belongs to this process and environment."""
+        return {name: value for name, value in vars(self).items() if name != "_end"} | {"_engine": None}
 
     def __setstate__(self, state: dict[str, Any]) -> None:
         """Set the attributes, and find the memory of this process."""

@@ -21,13 +21,13 @@ from numpy.typing import NDArray
 from hoof_env.envs.arguments import VectorArguments, takes
 from hoof_env.envs.batch_reports import endings_of, infos_of
 from hoof_env.envs.batch_starts import check_options
+from hoof_env.envs.drawn_recording import DrawnRecording
 from hoof_env.envs.infos import name_columns
-from hoof_env.envs.recording import Recording
 from hoof_env.envs.row_states import RowStates
 from hoof_env.envs.rows import RowAttributes, RowSeeds
 from hoof_env.envs.vector_checks import check_actions, check_drawn, check_mask
 from hoof_env.errors import ParameterError, count
-from hoof_env.render.renderer import USUAL_SIZE
+from hoof_env.render.size import USUAL_SIZE
 from hoof_env.tasks.episode import FAILED, TRUNCATED
 
 Floats = NDArray[np.float64]
@@ -116,7 +116,7 @@ class HorseLegVectorEnv(  # type: ignore[misc]  # generators are of all
         self.metadata["autoreset_mode"] = self.autoreset_mode
         self.spec = None
         self.drawn = check_drawn(rendered, self.num_envs, self.render_mode)
-        self._watched = {env: Recording(self.batch, env, self._size) for env in range(self.drawn)}
+        self._watched = {env: DrawnRecording(self.batch, env, self._size) for env in range(self.drawn)}
         self._attributes: dict[str, dict[int, Any]] = {}
         self._generators: list[np.random.Generator] = []
         self._seeds: list[int] = []

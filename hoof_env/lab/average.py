@@ -16,8 +16,8 @@ from numpy.typing import NDArray
 
 from hoof_env._output import markdown_table, staged
 from hoof_env.errors import DataFileError, ParameterError, check_choice, check_number, count
-from hoof_env.lab.compare import ONE_PERCENT, why_none
-from hoof_env.lab.doubts import for_one
+from hoof_env.lab.axis_checks import for_one
+from hoof_env.lab.compare import RELATIVE_THRESHOLD, why_none
 from hoof_env.lab.forces import THRESHOLD
 from hoof_env.lab.read import ForceRecord
 from hoof_env.lab.stances import whole_stances
@@ -54,7 +54,7 @@ class Average:
     Attributes:
         unit: unit of all forces, "N" or "BW".
         limbs: mean stances by limb, in the order of the records.
-        warnings: limbs that a record lacks, and doubts about the records.
+        warnings: limbs that a record lacks, and warnings about the records.
     """
 
     unit: str
@@ -141,7 +141,7 @@ def _level(record: ForceRecord, threshold: float | None, unit: str) -> float:
     if record.weight:
         return newtons / record.weight
     if threshold is None:
-        return ONE_PERCENT
+        return RELATIVE_THRESHOLD
     raise ParameterError(
         f"mass: expected the mass [kg] of the animal of {record.name}, to know {newtons:g} N in body "
         "weights, or no threshold"

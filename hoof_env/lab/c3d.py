@@ -27,7 +27,7 @@ MARKERS = ("toe", "heel")
 CHANNELS = {"Fx": "N", "Fy": "N", "Fz": "N", "Mx": "Nmm", "My": "Nmm", "Mz": "Nmm"}
 """Channels of a plate, in its own frame about the centre of its surface, and their units."""
 
-MOST_FRAMES = 65_535
+MAX_FRAMES = 65_535
 """Largest number of frames; a c3d header has 16 bits for it."""
 
 MM = 1000.0
@@ -68,12 +68,12 @@ def write_c3d(record: Columns, about: Mapping[str, Any], path: Path) -> None:
     limbs, weight and threshold [N] in a group HOOF_ENV.
 
     Raises:
-        ParameterError: the record has more than `MOST_FRAMES` rows.
+        ParameterError: the record has more than `MAX_FRAMES` rows.
     """
     time = record["time"]
     limbs = limbs_of(record)
-    if len(time) > MOST_FRAMES:
-        raise ParameterError(f"seconds: expected at most {MOST_FRAMES} frames of a c3d, got {len(time)}")
+    if len(time) > MAX_FRAMES:
+        raise ParameterError(f"seconds: expected at most {MAX_FRAMES} frames of a c3d, got {len(time)}")
     file = ezc3d().c3d()
     parameters = file["parameters"]
     rate = [1 / float(np.median(np.diff(time)))]

@@ -15,19 +15,19 @@ from hoof_env.errors import DataFileError
 BLOCK = 512
 """Bytes of a block."""
 
-KEY = 80
+C3D_MARK = 80
 """Second byte of every c3d."""
 
-MIPS = 86
+BIG_ENDIAN_PROCESSOR = 86
 """Code of processors that write the high byte first."""
 
-FIRST = 4
+SECTION_HEADER_BYTES = 4
 """Bytes of a parameter section before its first entry."""
 
-BYTES = {-1: 1, 1: 1, 2: 2, 4: 4}
+BYTES_BY_TYPE = {-1: 1, 1: 1, 2: 2, 4: 4}
 """Bytes of a number by the type of a parameter: text, byte, integer, float."""
 
-MOST_DIMENSIONS = 7
+MAX_DIMENSIONS = 7
 """Largest number of dimensions of a parameter that c3d allows."""
 
 PRINTED = range(32, 127)
@@ -44,14 +44,14 @@ def frames_of(path: Path) -> tuple[int, int]:
         # The section begins in block 255 at most and has 255 blocks at most: each number is one byte.
         head = file.read((255 + 255 + 1) * BLOCK)
     begin = (head[0] - 1) * BLOCK if head else 0
-    if len(head) < 2 * BLOCK or head[1] != KEY or not 0 < begin < len(head) - FIRST:
+    if len(head) < 2 * BLOCK or head[1] != C3D_MARK or not 0 < begin < len(head) - SECTION_HEADER_BYTES:
         raise DataFileError(
-            f"record {str(path)!r}: cannot read it (expected a c3d, whose second byte is {KEY} and whose "
-            "first is the number of the block where its parameters begin)"
+            f"record {str(path)!r}: cannot read it (expected a c3d: the second byte is {C3D_MARK}, the first "
+            "the number of the block where the parameters begin)"
         )
-    order = ">" if head[begin + 3] == MIPS else "<"
+    order = ">" if head[begin + 3] == BIG_ENDIAN_PROCESSOR else "<"
     try:
-        _check_parameters(head, begin + FIRST, order)
+        _check_parameters(head, begin + SECTION_HEADER_BYTES, order)
     except (struct.error, IndexError):
         raise DataFileError(
             f"record {str(path)!r}: cannot read it (its parameters lead beyond the end of the file)"
@@ -102,10 +102,10 @@ def _check_parameters(head: bytes, at: int, order: str) -> None:
 def _size(head: bytes, at: int, name: str) -> int:
     """Return the bytes of a parameter from its type, in byte `at`, to the end of its numbers."""
     kind, dimensions = struct.unpack_from("bB", head, at)
-    if kind not in BYTES or dimensions > MOST_DIMENSIONS:
+    if kind not in BYTES_BY_TYPE or dimensions > MAX_DIMENSIONS:
         raise ValueError(f"{name} has type {kind} and {dimensions} dimensions")
     numbers = math.prod(head[at + 2 : at + 2 + dimensions])
-    size = 2 + dimensions + BYTES[kind] * numbers
+    size = 2 + dimensions + BYTES_BY_TYPE[kind] * numbers
     if at + size > len(head):
         raise IndexError
     return size

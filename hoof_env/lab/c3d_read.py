@@ -31,10 +31,10 @@ from hoof_env.lab.c3d_header import frames_of
 
 Floats = NDArray[np.float64]
 
-EIGHT_FORCES = 3
+EIGHT_CHANNEL_TYPE = 3
 """Type of plates with eight channels of forces."""
 
-CALIBRATED = 4
+CALIBRATED_TYPE = 4
 """Type of plates with a matrix that calibrates the channels."""
 
 SECONDS = 120.0
@@ -43,22 +43,22 @@ SECONDS = 120.0
 BYTES_A_SECOND = 1e6
 """Size for which one more second is allowed [bytes]."""
 
-STEADY = 0.05
+MAX_BASELINE_DRIFT = 0.05
 """Largest change of an unloaded plate's force, as a share of the highest force."""
 
-IDLE = 0.02
+MAX_PULL_SHARE = 0.02
 """Largest pull of a plate, as a share of its highest force."""
 
-ROBUST = 1.4826
+SIGMA_PER_MAD = 1.4826
 """Standard deviation of normal noise, in median absolute deviations."""
 
-NOISY = 6.0
+MAX_NOISE_SIGMAS = 6.0
 """Largest deviation that counts as noise, in standard deviations."""
 
-LARGE = 0.25
+MAX_OFFSET_SHARE = 0.25
 """Share of a plate's highest force above which a baseline may be a load instead of an offset."""
 
-SMALL = 0.1
+ZERO_FORCE_SHARE = 0.1
 """Share of the baseline below which a plate's force counts as zero."""
 
 PLEA = re.compile(
@@ -259,16 +259,18 @@ def _unloaded(quiet: Floats, force: Floats, base: Floats, highest: float) -> boo
     """
     # Median deviations, so that a few outliers do not hide how steady the other samples are.
     off = np.abs(quiet - np.median(quiet, axis=0))
-    noise = ROBUST * np.median(off, axis=0)
-    if (noise > STEADY * highest).any() or (off > np.maximum(STEADY * highest, NOISY * noise)).any():
+    noise = SIGMA_PER_MAD * np.median(off, axis=0)
+    drift = MAX_BASELINE_DRIFT * highest
+    if (noise > drift).any() or (off > np.maximum(drift, MAX_NOISE_SIGMAS * noise)).any():
         return False
     axis = int(np.abs(force).max(axis=0).argmax())
     along = force[:, axis] * np.sign(force[np.abs(force[:, axis]).argmax(), axis])
-    if along.max() < STEADY * highest:  # never loaded
+    if along.max() < drift:  # never loaded
         return True
-    least = IDLE * along.max() + 3 * float(quiet[:, axis].std())
+    least = MAX_PULL_SHARE * along.max() + 3 * float(quiet[:, axis].std())
     shown = np.abs(force[:, axis] + base[axis])
-    rests = abs(base[axis]) > LARGE * along.max() and np.percentile(shown, 10) < SMALL * abs(base[axis])
+    is_offset_large = abs(base[axis]) > MAX_OFFSET_SHARE * along.max()
+    rests = is_offset_large and np.percentile(shown, 10) < ZERO_FORCE_SHARE * abs(base[axis])
     return float(np.percentile(along, 10)) > -least and not rests
 
 
@@ -281,9 +283,9 @@ def _force_unit(parameters: Mapping[str, Any], plate: int) -> str:
     units = parameters["ANALOG"].get("UNITS", [])
     kind = int(of_plates["TYPE"][plate])
     channels = np.array(of_plates["CHANNEL"])[:, plate]
-    if kind == CALIBRATED:
+    if kind == CALIBRATED_TYPE:
         return "N"
     # The first channels of a plate are its forces; the others are moments, in other units.
-    numbers = [int(channel) - 1 for channel in channels[: 8 if kind == EIGHT_FORCES else 3]]
+    numbers = [int(channel) - 1 for channel in channels[: 8 if kind == EIGHT_CHANNEL_TYPE else 3]]
     stated = {units[number].strip() for number in numbers if 0 <= number < len(units)} - {""}
     return " and ".join(sorted(stated)) or "N"

@@ -27,20 +27,20 @@ from numpy.typing import NDArray
 from hoof_env.errors import DataFileError, ParameterError, check_choice, check_number
 from hoof_env.lab.forces import THRESHOLD
 from hoof_env.lab.read import ForceRecord
-from hoof_env.lab.stances import SHORTEST, Pair, Side, Spans, best_shift, pairs_of, whole_stances
+from hoof_env.lab.stances import MIN_STANCE_SECONDS, Pair, Side, Spans, best_shift, pairs_of, whole_stances
 
 Floats = NDArray[np.float64]
 
 ALIGNMENTS = ("stances", "shift", "none")
 """Ways to align B with A, see above."""
 
-ONE_PERCENT = 0.01
+RELATIVE_THRESHOLD = 0.01
 """Threshold of a stance in body weights, if the weight of the animal is unknown."""
 
-WIDE = 0.1
+MAX_TOUCHDOWN_SPREAD = 0.1
 """Largest spread of touchdowns without a warning, as a share of a stride."""
 
-MOST_SAMPLES = 20_000_000
+MAX_SAMPLES = 20_000_000
 """Largest number of samples of a record at the common rate, some hours of a force plate."""
 
 
@@ -101,7 +101,7 @@ class Comparison:
         curves: pairs of stances by limb: time from A's touchdown, shape (n,) [s], and the forces of A and of
             B at that time, forward and upward, shape (n, 2).
         missing: limbs that are not compared, with the reason.
-        warnings: doubts about the errors of limbs.
+        warnings: warnings about the errors of limbs.
     """
 
     a: ForceRecord
@@ -170,7 +170,7 @@ def compare(
         if pairs:
             limbs[name] = _errors(pairs, rate)
             curves[name] = [(pair.time, pair.a, pair.b) for pair in pairs]
-            warnings += [f"{name}: {doubt}" for doubt in _doubts(sides, limbs[name])]
+            warnings += [f"{name}: {text}" for text in _warnings(sides, limbs[name])]
         else:
             missing[name] = _why_missing(sides, levels, unit)
     if not limbs:
@@ -219,7 +219,7 @@ def _levels(a: ForceRecord, b: ForceRecord, threshold: float | None, unit: str) 
     if a.weight and b.weight:
         return newtons / a.weight, newtons / b.weight
     if threshold is None:
-        return ONE_PERCENT, ONE_PERCENT
+        return RELATIVE_THRESHOLD, RELATIVE_THRESHOLD
     lacking, record = ("b", b) if a.weight else ("a", a)
     raise ParameterError(
         f"mass-{lacking}: expected the mass [kg] of the animal of {record.name}, to know {newtons:g} N in "
@@ -228,11 +228,11 @@ def _levels(a: ForceRecord, b: ForceRecord, threshold: float | None, unit: str) 
 
 
 def _check_length(a: ForceRecord, b: ForceRecord, rate: float) -> None:
-    """Raise `ParameterError` if a record would have more than `MOST_SAMPLES` at `rate` [Hz]."""
+    """Raise `ParameterError` if a record would have more than `MAX_SAMPLES` at `rate` [Hz]."""
     longest = max(float(record.time[-1] - record.time[0]) for record in (a, b))
-    if longest * rate > MOST_SAMPLES:
+    if longest * rate > MAX_SAMPLES:
         raise ParameterError(
-            f"rate: expected at most {MOST_SAMPLES} samples of a record at the higher of both rates, got "
+            f"rate: expected at most {MAX_SAMPLES} samples of a record at the higher of both rates, got "
             f"{longest:g} s at {rate:g} Hz"
         )
 
@@ -284,7 +284,7 @@ def why_none(verticals: list[Floats], time: Floats, level: float, unit: str) -> 
             f"{why}: what it has is cut off by the {' and the '.join(cut)} of the record, where the limb "
             "is still loaded; a longer record has whole stances"
         )
-    return f"{why}: the force stays above that for less than {1e3 * SHORTEST:.0f} ms at a time"
+    return f"{why}: the force stays above that for less than {1e3 * MIN_STANCE_SECONDS:.0f} ms at a time"
 
 
 def _unshared(a: ForceRecord, b: ForceRecord, names: list[tuple[str, str]]) -> dict[str, str]:
@@ -295,8 +295,8 @@ def _unshared(a: ForceRecord, b: ForceRecord, names: list[tuple[str, str]]) -> d
     return missing | {limb: "only B has it" for limb in b.limbs if limb not in of_b}
 
 
-def _doubts(sides: tuple[Side, Side], errors: LimbErrors) -> list[str]:
-    """Return doubts about the errors of a limb: stances that one record lacks, touchdowns that scatter."""
+def _warnings(sides: tuple[Side, Side], errors: LimbErrors) -> list[str]:
+    """Return warnings about the errors of a limb: stances that one record lacks, touchdowns that scatter."""
     a, b = sides
     period = a.period if a.period > 0 else b.period
     # Near the ends a stance may be whole in one record and cut off in the other.
@@ -304,18 +304,18 @@ def _doubts(sides: tuple[Side, Side], errors: LimbErrors) -> list[str]:
     low = max(a.time[0], b.time[0]) + edge
     high = min(a.time[-1], b.time[-1]) - edge
     counts = [side.whole_between(low, high) for side in sides]
-    doubts = []
+    warnings = []
     if counts[0] != counts[1]:
-        doubts.append(
+        warnings.append(
             f"A has {counts[0]} whole stances and B {counts[1]} in the same time, {errors.pairs} are "
             "compared; if noise makes or splits stances, raise --threshold"
         )
-    if period > 0 and errors.touchdown_spread > WIDE * period:
-        doubts.append(
+    if period > 0 and errors.touchdown_spread > MAX_TOUCHDOWN_SPREAD * period:
+        warnings.append(
             f"touchdowns scatter by {1e3 * errors.touchdown_spread:.0f} ms, of a stride of "
             f"{1e3 * period:.0f} ms: the records differ in pace, or stances are paired wrongly"
         )
-    return doubts
+    return warnings
 
 
 def _common_unit(a: ForceRecord, b: ForceRecord, units: str) -> tuple[str, tuple[float, float]]:

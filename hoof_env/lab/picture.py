@@ -11,8 +11,8 @@ import numpy as np
 from hoof_env._output import check_folder, markdown_table, staged
 from hoof_env._plotting import BLUE, GREY, ORANGE, STYLE
 from hoof_env.errors import MissingExtraError, ParameterError
+from hoof_env.lab.axis_checks import for_one
 from hoof_env.lab.compare import Comparison, Force
-from hoof_env.lab.doubts import for_one
 from hoof_env.lab.read import REVERSED, ForceRecord
 
 SUFFIXES = (".pdf", ".png", ".svg")
@@ -36,15 +36,15 @@ def report(found: Comparison) -> str:
         "",
         _table(found),
     ]
-    # A record that is compared with itself has its doubts once, with the options of both.
+    # A record that is compared with itself shows its warnings once, with the options of both.
     same = (found.a.name, found.a.notes) == (found.b.name, found.b.notes)
-    doubts = [f"{found.a.name}: {note if same else for_one(note, '-a')}" for note in found.a.notes]
-    doubts += [f"{found.b.name}: {for_one(note, '-b')}" for note in found.b.notes if not same]
-    doubts += [f"{limb} is not compared: {why}" for limb, why in found.missing.items()] + found.warnings
+    warnings = [f"{found.a.name}: {note if same else for_one(note, '-a')}" for note in found.a.notes]
+    warnings += [f"{found.b.name}: {for_one(note, '-b')}" for note in found.b.notes if not same]
+    warnings += [f"{limb} is not compared: {why}" for limb, why in found.missing.items()] + found.warnings
     for limb, errors in found.limbs.items():
         if "fore-aft" in errors.forces and errors.forces["fore-aft"].r < -0.5:
-            doubts.append(f"{limb}: fore-aft forces point opposite ways; {_remedy(found, limb)}")
-    return "\n".join([*lines, *(f"warning: {doubt}" for doubt in doubts)])
+            warnings.append(f"{limb}: fore-aft forces point opposite ways; {_remedy(found, limb)}")
+    return "\n".join([*lines, *(f"warning: {text}" for text in warnings)])
 
 
 def _remedy(found: Comparison, limb: str) -> str:

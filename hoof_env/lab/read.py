@@ -1,7 +1,7 @@
 """Force records from files, ours or a laboratory's, in the world frame of `hoof_env.lab`: axes, signs, units.
 
-`lab.tables` reads the files, `lab.columns` finds the columns of each limb, and `lab.clock` reads the times.
-Columns that are not asked for may hold anything.
+`lab.tables` reads the files, `lab.columns` finds the columns of each limb, `lab.sample_times` reads the
+times, and `lab.axis_checks` warns of suspect axes. Columns that are not used may hold anything.
 """
 
 from __future__ import annotations
@@ -22,10 +22,10 @@ from hoof_env.errors import (
     check_choice,
     check_number,
 )
-from hoof_env.lab.clock import times_of
+from hoof_env.lab.axis_checks import suspect_axes, suspect_direction
 from hoof_env.lab.columns import Source, Term, few, sources_of
 from hoof_env.lab.columns import parse_mapping as parse_mapping
-from hoof_env.lab.doubts import backward, sideways
+from hoof_env.lab.sample_times import times_of
 from hoof_env.lab.tables import READERS, Table
 
 Floats = NDArray[np.float64]
@@ -57,14 +57,14 @@ vertical force that points down, as the force of the limb on the plate does."""
 AXES = ("auto", "x", "y", "z", "-x", "-y", "-z")
 """Axes of a file, for the upward and the forward direction."""
 
-STRONG = 0.2
+LOADED_SHARE = 0.2
 """Share of a limb's highest vertical force below which samples do not count for its direction, so that an
 offset does not decide it."""
 
-IDLE = 0.05
+UNLOADED_SHARE = 0.05
 """Share of the highest vertical force of all limbs below which a limb has no direction."""
 
-ONE_WAY = 0.5
+MIN_NET_SHARE = 0.5
 """Share of the sum of absolute forces that the sum of forces must exceed for a limb to have a direction."""
 
 
@@ -84,7 +84,7 @@ class ForceRecord:
         weight: weight of the animal [N], or None if unknown.
         signs: factors of the forward and the upward component in the file by limb; (1, 1) for others.
         turned: limbs of which "auto" has turned both components.
-        notes: doubts about the record, and their remedies.
+        notes: warnings about the record, and their remedies.
     """
 
     name: str
@@ -151,21 +151,21 @@ def read_record(
     has_axes = any(part.axes for parts in sources.values() for part in parts)
     if (up, forward) != ("auto", "auto") and not has_axes:
         raise ParameterError(
-            f"up, forward: expected none beside columns of {path.name} that --map names; name those of the "
-            "axes there, with a minus for its other end"
+            f"up, forward: expected neither with columns of {path.name} that --map names; name the columns "
+            "of the axes there, with a minus for the opposite direction"
         )
     columns = _components(path, table, sources)
     unit = _unit(path, table, unit, sources)
     rows = len(next(iter(columns.values()))[0])
-    times, doubts = times_of(path, table, time, rate, rows, few(table.names))
+    times, time_notes = times_of(path, table, time, rate, rows, few(table.names))
     if REVERSED[reverse] is None:
         _check_sums(path, table, sources)
     forces, signs, down = _turned(columns, reverse)
     turned = tuple(limb for limb, which in down.items() if any(which))
-    notes += table.notes + doubts
-    notes += sideways(forces, _others(table, sources), ahead, upward, (up, forward))
-    notes += backward(forces, times, ahead, has_axes)
-    # A mass that is given goes before the weight in the file.
+    notes += table.notes + time_notes
+    notes += suspect_axes(forces, _others(table, sources), ahead, upward, (up, forward))
+    notes += suspect_direction(forces, times, ahead, has_axes)
+    # A given mass takes precedence over the weight in the file.
     weight = table.weight if mass is None else mass * GRAVITY
     return ForceRecord(path.name, times, forces, unit, weight, signs, turned, tuple(notes))
 
@@ -253,7 +253,7 @@ def _downward(forces: dict[str, list[Floats]]) -> dict[str, list[bool]]:
     noise only, has no direction.
     """
     highest = max(float(np.abs(part[:, 1]).max()) for parts in forces.values() for part in parts)
-    least = IDLE * highest
+    least = UNLOADED_SHARE * highest
     down = {}
     for limb, parts in forces.items():
         down[limb] = [_points_down(part[:, 1], least) for part in parts]
@@ -264,8 +264,8 @@ def _points_down(vertical: Floats, least: float) -> bool:
     """Return True if a vertical force of shape (n,) points down and is higher than `least`."""
     highest = float(np.abs(vertical).max())
     # Only strong samples: an offset in swing lasts longer than a stance.
-    strong = vertical[np.abs(vertical) > STRONG * highest]
-    return highest > least and bool(strong.sum() < -ONE_WAY * np.abs(strong).sum())
+    strong = vertical[np.abs(vertical) > LOADED_SHARE * highest]
+    return highest > least and bool(strong.sum() < -MIN_NET_SHARE * np.abs(strong).sum())
 
 
 def _check_sums(path: Path, table: Table, sources: dict[str, list[Source]]) -> None:
@@ -276,7 +276,7 @@ def _check_sums(path: Path, table: Table, sources: dict[str, list[Source]]) -> N
             if len(terms) < 2 or any(term.sign < 0 for term in terms):
                 continue
             columns = {term.column: table.columns[term.column] for term in terms}
-            least = IDLE * max(float(np.abs(values).max()) for values in columns.values())
+            least = UNLOADED_SHARE * max(float(np.abs(values).max()) for values in columns.values())
             down = [name for name, values in columns.items() if _points_down(values, least)]
             up = [name for name, values in columns.items() if _points_down(-values, least)]
             if down and up:

@@ -1,7 +1,7 @@
 """Stances in a vertical force, and pairs of stances of two records.
 
-A stance is a time of at least `SHORTEST` above a threshold. Shorter bursts, which noise makes in swing, are
-dropped first; then shorter gaps are closed. Stances that an end of the record cuts off are left out.
+A stance is a time of at least `MIN_STANCE_SECONDS` above a threshold. Shorter bursts, which noise causes in
+swing, are dropped first; then shorter gaps are closed. Stances that the record's ends cut off are left out.
 """
 
 from __future__ import annotations
@@ -19,16 +19,16 @@ Floats = NDArray[np.float64]
 Spans = list[tuple[int, int]]
 """Numbers of the first sample of each stance and of the sample after its last."""
 
-SHORTEST = 0.02
+MIN_STANCE_SECONDS = 0.02
 """Shortest stance, and shortest gap between stances [s]."""
 
-NEAR = 1.1
-"""Ratio to the least difference within which the shortest shift is taken."""
+NEAR_BEST_RATIO = 1.1
+"""Largest difference of a shift that counts as near the best, over the least difference."""
 
-MOST_SHIFTS = 400
+MAX_SHIFTS = 400
 """Largest number of shifts between touchdowns that are tried."""
 
-SAME_PACE = 1.1
+MAX_PERIOD_RATIO = 1.1
 """Largest ratio of stride periods at which stances are paired by their times."""
 
 
@@ -43,9 +43,9 @@ def whole_stances(vertical: Floats, level: float, rate: float) -> Spans:
     edges = np.flatnonzero(np.diff((vertical > level).astype(int), prepend=0, append=0))
     spans: Spans = []
     for first, last in edges.reshape(-1, 2).tolist():
-        if last - first < SHORTEST * rate:
+        if last - first < MIN_STANCE_SECONDS * rate:
             continue
-        if spans and first - spans[-1][1] < SHORTEST * rate:
+        if spans and first - spans[-1][1] < MIN_STANCE_SECONDS * rate:
             spans[-1] = spans[-1][0], last
         else:
             spans.append((first, last))
@@ -72,7 +72,7 @@ def best_shift(
     touch = [(of_a, of_b) for of_a, of_b in zip(*stances, strict=True) if of_a and of_b]
     if not touch:
         raise ParameterError("align: expected stances of one limb in both records, found none")
-    lags = sorted({i - j for (i, _), (j, _) in product(*touch[0])}, key=abs)[:MOST_SHIFTS]
+    lags = sorted({i - j for (i, _), (j, _) in product(*touch[0])}, key=abs)[:MAX_SHIFTS]
     # Under a large shift a short overlap could agree by chance.
     least = min(whole_a.shape[1], whole_b.shape[1]) // 2
 
@@ -87,7 +87,7 @@ def best_shift(
 
     differences = {lag: difference(lag) for lag in lags}
     # Strides repeat, so that several shifts are about as good: the shortest is taken.
-    best = next(lag for lag in lags if differences[lag] <= NEAR * min(differences.values()))
+    best = next(lag for lag in lags if differences[lag] <= NEAR_BEST_RATIO * min(differences.values()))
     around = sorted(range(best - near, best + near + 1), key=lambda lag: abs(lag - best))
     # Of equal differences `min` takes the first, which is the nearest to the touchdowns.
     return min(around, key=difference) / rate
@@ -170,7 +170,7 @@ def _matches(a: Side, b: Side, by_touchdown: bool) -> list[tuple[int, int]]:
     apart = np.abs(a.touchdowns[:, None] - b.touchdowns)
     periods = sorted((a.period, b.period))
     # `not <=` instead of `>`, as an unknown period is NaN and counts as a different pace.
-    if by_touchdown and not periods[1] <= SAME_PACE * periods[0]:
+    if by_touchdown and not periods[1] <= MAX_PERIOD_RATIO * periods[0]:
         i, j = np.unravel_index(int(apart.argmin()), apart.shape)
         later = int(i - j)
         return [(m, m - later) for m in range(apart.shape[0]) if 0 <= m - later < apart.shape[1]]

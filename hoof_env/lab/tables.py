@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from hoof_env.errors import DataFileError, MissingExtraError, parse_json
 from hoof_env.lab.c3d_read import read_plates
-from hoof_env.lab.text import TITLE, Row, Text, cells_of, is_number, lines_of, number, parse
+from hoof_env.lab.text import TITLE_PATTERN, Row, Text, cells_of, is_number, lines_of, number, parse
 
 Columns = dict[str, NDArray[np.float64]]
 
@@ -116,7 +116,7 @@ def _table(path: Path, text: Text) -> Table:
     # A separator at the end of the line leaves an empty name.
     while titles and not titles[-1].strip():
         titles = titles[:-1]
-    parts = [match for title in titles if (match := TITLE.fullmatch(title))]
+    parts = [match for title in titles if (match := TITLE_PATTERN.fullmatch(title))]
     width = len(parts) or (len(rows[0][1]) if rows else 0)
     names = [part["name"] for part in parts] or [""] * width
     for k, cells in rows:

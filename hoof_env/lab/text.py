@@ -15,11 +15,11 @@ from pathlib import Path
 from hoof_env.errors import DataFileError
 
 # A name, with its unit in brackets behind it if it has one.
-TITLE = re.compile(r"\s*(?P<name>.*?)\s*(?:[\[(]\s*(?P<unit>[^\[\]()]*?)\s*[\])])?\s*")
-WORD = re.compile(r"[^\s\[(]+(?:\s*[\[(][^\])]*[\])])?")
+TITLE_PATTERN = re.compile(r"\s*(?P<name>.*?)\s*(?:[\[(]\s*(?P<unit>[^\[\]()]*?)\s*[\])])?\s*")
+WORD_PATTERN = re.compile(r"[^\s\[(]+(?:\s*[\[(][^\])]*[\])])?")
 """Pattern of a name between blanks, with its unit."""
 
-COMMENT = re.compile(r"\s*(#|%|//)+\s*")
+COMMENT_PATTERN = re.compile(r"\s*(#|%|//)+\s*")
 """Pattern of a comment sign before the names, which NumPy writes."""
 
 UNIT_WORDS = frozenset(
@@ -37,7 +37,7 @@ UNIT_WORDS = frozenset(
 SEPARATORS = ("\t", ";", ",", None)
 """Separators of cells; None stands for blanks."""
 
-SURE = 10
+MIN_TABLE_ROWS = 10
 """Number of successive rows of numbers that make a table, unless the file has fewer."""
 
 Row = tuple[int, list[str]]
@@ -147,7 +147,7 @@ def _first_row(lines: list[str]) -> tuple[int, str | None]:
             length, begin, first = runs[-1] if runs else (0, 0, None)
             # A run has the separator of its first row: later rows may be read in more than one way.
             runs[-1:] = [(length + 1, begin if length else k, first if length else between)]
-            if length + 1 == SURE:
+            if length + 1 == MIN_TABLE_ROWS:
                 return runs[-1][1:]
         # The file is shorter than a sure table: the first of its longest runs.
         if runs and max(runs)[0]:
@@ -204,8 +204,8 @@ def _between_names(line: str, between: str | None, row: str) -> str | None:
 
 def _titles(line: str, between: str | None) -> list[str]:
     """Split a line of names, without a comment sign before them, at a separator."""
-    bare = COMMENT.sub("", line, count=1) if COMMENT.match(line) else line
-    return WORD.findall(bare) if between is None else cells_of(bare, between)
+    bare = COMMENT_PATTERN.sub("", line, count=1) if COMMENT_PATTERN.match(line) else line
+    return WORD_PATTERN.findall(bare) if between is None else cells_of(bare, between)
 
 
 def _are_units(cells: list[str], names: list[str]) -> bool:

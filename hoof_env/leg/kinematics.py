@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,8 +19,10 @@ from hoof_env.errors import ParameterError, check_choice, check_number, one_of
 from hoof_env.leg.assembly import centres, solve
 from hoof_env.leg.checks import count_of
 from hoof_env.leg.closed_form import Vectors
-from hoof_env.leg.geometry import Geometry
 from hoof_env.leg.mechanism import Mechanism
+
+if TYPE_CHECKING:
+    from hoof_env.leg.geometry import Geometry
 
 
 def mirror(z: complex, travel: float) -> complex:
@@ -146,7 +149,9 @@ def pose(
     theta = check_number("theta", theta)
     theta_rate, theta_acc = check_number("theta_rate", theta_rate), check_number("theta_acc", theta_acc)
     frame = FrameMotion() if frame is None else one_of("frame", frame, FrameMotion)
-    mechanism = one_of("geometry", geometry, Geometry).mechanism
+    mechanism = getattr(geometry, "mechanism", None)
+    if not isinstance(mechanism, Mechanism):
+        raise ParameterError(f"geometry: expected Geometry, got {geometry!r}")
     z, dz, ddz = (Vectors(w.real[0], w.imag[0]) for w in solve(geometry, [theta]))
     swing = frame.phi, frame.phi_rate, frame.phi_acc
     motion = place(z, dz, ddz, theta_rate, theta_acc, *swing, float(geometry.travel))

@@ -17,7 +17,7 @@ import xml.etree.ElementTree as ET
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Protocol, runtime_checkable
+from typing import TYPE_CHECKING, Protocol, runtime_checkable
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,10 +26,12 @@ from hoof_env._output import staged
 from hoof_env.constants import GRAVITY
 from hoof_env.errors import GeometryError, ParameterError, check_number
 from hoof_env.leg.checks import checked_path
-from hoof_env.leg.geometry import Geometry
 from hoof_env.leg.kinematics import FrameMotion, Pose, pose
 from hoof_env.leg.link_tree import CRANK_LINK, LinkTree, link_tree
 from hoof_env.leg.mechanism import FRAME_NAME
+
+if TYPE_CHECKING:
+    from hoof_env.leg.geometry import Geometry
 
 RADIUS = 0.01
 """Radius of the balls at the feet [m]; the floor lies a radius deeper, so a ball touches when its point

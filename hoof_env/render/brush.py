@@ -1,4 +1,4 @@
-"""Brush of the picture: lettering, smooth shapes."""
+"""Brush of pictures: lettering and smooth shapes."""
 
 from __future__ import annotations
 
@@ -20,8 +20,8 @@ _fonts: dict[int, Any] = {}
 
 
 def _font(size: int) -> Any:
-    """The font that pygame brings along, the same everywhere; made anew after anybody's `pygame.quit()`."""
-    if not pygame.font.get_init():  # a font of before crashes pygame; pygame-ce refuses it
+    """Return pygame's own font, the same on all systems; make it anew after a `pygame.quit()`."""
+    if not pygame.font.get_init():  # an older font crashes pygame, and pygame-ce refuses it
         _fonts.clear()
         pygame.font.init()
     if not _fonts:
@@ -46,7 +46,7 @@ class Brush:
     def write(
         self, canvas: Any, text: str, at: Position, size: int, colour: Colour, side: str = "midleft"
     ) -> None:
-        """Write with the corner or edge `side` (a name of pygame.Rect's) of the text `at` a pixel."""
+        """Write a text whose corner or edge `side`, an attribute of `pygame.Rect`, is `at` a pixel."""
         image = self._letters(text, size, colour)
         place = image.get_rect(**{side: (round(at[0]), round(at[1]))})
         canvas.blit(image, place, special_flags=pygame.BLEND_PREMULTIPLIED)
@@ -64,7 +64,7 @@ class Brush:
         paint: Callable[[Any, Callable[[complex], Position]], None],
     ) -> None:
         """Paint at `FINE` times the resolution into the box around pixels (complex), `margin` wider on every
-        side, then scale down onto `canvas`; what lies outside the picture is left out.
+        side, then scale down onto `canvas`; parts outside the picture are clipped.
 
         `paint` is called with the fine surface and the map from a pixel (complex) to a position on it.
         """
@@ -93,7 +93,7 @@ class Brush:
 
 
 def bar(surface: Any, colour: Colour, a: Position, b: Position, radius_a: float, radius_b: float) -> None:
-    """A bar from `a` to `b` with round ends."""
+    """Draw a bar from `a` to `b` with round ends."""
     one = complex(*a)
     two = complex(*b)
     side = 1j * (two - one) / max(abs(two - one), 1e-9)
@@ -104,7 +104,7 @@ def bar(surface: Any, colour: Colour, a: Position, b: Position, radius_a: float,
 
 
 def arrow(surface: Any, colour: Colour, a: Position, b: Position, width: float, grow: float = 0.0) -> None:
-    """An arrow from `a` to `b`, grown on all sides by `grow`; the head of a short one shrinks with it."""
+    """Draw an arrow from `a` to `b`, wider by `grow` on all sides; a short arrow has a smaller head."""
     tail = complex(*a)
     tip = complex(*b)
     along = (tip - tail) / max(abs(tip - tail), 1e-9)

@@ -12,8 +12,8 @@ FORCE = (213, 94, 0)
 TOE = (0, 114, 178)
 HEEL = (204, 121, 167)
 CRANK = (0, 158, 115)
-"""Vermilion, blue, reddish purple and bluish green of Okabe and Ito's palette, which any colour vision tells
-apart."""
+"""Vermilion, blue, reddish purple and bluish green of Okabe and Ito's palette, which people with any colour
+vision can tell apart."""
 
 SKY_TOP = (219, 231, 242)
 SKY_BOTTOM = (249, 250, 252)

@@ -1,4 +1,4 @@
-"""Drawing data of an instant: one row of numbers, and the places in it from which glyphs take theirs.
+"""Drawing data of an instant: a row of numbers, and the place of each glyph's numbers in the row.
 
 A row begins with time, the place that the camera looks at, and the numbers of the page; outlines follow, in
 metres of the world. The script of a page hands the parts of a row to the glyphs by `Drawing.places`.
@@ -13,7 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hoof_env.leg.mechanism_list import flesh_of
-from hoof_env.render.instant import BodyInstant, Instant, Surroundings
+from hoof_env.record.instant import BodyInstant, Instant
+from hoof_env.record.surroundings import Surroundings
 from hoof_env.render.outline import (
     AROUND_M,
     ARROW_M,
@@ -22,7 +23,7 @@ from hoof_env.render.outline import (
     FAR,
     HORN_SHARE,
     HORSE_HIP_M,
-    LEAST_FORCE,
+    MIN_FORCE_SHARE,
     TAIL,
     TRUNK_M,
     USUAL_HIP_M,
@@ -34,10 +35,10 @@ Floats = NDArray[np.float64]
 Points = NDArray[np.complex128]
 
 HEAD = 3
-"""Numbers at the front of a row: time [s], x and level of the ground that the camera looks at [m]."""
+"""Count of numbers at the front of a row: time [s], and the camera's x and ground level [m]."""
 
 ARC = 9  # vertices of the round end of a part
-ARROW_WIDTH_M = 0.035  # of the arrow of a whole hoof [m]; those of toe and heel are half as wide
+ARROW_WIDTH_M = 0.035  # of the arrow of a whole hoof [m]; arrows of toe and heel are half as wide
 COIL = np.linspace(0.0, 1.0, 17)
 
 
@@ -73,7 +74,7 @@ def capsules(tails: Points, heads: Points, first: Floats, last: Floats) -> Point
 
 
 def arrows(tails: Points, forces: Points, widths: Floats) -> Points:
-    """Return the outlines of arrows from points, shape (n, 7) [m]; those without length are points."""
+    """Return the outlines of arrows from points, shape (n, 7) [m]; arrows without length are points."""
     size = np.abs(forces)
     along = forces / np.maximum(size, 1e-9)
     head = np.minimum(3.0 * widths, size)
@@ -96,8 +97,8 @@ class Drawing:
         places: where glyphs find their numbers.
         has_heel: False for legs with one foot, which is called toe.
         full_scale: force of an arrow of `ARROW_M` at a leg of a horse's size [N].
-        low, high, half_width: what the camera shows around its place [m].
-        size, girth: size of trunk and arrows, and of legs, over that of their usual drawing [-].
+        low, high, half_width: the camera's view around its place [m].
+        size, girth: size of trunk and arrows, and of legs, over their usual size [-].
         weights, far, trunk_parts: full scale over the weight [-], legs behind the trunk, parts of the trunk.
     """
 
@@ -131,7 +132,7 @@ class Drawing:
         self._claim("arrows", 3 * len(legs), 7)
 
     def _measure(self) -> None:
-        """Set the sizes and what the camera shows."""
+        """Set the sizes and the camera's view."""
         hip = self._geometry.hip_height
         self.size = self.girth = min(1.0, hip / USUAL_HIP_M)
         out, up = reach(self._geometry)
@@ -141,7 +142,7 @@ class Drawing:
         self.half_width = out + 0.1 * self.size
 
     def _find_points(self) -> None:
-        """Find the points of flesh and hooves, of legs that have them."""
+        """Find the points of flesh and hooves, if the legs have them."""
         points = self._geometry.mechanism.points
         self._number = {name: k for k, name in enumerate(points)}
         self._flesh = flesh_of(self._geometry.mechanism)
@@ -209,7 +210,7 @@ class Drawing:
         return [part.ravel() for outline in outlines for part in (outline.real, outline.imag)]
 
     def _trunk(self, now: BodyInstant) -> tuple[Points, Points]:
-        """Return the outlines of the trunk and of what holds it."""
+        """Return the outlines of the trunk and of its support."""
         hip = complex(now.x, now.y)
         turn = np.exp(1j * now.pitch)
         half, above, below = (self.size * length for length in TRUNK_M)
@@ -237,7 +238,7 @@ class Drawing:
             forces.append(complex(now.force_x, now.force_y))
         lengths = np.array(forces) / self.full_scale
         hoof = np.abs(lengths[2::3])
-        drawn = np.repeat(hoof >= LEAST_FORCE, 3) & (np.abs(lengths) > 0)
+        drawn = np.repeat(hoof >= MIN_FORCE_SHARE, 3) & (np.abs(lengths) > 0)
         shown: Any = ARROW_M * self.size * np.where(drawn, lengths, 0j)
         # An arrow that is not drawn is a point at the toe: a centre of pressure without load is at 0, 0.
         start = np.where(drawn, np.array(tails), np.repeat(np.array(tails)[::3], 3))
@@ -253,7 +254,7 @@ class HorseDrawing(Drawing):
     trunk_parts = len(BODY) + 2
 
     def _measure(self) -> None:
-        """Set the sizes and what the camera shows."""
+        """Set the sizes and the camera's view."""
         self.size = self.girth = self._geometry.hip_height / HORSE_HIP_M
         self.low = -0.35 * self.size
         self.high = 2.75 * self.size

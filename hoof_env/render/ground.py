@@ -11,14 +11,14 @@ import pygame
 from numpy.typing import NDArray
 
 from hoof_env.ground.terrain import Terrain
+from hoof_env.record.instant import Instant
 from hoof_env.render.brush import Brush
 from hoof_env.render.colours import SOIL_LINE, Colour
-from hoof_env.render.instant import Instant
-from hoof_env.render.kinds import ALIKE, BODY, SKIN, find_patches, kinds_of, shade
+from hoof_env.render.kinds import BODY, SKIN, TOLERANCE, find_patches, kinds_of, shade
 
-FLANK_M = 0.09  # how far from the hoof the footprint draws the ground down; the model has no width [m]
-COLUMN = 6  # distance of the places where the surface is drawn [pixels of the usual picture]
-LABEL = 90  # least width of a patch that is labelled [pixels of the usual picture]
+FLANK_M = 0.09  # reach of the drawn footprint beyond the hoof, as the model has no width [m]
+COLUMN = 6  # distance between drawn points of the surface [pixels of a picture of 960 x 540]
+LABEL = 90  # least width of a labelled patch [pixels of a picture of 960 x 540]
 
 Point = tuple[float, float]
 
@@ -43,11 +43,11 @@ class GroundPainter:
         self._grid = COLUMN * brush.unit / scale
 
     def height(self, x: Any) -> Any:
-        """Height of the undisturbed ground [m]."""
+        """Return the height of the undisturbed ground [m]."""
         return np.interp(x, self._knots, self._heights)
 
     def kinds(self) -> list[tuple[str, Colour]]:
-        """Return name and colour of every kind of ground in the terrain but the usual."""
+        """Return name and colour of each unusual kind of ground in the terrain."""
         return kinds_of(self._terrain)
 
     def draw(self, canvas: Any, feet: Sequence[Instant], corner: complex) -> None:
@@ -86,7 +86,7 @@ class GroundPainter:
     def _runs(
         self, line: list[Point], middle: Any, factors: Any, colours: tuple[Colour | None, ...]
     ) -> Iterator[tuple[list[Point], Colour]]:
-        """Stretches of the surface line of one colour, by the factor in the middle of each piece of it."""
+        """Yield stretches of the surface line with their colour, by the factor amid each piece."""
         shades = shade(np.interp(middle, self._knots, factors))
         changes = [0, *(np.flatnonzero(np.diff(shades)) + 1).tolist(), len(shades)]
         for start, end in pairwise(changes):
@@ -123,7 +123,7 @@ class GroundPainter:
             x = (middle - left) * self._scale
             y = (corner.imag - float(self.height(middle))) * self._scale + 36 * unit
             factors = [("stiffness", patch.stiffness), ("friction", patch.friction)]
-            words = [f"{name} × {factor:.2g}" for name, factor in factors if abs(factor - 1) > ALIKE]
+            words = [f"{name} × {factor:.2g}" for name, factor in factors if abs(factor - 1) > TOLERANCE]
             for k, text in enumerate(words):
                 self._brush.write(canvas, text, (x, y + 15 * k * unit), 16, SOIL_LINE, "midtop")
 

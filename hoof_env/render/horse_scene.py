@@ -14,19 +14,19 @@ import pygame
 
 from hoof_env.ground.terrain import Terrain
 from hoof_env.leg.geometry import Geometry
+from hoof_env.record.instant import BodyInstant
 from hoof_env.render.brush import FINE, Brush, arrow, bar
 from hoof_env.render.colours import COAT, COAT_EDGE, CRANK, FORCE, GREY, HEEL, TOE
 from hoof_env.render.ground import GroundPainter
-from hoof_env.render.instant import BodyInstant
 from hoof_env.render.outline import AROUND_M, ARROW_M, BODY, EAR, FAR, HORSE_HIP_M, TAIL, LegOutline
 from hoof_env.render.scene import LegScene
 
-FAR_COAT = 0.45  # how far the colour of far legs is from the sky's [-]
+FAR_COAT = 0.45  # opacity of far legs [-]
 WIDE_M = (1.75, 2.25)
-"""Width that is seen behind and before the trunk's centre [m]."""
+"""Visible width behind and before the trunk's centre [m]."""
 
 SOIL_M = 0.45
-"""Depth that is seen below the ground [m]."""
+"""Visible depth below the ground [m]."""
 ARROW_SHARE = 0.75  # length of a full-scale arrow over that of one leg's scene, at the usual hips [-]
 
 
@@ -52,10 +52,10 @@ class HorseScene(LegScene):
         self._key = lru_cache(maxsize=8)(self._paint_key)
 
     def reset(self) -> None:
-        """Nothing is kept."""
+        """Do nothing, as the scene shows no paths."""
 
     def add(self, instants: Sequence[Any]) -> None:
-        """Nothing is kept."""
+        """Do nothing, as the scene shows no paths."""
 
     def draw(self, canvas: Any, now: Any, full_scale: float) -> None:
         """Draw an instant; the arrow of a force `full_scale` [N] is as long for animals of all sizes in the

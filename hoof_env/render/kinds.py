@@ -19,8 +19,8 @@ from hoof_env.render.colours import (
     mix,
 )
 
-STRONG = 4.0  # a factor of stiffness or friction of this, or its inverse, has the full colour [-]
-ALIKE = 0.02  # relative difference of a factor from 1 below which the ground counts as usual [-]
+FULL_COLOUR_FACTOR = 4.0  # factor of stiffness or friction that, like its inverse, has the full colour [-]
+TOLERANCE = 0.02  # largest difference of a factor from 1 on usual ground [-]
 
 
 class Patch(NamedTuple):
@@ -33,14 +33,14 @@ class Patch(NamedTuple):
 
 
 def find_patches(terrain: Terrain) -> list[Patch]:
-    """Stretches of one kind, all but the usual; a change over one spacing counts half to either side."""
+    """Return the unusual stretches of a terrain; a change over one spacing belongs half to either side."""
     factors = np.array([terrain.stiffness, terrain.friction])
-    differs = (np.diff(np.round(factors / ALIKE), axis=1) != 0).any(axis=0)
+    differs = (np.diff(np.round(factors / TOLERANCE), axis=1) != 0).any(axis=0)
     changes = [0, *(np.flatnonzero(differs) + 1).tolist(), factors.shape[1]]
     patches = []
     for first, end in pairwise(changes):
         stiffness, friction = factors[:, (first + end) // 2].tolist()
-        if max(abs(stiffness - 1), abs(friction - 1)) > ALIKE:
+        if max(abs(stiffness - 1), abs(friction - 1)) > TOLERANCE:
             left = -np.inf if first == 0 else terrain.start + (first - 0.5) * terrain.spacing
             right = np.inf if end == factors.shape[1] else terrain.start + (end - 0.5) * terrain.spacing
             patches.append(Patch(left, right, stiffness, friction))
@@ -48,27 +48,27 @@ def find_patches(terrain: Terrain) -> list[Patch]:
 
 
 def kinds_of(terrain: Terrain) -> list[tuple[str, Colour]]:
-    """Return name and colour of every kind of ground in the terrain but the usual."""
+    """Return name and colour of each unusual kind of ground in the terrain."""
     stiffness = np.array(terrain.stiffness)
     friction = np.array(terrain.friction)
     all_kinds = (
-        ("stiffer ground", STIFFER, stiffness.max() > 1 + ALIKE),
-        ("softer ground", SOFTER, stiffness.min() < 1 - ALIKE),
-        ("more slippery", SLIPPERY, friction.min() < 1 - ALIKE),
-        ("less slippery", ROUGHER, friction.max() > 1 + ALIKE),
+        ("stiffer ground", STIFFER, stiffness.max() > 1 + TOLERANCE),
+        ("softer ground", SOFTER, stiffness.min() < 1 - TOLERANCE),
+        ("more slippery", SLIPPERY, friction.min() < 1 - TOLERANCE),
+        ("less slippery", ROUGHER, friction.max() > 1 + TOLERANCE),
     )
     return [(name, colour) for name, colour, there in all_kinds if there]
 
 
 def shade(factor: Any) -> Any:
-    """Index of the colour for a factor of stiffness or friction: `SHADES` where it is 1."""
-    strength = np.log(np.maximum(factor, 1e-3)) / np.log(STRONG)
-    usual = np.abs(np.asarray(factor) - 1) <= ALIKE
+    """Return the index of the colour for a factor of stiffness or friction; `SHADES` for a factor of 1."""
+    strength = np.log(np.maximum(factor, 1e-3)) / np.log(FULL_COLOUR_FACTOR)
+    usual = np.abs(np.asarray(factor) - 1) <= TOLERANCE
     steps = np.sign(strength) * np.maximum(np.ceil(np.minimum(np.abs(strength), 1) * SHADES - 1e-9), 1)
     return np.where(usual, 0, steps).astype(int) + SHADES
 
 
-SHADES = 5  # of a colour between the usual and the full one
+SHADES = 5  # number of steps from the usual to the full colour
 
 BODY: tuple[Colour | None, ...] = tuple(
     mix(SOIL, SOFTER if k < 0 else STIFFER, abs(k) / SHADES) for k in range(-SHADES, SHADES + 1)

@@ -11,10 +11,10 @@ from typing import Any
 
 import pygame
 
+from hoof_env.record.instant import BodyInstant
 from hoof_env.render.brush import FINE, Brush
 from hoof_env.render.colours import FAINT, FORCE, GREY, INK, OF_LEGS, PAPER, Colour
-from hoof_env.render.instant import BodyInstant
-from hoof_env.render.panel import SECONDS, SMALLEST_SCALE, Stances, interval_of, nice
+from hoof_env.render.panel import MIN_FULL_SCALE_N, SECONDS, Stances, interval_of, nice
 
 NUMBERS = (
     ("time", "s", INK),
@@ -22,11 +22,11 @@ NUMBERS = (
     ("pitch", "deg", INK),
     ("highest force", "kN", FORCE),
 )
-ROW = 13  # height of a row of the footfall diagram [pixels of the usual picture]
+ROW = 13  # height of a row of the footfall diagram [pixels of a picture of 960 x 540]
 CURVE = 50  # largest height of a leg's curve [same]
 GAP = 17  # between curves, for the name of a leg [same]
 ROOM = 320  # for all curves and rows [same]
-MOST_LEGS = 9  # for which there is room
+MAX_LEGS = 9  # for which there is room
 
 
 class LegsPanel:
@@ -46,7 +46,7 @@ class LegsPanel:
         self._brush = brush
         self._box = pygame.Rect(box)
         self._legs = tuple(leg.removesuffix("_") for leg in legs)
-        self._weight = weight_n or SMALLEST_SCALE  # 0 is a weight that is not known
+        self._weight = weight_n or MIN_FULL_SCALE_N  # 0 stands for an unknown weight
         self._lift_off = lift_off_n
         self._inside = self._box.inflate(-36 * unit, -28 * unit)
         left = self._inside.left + round(34 * unit)
@@ -73,7 +73,7 @@ class LegsPanel:
 
     @property
     def stances(self) -> Stances:
-        """Stances of the leg with the highest force of an open stance."""
+        """Stances of the leg whose open stance has the highest force."""
         return max(self.each, key=lambda one: one.running_peak)
 
     def add(self, instants: Sequence[BodyInstant]) -> None:
@@ -132,7 +132,7 @@ class LegsPanel:
                 pygame.draw.aalines(canvas, colour, False, [(x, y - shift) for x, y in line])
 
     def _line(self, k: float, x: float) -> tuple[float, float]:
-        """Middle of line `k` of the numbers, `x` from the left."""
+        """Return the middle of line `k` of the numbers, `x` from the left."""
         return self._inside.left + x * self._brush.unit, self._inside.top + (8 + 23 * k) * self._brush.unit
 
     def _paint_card(self, full_scale: float) -> Any:

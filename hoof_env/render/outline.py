@@ -1,5 +1,4 @@
-"""Outlines of legs and trunks in metres, without a library that draws: what films and pages show of an
-instant."""
+"""Outlines of legs and trunks in metres, which films and pages share; they need no library that draws."""
 
 from __future__ import annotations
 
@@ -12,15 +11,15 @@ from hoof_env.gait import LIMITS
 from hoof_env.leg.assembly import solve
 from hoof_env.leg.geometry import Geometry
 from hoof_env.leg.kinematics import pose
-from hoof_env.render.instant import Instant
+from hoof_env.record.instant import Instant
 
 TRUNK_M = (1.05, 0.42, 0.16)  # the trunk about O: half its length, its height above and below [m]
 USUAL_HIP_M = 1.5
-"""Least height of a hip around which all is drawn in full size [m]; below, in proportion to the height."""
+"""Least hip height with trunk and arrows in full size [m]; for lower hips they shrink in proportion."""
 
-AROUND_M = np.linspace(-1.5, 1.5, 31)  # where, from O, the ground is looked at for the camera's level [m]
+AROUND_M = np.linspace(-1.5, 1.5, 31)  # places about O, whose mean ground is the camera's level [m]
 ARROW_M = 1.3  # length of an arrow of the full scale, drawn in full size [m]
-LEAST_FORCE = 0.004  # part of the full scale below which a force is not drawn [-]
+MIN_FORCE_SHARE = 0.004  # least drawn force over the full scale [-]
 HOLD_M = 0.1  # height above the trunk of the rail or plate that holds it [m]
 HORN_SHARE = 0.45  # part of the hoof triangle, from the sole up, that is horn; above it is the pastern [-]
 
@@ -38,7 +37,7 @@ EAR: Part = ((1.36, 0.86), (1.38, 1.06), 0.05, 0.015)
 TAIL: Part = ((-0.93, 0.22), (-1.15, -0.42), 0.05, 0.025)
 HORSE_HIP_M = 1.4
 FAR = (1, 3)
-"""Legs of a horse that are drawn behind its trunk, the right ones."""
+"""Right legs of a horse, which are drawn behind its trunk."""
 
 
 class LegOutline:

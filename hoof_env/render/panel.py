@@ -1,4 +1,4 @@
-"""The panel of one leg: numbers of the instant, gait commanded and made, force of the last seconds."""
+"""The panel of one leg: numbers of the instant, commanded and actual gait, force of the last seconds."""
 
 from __future__ import annotations
 
@@ -12,13 +12,13 @@ import numpy as np
 import pygame
 
 from hoof_env.dynamics.observables import StanceCounter
+from hoof_env.record.instant import BodyInstant, Instant
 from hoof_env.render.brush import FINE, Brush
 from hoof_env.render.colours import CRANK, FAINT, FORCE, GREY, INK, PAPER
-from hoof_env.render.instant import BodyInstant, Instant
 
 SECONDS = 3  # time shown [s]
 RESOLUTION = 0.01  # the curve keeps the largest force of every such interval [s]
-SMALLEST_SCALE = 200.0  # least full scale of the curve [N]
+MIN_FULL_SCALE_N = 200.0  # least full scale of the curve [N]
 UNDER_CURVE = (252, 230, 214)
 
 NUMBERS = (
@@ -28,7 +28,7 @@ NUMBERS = (
     ("peak of this stance", "", FORCE),
     ("highest so far", "", FORCE),
 )
-"""Title, unit and colour; no unit is that of forces."""
+"""Title, unit and colour; "" stands for the unit of forces."""
 
 
 class Unit(NamedTuple):
@@ -41,12 +41,12 @@ class Unit(NamedTuple):
 
 KILONEWTONS = Unit("kN", 1000.0, 2)
 NEWTONS = Unit("N", 1.0, 0)
-LIGHT = 10.0  # lift-off force of a leg whose forces are written in newtons [N]; it goes with the weight
-SMALLEST_OF_LIGHT = 10.0  # least full scale of its curve [N]
+LIGHT = 10.0  # lift-off force, a share of the weight, below which forces are in newtons [N]
+MIN_LIGHT_FULL_SCALE_N = 10.0  # least full scale of its curve [N]
 
 
 def unit_of(lift_off_n: float) -> Unit:
-    """In which forces on such a leg are written; one that does not say its weight is a heavy one."""
+    """Return the unit of a leg's forces; a leg of unknown weight counts as heavy."""
     return NEWTONS if 0.0 < lift_off_n < LIGHT else KILONEWTONS
 
 
@@ -56,11 +56,11 @@ GAIT = (
     ("swing sine", "swing_sin", "swing_sin", "rad"),
     ("swing cosine", "swing_cos", "swing_cos", "rad"),
 )
-"""Title, field of `Instant`, parameter that is commanded and unit."""
+"""Title, field of `Instant`, commanded parameter and unit."""
 
 
 class Peak(NamedTuple):
-    """When a stance had its highest force, and how much it was: [s, N]."""
+    """Time and size of a stance's highest force [s, N]."""
 
     time: float
     force: float
@@ -122,7 +122,7 @@ class LegPanel:
         self._weight = weight_n
         self._lift_off = lift_off_n
         self._force = unit_of(lift_off_n)
-        self._least = SMALLEST_OF_LIGHT if self._force is NEWTONS else SMALLEST_SCALE
+        self._least = MIN_LIGHT_FULL_SCALE_N if self._force is NEWTONS else MIN_FULL_SCALE_N
         self._inside = self._box.inflate(-36 * unit, -32 * unit)
         self._plot = pygame.Rect(0, 0, self._inside.width - 40 * unit, 150 * unit)
         self._plot.bottomright = self._inside.right - round(6 * unit), self._inside.bottom - round(36 * unit)
@@ -161,7 +161,7 @@ class LegPanel:
         self._draw_curve(canvas, now.time)
 
     def _line(self, k: float, x: float) -> tuple[float, float]:
-        """Middle of line `k` of the numbers and the gait, `x` from the left."""
+        """Return the middle of line `k` of the numbers and the gait, `x` from the left."""
         return self._inside.left + x * self._brush.unit, self._inside.top + (8 + 24 * k) * self._brush.unit
 
     def _paint_card(self, full_scale: float) -> Any:
@@ -285,6 +285,6 @@ def interval_of(time: float) -> int:
 
 
 def nice(force: float) -> float:
-    """The smallest 1, 2 or 5 times a power of ten that is at least `force`."""
+    """Return the smallest 1, 2 or 5 times a power of ten that is at least `force` [N]."""
     power = 10.0 ** np.floor(np.log10(force))
     return float(next(power * m for m in (1, 2, 5, 10) if power * m >= force * (1 - 1e-12)))

@@ -1,7 +1,7 @@
-"""Pictures that bodies ask for: which scene, which panel, and which drawing on a page show a body.
+"""Pictures of bodies by kind: the scene, the panel and a page's drawing that show a body.
 
-A body names its picture (`tasks.body.Body.picture`), and whatever draws asks the picture. A new body takes
-one of these, or brings another.
+A body names the kind of its picture (`tasks.body.Body.picture`); `picture_of` finds the picture. A body that
+needs another one adds it to `PICTURES`.
 """
 
 from __future__ import annotations
@@ -10,25 +10,26 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any, Protocol
 
 from hoof_env.dynamics.parts import ONE_LEG, TRUNKS
-from hoof_env.errors import ParameterError
+from hoof_env.errors import ParameterError, check_choice
+from hoof_env.record.instant import BodyInstant
+from hoof_env.record.surroundings import Surroundings
 
 if TYPE_CHECKING:
     from hoof_env.render.brush import Brush
     from hoof_env.render.drawing import Drawing
-    from hoof_env.render.instant import BodyInstant, Surroundings
     from hoof_env.render.panel import Stances
 
-# Scenes and panels need pygame, which a server or a cluster may lack: they are imported where they are made.
+# Scenes and panels need pygame, which a server may lack: methods that make them import them.
 
 
 class Scene(Protocol):
     """Interface of scenes: the body on its ground."""
 
     def reset(self) -> None:
-        """Forget what was shown: an episode begins."""
+        """Forget the instants of the last episode."""
 
     def add(self, instants: Sequence[BodyInstant]) -> None:
-        """Take what happened since the last call, in the order of time."""
+        """Add the instants since the last call, in the order of time."""
 
     def draw(self, canvas: Any, now: BodyInstant, full_scale: float) -> None:
         """Draw an instant on a surface of pygame; `full_scale` is the force of the longest arrow [N]."""
@@ -45,13 +46,13 @@ class Panel(Protocol):
 
     @property
     def stances(self) -> Stances:
-        """Stances of the episode and their peaks; of several legs those of the one that bears most."""
+        """Stances of the episode and their peaks; of several legs, of the leg with the highest force."""
 
     def reset(self) -> None:
-        """Forget what was shown: an episode begins."""
+        """Forget the instants of the last episode."""
 
     def add(self, instants: Sequence[BodyInstant]) -> None:
-        """Take what happened since the last call, in the order of time."""
+        """Add the instants since the last call, in the order of time."""
 
     def draw(self, canvas: Any, now: BodyInstant) -> None:
         """Draw an instant on a surface of pygame, over the scene."""
@@ -98,9 +99,7 @@ class LegPicture:
         from hoof_env.render.panel import LegPanel
 
         if len(here.hips) > 1:
-            raise ParameterError(
-                f"picture: expected a LegsPicture of {len(here.hips)} legs, got a LegPicture"
-            )
+            raise ParameterError(f"picture: expected 'legs' for {len(here.hips)} legs, got 'leg'")
         weight = here.weight_n if here.trunk == "suspended" else 0.0
         return LegPanel(brush, box, weight, here.lift_off_n, limits_of(here.geometry))
 
@@ -116,10 +115,10 @@ class LegsPicture(LegPicture):
 
     def panel(self, brush: Brush, box: tuple[int, int, int, int], here: Surroundings) -> Panel:
         """Make the panel, see `Picture`."""
-        from hoof_env.render.legs_panel import MOST_LEGS, LegsPanel
+        from hoof_env.render.legs_panel import MAX_LEGS, LegsPanel
 
-        if len(here.hips) > MOST_LEGS:
-            raise ParameterError(f"picture: expected at most {MOST_LEGS} legs, got {len(here.hips)}")
+        if len(here.hips) > MAX_LEGS:
+            raise ParameterError(f"picture: expected at most {MAX_LEGS} legs, got {len(here.hips)}")
         return LegsPanel(brush, box, tuple(here.hips), here.weight_n, here.lift_off_n)
 
 
@@ -139,3 +138,12 @@ class HorsePicture(LegsPicture):
         from hoof_env.render.drawing import HorseDrawing
 
         return HorseDrawing(here, numbers)
+
+
+PICTURES: dict[str, Picture] = {"leg": LegPicture(), "legs": LegsPicture(), "horse": HorsePicture()}
+"""Pictures by kind."""
+
+
+def picture_of(here: Surroundings) -> Picture:
+    """Return the picture of a body; raise `ParameterError` for an unknown kind."""
+    return PICTURES[check_choice("picture", here.picture, PICTURES)]

@@ -1,7 +1,7 @@
-"""Pictures of the leg at work: an off-screen RGB array, or a window for people.
+"""Pictures of a body in motion: an off-screen RGB array, or a window.
 
 Drawing is done in software on an off-screen surface; only render mode "human" opens a display. Every
-number in the picture is read from `instant.Instant`s; it computes no mechanics of its own.
+number in the picture is read from instants (`record.instant`); it computes no mechanics of its own.
 """
 
 from __future__ import annotations
@@ -16,23 +16,23 @@ from gymnasium import logger
 from gymnasium.error import DependencyNotInstalled, ResetNeeded
 from numpy.typing import NDArray
 
-from hoof_env.errors import HoofEnvError, ParameterError, check_choice, check_number, count
-from hoof_env.render.instant import BodyInstant, Surroundings
+from hoof_env.errors import HoofEnvError, check_choice, check_number
+from hoof_env.record.instant import BodyInstant
+from hoof_env.record.surroundings import Surroundings
+from hoof_env.render.picture import picture_of
+from hoof_env.render.size import USUAL_SIZE, check_size
 
 if TYPE_CHECKING:
     from hoof_env.render.panel import Stances
 
 MODES = ("rgb_array", "human")
-SMALLEST_SIZE = (480, 270)  # below this the lettering is not readable [pixels]
-USUAL_SIZE = 960, 540  # [pixels]
-LARGEST_SIDE = 8192  # largest width and height [pixels]; a canvas of both takes 270 MB
 
 
 class Renderer:
     """Renderer of a body, the ground, the forces on hooves and a panel with numbers and curves.
 
     Args:
-        here: surroundings; their picture makes scene and panel.
+        here: surroundings; the kind of picture that they name makes scene and panel.
         mode: one of `MODES`.
         fps: frames per second that a window is held to [Hz].
         size: width and height of the picture [pixels].
@@ -55,8 +55,9 @@ class Renderer:
         self.here = here
         self.mode = check_choice("render_mode", mode, MODES)
         self.fps = check_number("fps", fps, low=0, exclusive_low=True)
-        self.size = _check_size(size)
-        check_choice("trunk", here.trunk, here.picture.trunks)
+        self.size = check_size(size)
+        picture = picture_of(here)
+        check_choice("trunk", here.trunk, picture.trunks)
         check_number("weight_n", here.weight_n, low=0)
         try:
             import pygame
@@ -67,14 +68,14 @@ class Renderer:
 
         self._pygame = pygame
         self._canvas = pygame.Surface(self.size, 0, 32)
-        # laid out in memory as a frame is, so that the copy is quick
+        # In the layout of a frame, which makes the copy fast.
         self._packed = pygame.Surface(self.size, 0, 24, (0xFF, 0xFF00, 0xFF0000, 0))
         self.brush = brush = Brush(self.size)
         edge = round(16 * brush.unit)
         column = round(304 * brush.unit)
         box = (self.size[0] - edge - column, edge, column, round(508 * brush.unit))
-        self._scene = here.picture.scene(brush, here, self.size, column + 2 * edge)
-        self._panel = here.picture.panel(brush, box, here)
+        self._scene = picture.scene(brush, here, self.size, column + 2 * edge)
+        self._panel = picture.panel(brush, box, here)
         self._window_open = False
         self._clock = pygame.time.Clock()
         self._closed = False
@@ -87,7 +88,7 @@ class Renderer:
 
     @property
     def latest(self) -> Any:
-        """The instant that is drawn next; `ResetNeeded` if there is none."""
+        """The instant that is drawn next; raise `ResetNeeded` if there is none."""
         if self._now is None:
             raise ResetNeeded("nothing to draw yet: reset the environment first")
         return self._now
@@ -97,13 +98,13 @@ class Renderer:
         return self._now is None
 
     def reset(self) -> None:
-        """A new episode: forget the force history and the paths of the hoof."""
+        """Forget the forces and the paths of the last episode."""
         self._now = None
         self._scene.reset()
         self._panel.reset()
 
     def add(self, news: Sequence[BodyInstant]) -> None:
-        """Take what happened since the last call, in the order of time; what is not finite is left out."""
+        """Add the instants since the last call, in the order of time; skip instants that are not finite."""
         seen = [now for now in news if _is_finite(now)]
         if seen:
             self._now = seen[-1]
@@ -131,7 +132,7 @@ class Renderer:
             self._pygame.display.quit()
 
     def draw(self) -> Any:
-        """Draw the latest instant; returns the surface, which the next call paints over."""
+        """Draw the latest instant; return the surface, which the next call paints over."""
         now = self.latest
         self._scene.draw(self._canvas, now, self._panel.full_scale)
         self._panel.draw(self._canvas, now)
@@ -181,26 +182,6 @@ def open_window(size: tuple[int, int], title: str) -> Any:
 
 
 def _is_finite(now: BodyInstant) -> bool:
-    """Return True if all that places the picture is finite."""
+    """Return True if all numbers that the picture needs are finite."""
     of_legs = (sum(leg[:9]) + leg.force_x + leg.force_y for leg in now.legs)
     return math.isfinite(now.x + now.y + now.vx + now.vy + now.pitch + sum(of_legs))
-
-
-def check_side(name: str, pixels: Any) -> int:
-    """The "width" or "height" of a picture [pixels]."""
-    return count(name, pixels, SMALLEST_SIZE[name == "height"], LARGEST_SIDE)
-
-
-def _check_size(size: Any) -> tuple[int, int]:
-    low_w, low_h = SMALLEST_SIZE
-    high = LARGEST_SIDE
-    try:
-        width, height = size
-        good = high >= width == int(width) >= low_w and high >= height == int(height) >= low_h
-    except (TypeError, ValueError):
-        good = False
-    if not good:
-        raise ParameterError(
-            f"size: expected (width, height) from {low_w} x {low_h} to {high} x {high} pixels, got {size!r}"
-        )
-    return int(width), int(height)

@@ -18,6 +18,8 @@ import pygame
 from hoof_env.ground.terrain import Terrain
 from hoof_env.leg.geometry import Geometry
 from hoof_env.leg.mechanism_list import flesh_of
+from hoof_env.record.instant import BodyInstant, Instant
+from hoof_env.record.surroundings import ONE_HIP, Hips
 from hoof_env.render.brush import FINE, Brush, arrow, bar
 from hoof_env.render.colours import (
     COAT,
@@ -39,12 +41,11 @@ from hoof_env.render.colours import (
     mix,
 )
 from hoof_env.render.ground import GroundPainter
-from hoof_env.render.instant import ONE_HIP, BodyInstant, Hips, Instant
 from hoof_env.render.outline import (
     AROUND_M,
     ARROW_M,
     HORN_SHARE,
-    LEAST_FORCE,
+    MIN_FORCE_SHARE,
     USUAL_HIP_M,
     LegOutline,
     reach,
@@ -52,7 +53,7 @@ from hoof_env.render.outline import (
 from hoof_env.render.panel import KILONEWTONS, Unit
 from hoof_env.render.trunk import TrunkPainter
 
-HEIGHT_SLACK_M = 0.2  # how far O may rise or sink from the paper's hip height before the camera follows [m]
+HEIGHT_SLACK_M = 0.2  # distance of O from the nominal hip height beyond which the camera follows [m]
 SOIL_M = 0.4  # least depth of soil in the picture [m]
 MARGIN_M = 0.1  # room around the leg at its furthest reach [m]
 PATH_SECONDS = 1.0  # length of the paths of toe and heel [s]
@@ -63,7 +64,7 @@ class LegScene:
     """Scene in a picture of `size`, whose `right` pixels the legs at `hips` leave free.
 
     Attributes:
-        small: size of what is drawn around the leg, at most 1.
+        small: size of trunk and arrows over their full size, at most 1.
     """
 
     small = 1.0
@@ -105,7 +106,7 @@ class LegScene:
 
     @property
     def _metre(self) -> float:
-        """Pixels of a metre of what is drawn around the leg."""
+        """Pixels per metre of trunk and arrows."""
         return self._scale * self.small
 
     def reset(self) -> None:
@@ -123,7 +124,7 @@ class LegScene:
                 path.popleft()
 
     def _soles(self, legs: Sequence[Instant]) -> Sequence[Instant]:
-        """Return legs with the heel in the toe if they have one foot: their engine has the heel at (0, 0)."""
+        """Return legs, with the heel at the toe if they have one foot, whose heel is (0, 0) in the engine."""
         if self._geometry.heel is not None:
             return legs
         return [leg._replace(heel_x=leg.toe_x, heel_y=leg.toe_y, heel_depth=leg.toe_depth) for leg in legs]
@@ -166,7 +167,7 @@ class LegScene:
         return dict(zip(self._geometry.mechanism.points, points, strict=True))
 
     def _pixels(self, z: Any) -> Any:
-        """World position, complex [m], to position in the picture, complex with y down [pixels]."""
+        """Convert positions in the world, complex [m], to pixels of the picture, complex with y down."""
         return np.conj(z - self._camera) * self._scale + complex(self._centre, self._level)
 
     def _paint_sky(self) -> Any:
@@ -244,8 +245,8 @@ class LegScene:
     def _draw_forces(
         self, canvas: Any, now: Instant, full_scale: float, share: float = 1.0, is_told: bool = True
     ) -> None:
-        """Arrows of the forces on the hoof; where both points bear load, that of their sum behind them."""
-        if now.grf < full_scale * LEAST_FORCE:
+        """Draw the forces on toe and heel, and behind them their sum."""
+        if now.grf < full_scale * MIN_FORCE_SHARE:
             return
         forces = [
             (TOE, 3.0, complex(now.toe_x, now.toe_y), complex(now.toe_force_x, now.toe_force_y)),

@@ -1,4 +1,4 @@
-"""The trunk of one leg, and what holds it: a spring, a rail or a plate."""
+"""The trunk of one leg and its support: a spring, a rail or a plate."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from hoof_env.render.outline import HOLD_M, TRUNK_M
 
 
 class TrunkPainter:
-    """Draws a trunk of a `kind` into pictures, `metre` pixels per metre; it is painted once and then copied.
+    """Painter of a trunk of a `kind`, `metre` pixels per metre; it paints the trunk once and then copies it.
 
     Places are pixels as complex numbers, with y down.
     """
@@ -37,7 +37,7 @@ class TrunkPainter:
         canvas.blit(image, at, special_flags=pygame.BLEND_PREMULTIPLIED)
 
     def draw_support(self, canvas: Any, hip: complex) -> None:
-        """Draw what holds the trunk around the crank centre at `hip`."""
+        """Draw the support of the trunk around the crank centre at `hip`."""
         top = hip - 1j * self._above
         if self._kind == "suspended":
             self._draw_spring(canvas, top)

@@ -17,8 +17,7 @@ from hoof_env.dynamics.parts import Limb, Limits, Trunk
 from hoof_env.gait import FilterSettings
 from hoof_env.ground.contact import Ground
 from hoof_env.leg.geometry import Geometry
-from hoof_env.render.instant import Hips
-from hoof_env.render.picture import Picture
+from hoof_env.record.surroundings import Hips
 from hoof_env.tasks.leg_starts import Start
 from hoof_env.tasks.settings import ResolvedSettings, Settings
 
@@ -56,7 +55,7 @@ class Body(Protocol):
         height: nominal height of the trunk [m].
         hips: crank centre of each leg from the place of the trunk [m], by the prefix of the leg's quantities,
             which is "" for a single leg.
-        picture: how pictures and pages show the body.
+        picture: kind of its picture, a key of `render.picture.PICTURES`.
         gaits: gaits by name.
         harmonics, filters, limits, step_error: arguments of the engine.
         command_step: largest change from one commanded speed to the next [m/s].
@@ -71,7 +70,7 @@ class Body(Protocol):
     geometry: Geometry
     height: float
     hips: Hips
-    picture: Picture
+    picture: str
     gaits: Mapping[str, Any]
     harmonics: int
     filters: FilterSettings

@@ -34,8 +34,7 @@ from hoof_env.leg.geometry import Geometry, load_geometry
 from hoof_env.leg.limb_masses import with_limb_masses
 from hoof_env.leg.mechanism_list import PAPER
 from hoof_env.leg.presets import Preset, preset_label
-from hoof_env.render.instant import Hips
-from hoof_env.render.picture import HorsePicture, Picture
+from hoof_env.record.surroundings import Hips
 from hoof_env.simd.layout import Block
 from hoof_env.tasks.body import BodyKernels
 from hoof_env.tasks.disturbances import MOST_STRENGTH
@@ -162,7 +161,7 @@ class Horse:
     """
 
     kernels = HORSE_KERNELS
-    picture: Picture = HorsePicture()
+    picture = "horse"
     finite_fields: tuple[str, ...] = ("gait",)
     action_names: tuple[str, ...] = tuple(f"{leg}_{name}" for leg, name in product(LEGS, PARAMETERS))
     # The spans are in the tag, so that policies, states and datasets of other spans are refused.

@@ -26,8 +26,7 @@ from hoof_env.gait import (
 from hoof_env.ground.contact import Ground, load_ground
 from hoof_env.leg.geometry import load_geometry
 from hoof_env.leg.presets import preset_error_type, preset_label
-from hoof_env.render.instant import ONE_HIP, Hips
-from hoof_env.render.picture import LegPicture, Picture
+from hoof_env.record.surroundings import ONE_HIP, Hips
 from hoof_env.simd import Mask, Pointer, Whole, maximum, minimum, read
 from hoof_env.simd.math import clip
 from hoof_env.tasks.body import BodyKernels
@@ -191,7 +190,7 @@ class OneLeg:
     action_names: tuple[str, ...] = tuple(f"rate_of_{name}" for name in PARAMETERS)
     action_form = "rates"
     hips: Hips = ONE_HIP
-    picture: Picture = LegPicture()
+    picture = "leg"
     step_error = 0.01
     command_step = math.inf
     start_names: tuple[str, ...] = ("crank_angle", "speed", "height", "x")

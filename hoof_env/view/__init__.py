@@ -1,6 +1,6 @@
 """The live page of `hoof-env view`, and pages that play a record without Python.
 
-`simulation` plays an episode that can be touched while it runs, `history` keeps what was shown, `drawing` and
-`figures` say what is drawn, `tab` and `server` are the page, `playback` writes pages that stand alone. The
-drawing data are those of films: instants and outlines of `hoof_env.render`, columns of `hoof_env.records`.
+`simulation` plays an episode whose settings may change as it runs, `history` keeps the shown curves,
+`figures` draws them, `tab` and `server` are the live page, and `playback` writes pages that stand alone.
+Pages and films share instants and columns (`hoof_env.record`) and outlines (`hoof_env.render`).
 """

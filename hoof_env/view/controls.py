@@ -48,12 +48,12 @@ CONDITIONS = {
     for gait in ("walk", "run")
     for condition, restitution in (("elastic", 1.0), ("inelastic", 0.0))
 }
-"""The paper's four conditions: arguments of `HorseLegFixed-v0`, with which the leg turns on and on."""
+"""The paper's four conditions as arguments of `HorseLegFixed-v0`."""
 PAPER_ID = "hoof_env/HorseLegFixed-v0"
 TURNS_ON = 600.0  # `episode_seconds` of these conditions [s]
 
 LOGARITHMIC = 50.0
-"""Ratio of the ends of a range from which a slider moves by the logarithm."""
+"""Least ratio of the ends of a range with a logarithmic slider."""
 NOTCHES = 200  # of a slider
 
 
@@ -94,7 +94,7 @@ def paper_values() -> dict[str, tuple[float, ...]]:
 def slider(
     ask: str, name: str, label: str, value: float, span: tuple[float, float], step: float | None = None
 ) -> Slider:
-    """Make a slider over a span that also holds the present value."""
+    """Make a slider over a span, extended to the present value."""
     low = min(span[0], value)
     high = max(span[1], value)
     is_log = low > 0 and high / low >= LOGARITHMIC
@@ -142,8 +142,8 @@ def known_ids() -> list[str]:
 
 
 def known_policies(simulation: Simulation) -> list[str]:
-    """Return the policies that the page offers: scripted ones, the best gait that sees nothing, and the one
-    that ships."""
+    """Return the policies that the page offers: scripted ones, the best open-loop gait, and the
+    shipped one."""
     names = policy_names(simulation.env)
     with suppress(DataFileError):  # an id without a gait
         gait_file(own_id(simulation.env_id))

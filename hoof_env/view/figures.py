@@ -140,7 +140,7 @@ class Scene:
     def _patches(
         self, name: str, fill: Colour | None, edge: Colour = colours.GREY, alpha: float = 1.0
     ) -> None:
-        """Draw outlines with their edges behind all of them, or a line where there is nothing to fill."""
+        """Draw outlines over all their edges, or a line if there is nothing to fill."""
         source = self.sources[name]
         if fill is None:
             self._add(source, Line(x="x", y="y", line_color=hex_of(edge), line_width=2))
@@ -191,7 +191,7 @@ class Scene:
 
 
 def ground_key(terrain: Terrain) -> list[tuple[str, str]]:
-    """Return names and colours of the kinds of ground that a terrain has, the usual one left out."""
+    """Return names and colours of the unusual kinds of ground in a terrain."""
     return [(name, hex_of(colour)) for name, colour in kinds.kinds_of(terrain)]
 
 

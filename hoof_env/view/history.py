@@ -1,4 +1,4 @@
-"""History of a page: curves, rows of the scene and numbers of stances of the last half a minute."""
+"""History of a page: curves, rows of the scene and numbers of stances of the last half minute."""
 
 from __future__ import annotations
 
@@ -11,14 +11,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hoof_env.dynamics.observables import StanceCounter
-from hoof_env.render.instant import Columns
+from hoof_env.record.columns import Columns
 from hoof_env.view.simulation import Chunk
 
-KEPT = 30.0
+KEPT_SECONDS = 30.0
 """Time back to which a page can go [s]."""
 
 RESOLUTION = 0.002
-"""Time of which a curve shows one substep, that with the largest force on a hoof [s]."""
+"""Interval of which a curve shows one substep, the one with the largest force on a hoof [s]."""
 
 STANCE = {"peak": "N", "mean": "N", "impulse": "N s", "duty": "-", "loading rate": "kN/s"}
 """Unit of each number of the running stance: largest ground reaction force, mean normal force, its integral,
@@ -26,7 +26,7 @@ part of the last stride in which the hoof stood, steepest rise of the normal for
 
 
 PATHS = ("toe", "heel")
-"""Points of a single leg that leave paths; of a horse it is the toe of each leg."""
+"""Points of a single leg that leave paths; a horse leaves the path of each toe."""
 
 
 def paths_of(legs: Sequence[str], has_heel: bool) -> tuple[str, ...]:
@@ -124,7 +124,7 @@ class StanceNumbers:
 
 
 class History:
-    """Curves, rewards and rows that a page can show again; what is older than `KEPT` is dropped."""
+    """Curves, rewards and rows of the last `KEPT_SECONDS`, which a page can show again."""
 
     def __init__(self) -> None:
         self.clear()
@@ -139,7 +139,7 @@ class History:
         """Keep curves."""
         if len(curves["time"]):
             self._curves.append(curves)
-            self._drop(curves["time"][-1] - KEPT)
+            self._drop(curves["time"][-1] - KEPT_SECONDS)
 
     def add_steps(self, steps: Columns) -> None:
         """Keep terms of the reward of control steps."""
@@ -147,7 +147,7 @@ class History:
             self._steps.append(steps)
 
     def add_row(self, row: NDArray[np.float64]) -> None:
-        """Keep a row, unless the last one is not a hundredth of a second older."""
+        """Keep a row if the last one is at least a hundredth of a second older."""
         if not self._rows or row[0] >= self._rows[-1][0] + 0.0099:
             self._rows.append(row.astype(np.float32))
 

@@ -2,27 +2,24 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 from bokeh.core import properties
 from bokeh.model import DataModel
 from bokeh.models import ColumnDataSource, CustomJS
-from jinja2 import Environment, FileSystemLoader, Template
 from numpy.typing import NDArray
 
 from hoof_env.leg.presets import preset_names
+from hoof_env.record.columns import Columns
 from hoof_env.records import default_policy
-from hoof_env.render.drawing import HEAD
-from hoof_env.render.instant import Columns
 from hoof_env.render.outline import ARROW_M
 from hoof_env.view import controls, figures
 from hoof_env.view.history import RESOLUTION, STANCE
 from hoof_env.view.player import Player
 from hoof_env.view.recording import FORMATS
+from hoof_env.view.templates import legend_of, scene_arguments, script, template
 
-FOLDER = Path(__file__).parent / "files"
 SPEEDS = (0.05, 2.0)  # slowest and fastest play, over real time [-]
 POINTS = round(1.15 * figures.SECONDS / RESOLUTION)  # of a curve that the browser keeps
 STEPS = 500  # of the reward that the browser keeps
@@ -57,40 +54,6 @@ def packed(row: NDArray[Any], curves: Columns, steps: Columns, is_anew: bool = F
     """
     counts = [len(columns.get("time", ())) for columns in (curves, steps)]
     return np.concatenate([[is_anew, *counts], row, *curves.values(), *steps.values()])
-
-
-def template(name: str) -> Template:
-    """Return a template of the room, which extends Bokeh's own; texts from outside are escaped in it."""
-    files = Environment(
-        loader=FileSystemLoader(FOLDER), autoescape=True, trim_blocks=True, lstrip_blocks=True
-    )
-    return files.get_template(name)
-
-
-def script(*names: str) -> str:
-    """Return the scripts of some files, one after the other."""
-    return "\n".join((FOLDER / name).read_text(encoding="utf-8") for name in names)
-
-
-def scene_arguments(scene: figures.Scene, player: Player) -> dict[str, Any]:
-    """Return what the script needs to draw rows into a scene."""
-    drawing = scene.drawing
-    return {
-        "paths": scene.paint_paths(player.legs),
-        "figure": scene.figure,
-        "sources": scene.sources,
-        "places": [list(place) for place in drawing.places],
-        "camera": {"low": drawing.low, "high": drawing.high, "wide": drawing.half_width},
-        "head": HEAD,
-        "numbers": [list(number) for number in player.numbers],
-    }
-
-
-def legend_of(curves: figures.Curves) -> dict[str, Any]:
-    """Return what a page writes above a figure of curves: its name, title, and the names of its lines."""
-    keys = dict.fromkeys((line.label, figures.hex_of(line.colour), line.dash) for line in curves.lines)
-    is_plain = len(keys) == 1 or curves.figure.name == "footfall"
-    return {"name": curves.figure.name, "title": curves.title, "keys": [] if is_plain else [*keys]}
 
 
 def fill(doc: Any, player: Player) -> Wire:
@@ -150,7 +113,7 @@ def variables(player: Player, shown: list[figures.Curves]) -> dict[str, Any]:
         "simulation": simulation,
         "summary": env.task.summary,
         "figures": [legend_of(each) for each in shown],
-        "refusal": simulation.same_motion.refusal,
+        "refusal": simulation.other_ground.refusal,
         "has_heel": drawing.has_heel,
         "legs": [figures.leg_name(leg) for leg in player.legs],
         "stance": STANCE,

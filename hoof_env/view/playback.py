@@ -17,13 +17,13 @@ from numpy.typing import NDArray
 
 from hoof_env._output import staged
 from hoof_env.errors import ParameterError, check_number
+from hoof_env.record.columns import Columns
 from hoof_env.render import colours
 from hoof_env.render.colours import Colour
-from hoof_env.render.instant import Columns
 from hoof_env.view import figures
-from hoof_env.view.layout import legend_of, scene_arguments, script, template
 from hoof_env.view.player import Player
 from hoof_env.view.simulation import Chunk, Simulation
+from hoof_env.view.templates import legend_of, scene_arguments, script, template
 
 SHADES: tuple[Colour, ...] = (colours.FORCE, colours.TOE, colours.CRANK, colours.HEEL)
 """Colours of the records of a page with several."""

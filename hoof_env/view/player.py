@@ -1,26 +1,48 @@
-"""Clock of a page: how far the simulation is shown, at any speed, and what is new since the last look."""
+"""Player of a page: its clock, which runs at any speed, and the news since the last state."""
 
 from __future__ import annotations
 
 import math
 import time
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
-from hoof_env.render.instant import Columns, instants
+from hoof_env.record.columns import Columns
+from hoof_env.record.instant import instants
+from hoof_env.render.picture import picture_of
 from hoof_env.view.history import STANCE, History, StanceNumbers, curves_of, path_columns, thinned
-from hoof_env.view.recording import Recording
 from hoof_env.view.simulation import Chunk, Simulation
 
 FIRST_NUMBERS = {"time": 2, "speed": 2, "target": 2, "return": 2}
 """Digits of the numbers of a page that belong to the whole body."""
 LEG_NUMBERS = {"grf": 0, **dict(zip(STANCE, (0, 0, 1, 2, 1), strict=True))}
 """Digits of the numbers of each leg."""
-LONGEST_WORK = 0.1
-"""Time after which no further step is taken before the page has the last one [s]."""
+MAX_WORK_SECONDS = 0.1
+"""Longest work before the page gets a state [s]."""
 TERM_DIGITS = 2
 """Digits of the terms of the reward."""
+
+
+class Recorder(Protocol):
+    """Interface of recordings that take the chunks of a player, see `recording.Recording`.
+
+    Attributes:
+        is_over: True after the end of the recorded episode.
+        is_full: True if the recording takes no more chunks.
+    """
+
+    is_over: bool
+
+    @property
+    def is_full(self) -> bool: ...
+
+    def add(self, chunk: Chunk) -> None:
+        """Take the substeps of a control step."""
+
+    def write(self) -> Any:
+        """Write the file in a thread of its own; return the thread."""
 
 
 class Player:
@@ -48,8 +70,8 @@ class Player:
         of_legs = [(f"{name} {k}", n) for k in range(len(self.legs)) for name, n in LEG_NUMBERS.items()]
         terms = [(name, TERM_DIGITS) for name in simulation.terms]
         self.numbers = [*FIRST_NUMBERS.items(), *of_legs, *terms]
-        self.drawing = simulation.setting.picture.drawing(simulation.setting, len(self.numbers))
-        self.recording: Recording | None = None
+        self.drawing = picture_of(simulation.setting).drawing(simulation.setting, len(self.numbers))
+        self.recording: Recorder | None = None
         self.clock = 0.0
         self.shown = 0.0
 
@@ -90,13 +112,13 @@ class Player:
 
         Returns:
             How an episode ended meanwhile, "" if none did; the next one has begun then. Where a step takes
-            long, as with a slow policy, the clock goes on by less than asked, to the end of the step.
+            long, as with a slow policy, the clock advances by less than `seconds`, to the end of the step.
 
         Raises:
             HoofEnvError: the policy or the environment cannot go on; the clock has not moved.
         """
         until = self.clock + seconds
-        late = time.monotonic() + LONGEST_WORK
+        late = time.monotonic() + MAX_WORK_SECONDS
         simulation = self.simulation
         while self._simulated < until - 1e-9 and not simulation.ended:
             chunk = simulation.step()

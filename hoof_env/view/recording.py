@@ -1,5 +1,5 @@
-"""Recording of a page: substeps from one press of a button to the next, written as `hoof-env export` and
-`hoof-env render` write them, or as a page that stands alone."""
+"""Recording of a page: substeps from one press of a button to the next, in the files of `hoof-env export` and
+`hoof-env render`, or as a page that stands alone."""
 
 from __future__ import annotations
 
@@ -7,21 +7,19 @@ import threading
 from collections.abc import Callable
 from datetime import datetime
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from hoof_env import film, records
 from hoof_env.errors import check_choice
 from hoof_env.lab.forces import THRESHOLD
-from hoof_env.render.instant import Columns
-from hoof_env.view.words import words_of
-
-if TYPE_CHECKING:
-    from hoof_env.view.simulation import Chunk, Simulation
+from hoof_env.record.columns import Columns, joined
+from hoof_env.view.messages import error_text
+from hoof_env.view.simulation import Chunk, Simulation
 
 FORMATS = (".html", ".mp4", ".gif", ".csv", ".mot")
 """Formats by suffix."""
 
-LONGEST = 120.0
+MAX_SECONDS = 120.0
 """Longest recording [s]."""
 
 FPS = 25.0  # of films [1/s]
@@ -60,7 +58,7 @@ class Recording:
         else:
             records.check_place(self.path, FORMATS)
         self._simulation = simulation
-        # Those of the recorded episode: the next one may have begun when the file is written.
+        # Of the recorded episode: the next one may have begun when the file is written.
         self._played = {"policy": simulation.policy_name, "seed": simulation.seed}
         self._parameters = simulation.parameters
         self._tell = tell
@@ -77,24 +75,24 @@ class Recording:
 
     @property
     def is_full(self) -> bool:
-        """True if nothing more is taken."""
-        return self._seconds > LONGEST
+        """True if the recording takes no more substeps."""
+        return self._seconds > MAX_SECONDS
 
     def write(self) -> threading.Thread:
-        """Write the file in a thread of its own, and tell; return the thread."""
+        """Write the file in a thread of its own, and report the end; return the thread."""
         thread = threading.Thread(target=self._write_and_tell)
         thread.start()
         return thread
 
     def _write_and_tell(self) -> None:
-        """Write the file and tell, also of whatever is raised: nothing else hears of it in this thread."""
+        """Write the file and report the end; report errors, too, which nothing else would in this thread."""
         if not self._chunks:
             self._tell("Nothing was recorded: the page was paused.", "error")
             return
         try:
             self._write()
         except Exception as error:
-            self._tell(f"{self.path}: {words_of(error)}", "error")
+            self._tell(f"{self.path}: {error_text(error)}", "error")
             return
         seconds = self._chunks[-1].columns["time"][-1] - self._chunks[0].columns["time"][0]
         self._tell(f"Wrote {self.path}: {seconds:.2f} s.", "note")
@@ -123,7 +121,7 @@ class Recording:
                 reactions=[],
                 parameters=self._parameters,
             )
-            record = records.joined([c.columns for c in self._chunks], records.units_of(simulation.env))
+            record = joined([c.columns for c in self._chunks], records.units_of(simulation.env))
             records.write(record, about, self.path)
 
 

@@ -18,16 +18,16 @@ from typing import Any
 
 from hoof_env._output import check_folder
 from hoof_env.errors import MissingExtraError, ParameterError, count, parse_pairs
-from hoof_env.view.words import words_of
+from hoof_env.view.messages import error_text
 
-MOST_TABS = 8
+MAX_TABS = 8
 """Largest number of tabs, each with a simulation of its own."""
 
 LINGER = 1000
-"""Time after which a tab without a browser is let go [ms]."""
+"""Time after which the simulation of a tab without a browser is closed [ms]."""
 
-KEPT_SETUPS = 64
-"""Number of set-ups to which tabs may go back."""
+MAX_SETUPS = 64
+"""Largest number of set-ups to which tabs may return."""
 
 HERE = ("127.0.0.1", "localhost")
 """Addresses that only this machine reaches."""
@@ -60,7 +60,7 @@ class Pages:
         """Keep a set-up; return the address of its page, which cannot be guessed: a set-up may name files."""
         token = secrets.token_urlsafe(16)
         self._kept[token] = setup
-        while len(self._kept) > KEPT_SETUPS:
+        while len(self._kept) > MAX_SETUPS:
             self._kept.popitem(last=False)
         return f"?setup={token}"
 
@@ -70,18 +70,18 @@ class Pages:
         A tab counts from here on, before its browser is connected, until Bokeh lets its session go: the
         server's one thread does nothing else between the count and the new tab.
         """
-        from hoof_env.view.layout import template
         from hoof_env.view.tab import Tab
+        from hoof_env.view.templates import template
 
         wait = False
         asked = doc.session_context.request.arguments.get("setup", [b""])[0].decode("ascii", "replace")
         try:
             self._tabs = [tab for tab in self._tabs if tab.is_open]
-            if len(self._tabs) >= MOST_TABS:
+            if len(self._tabs) >= MAX_TABS:
                 # A page that is loaded again is here before the old one has gone.
                 wait = True
                 raise ParameterError(
-                    f"{MOST_TABS} tabs are open, each with a simulation; this one waits until one is closed"
+                    f"{MAX_TABS} tabs are open, each with a simulation; this one waits until one is closed"
                 )
             if asked and asked not in self._kept:
                 raise ParameterError("this page is too old; open the first one again")
@@ -90,7 +90,7 @@ class Pages:
             doc.clear()
             doc.title = "hoof-env view"
             doc.template = template("refused.html")
-            doc.template_variables.update(reason=words_of(error), wait=wait)
+            doc.template_variables.update(reason=error_text(error), wait=wait)
 
 
 def is_own_name(name: str, address: str, hosts: Collection[str] = ()) -> bool:
@@ -182,7 +182,7 @@ def start(
     from tornado.ioloop import IOLoop
     from tornado.netutil import bind_sockets
 
-    from hoof_env.view.answers import try_out
+    from hoof_env.view.session import try_out
 
     count("port", port, low=0, most=65535)
     if ":" in address:
@@ -238,11 +238,11 @@ def view(
         "seed": seed,
     }
     server, url = start(setup, address, port, out, hosts)
-    # A tab that is closed would be told in a line for each message that was under way to it.
+    # Otherwise each message on its way to a closed tab would cause a line.
     logging.getLogger("bokeh.server.views.ws").setLevel(logging.ERROR)
     if address not in HERE:
         print(
-            f"hoof-env view: warning: all who reach {address} can use this page, load files and write"
+            f"hoof-env view: warning: everybody who reaches {address} can use this page, load files and write"
             " recordings",
             file=sys.stderr,
             flush=True,

@@ -1,4 +1,4 @@
-"""Simulation of a page: one episode after the other, step by step, which can be touched while it runs."""
+"""Simulation of a page: one episode after the other, step by step, with settings that change as it runs."""
 
 from __future__ import annotations
 
@@ -14,9 +14,9 @@ from hoof_env.envs.policies import constant_gait, start_of
 from hoof_env.errors import HoofEnvError, ParameterError, check_choice, check_number, count
 from hoof_env.gait import PARAMETERS, GaitParameters, limits_of
 from hoof_env.lab.forces import THRESHOLD, above_threshold, onto_surface
-from hoof_env.render.instant import Columns
+from hoof_env.record.columns import Columns
 from hoof_env.tasks.settings import ABOUT, PER_EPISODE
-from hoof_env.view.same_motion import SameMotion
+from hoof_env.view.other_ground import OtherGround
 
 DRIVES = {"crank_torque": "N m", "crank_power": "W"}
 """Unit of each measurement of a leg's drive that a page shows next to the columns of a record."""
@@ -30,7 +30,7 @@ class Chunk(NamedTuple):
         drives: measurements of `DRIVES` by column, behind the names of a horse's legs, shape (n,).
         normals: normal force of elastic and of inelastic ground for the same motion, by "elastic" and
             "inelastic" behind the names of a horse's legs, shape (n,) [N]; empty where there is none, see
-            `SameMotion.refusal`.
+            `OtherGround.refusal`.
         terms: terms of the reward of this step by name; empty at a start.
     """
 
@@ -54,12 +54,12 @@ class Simulation:
     Attributes:
         env_id, arguments, policy, seed: arguments; they change with the calls below.
         env: environment.
-        setting: its surroundings, see `instant.Surroundings`.
+        setting: its surroundings, see `record.surroundings.Surroundings`.
         legs: prefixes of the columns of each leg, ("",) of a single one.
         dt: control step [s].
         parameters: physical parameters that were touched, by name.
         hand: gait that drives the leg instead of the policy, None for the policy.
-        same_motion: forces that other ground would give.
+        other_ground: forces that other ground would give.
         ended: how the episode ended, "" while it runs.
         is_asking: True while the policy is asked for an action.
 
@@ -86,7 +86,7 @@ class Simulation:
         self._player = self._find(policy, self.seed)
         self.parameters: dict[str, float] = {}
         self.hand: dict[str, float] | None = None
-        self.same_motion = SameMotion(self._leg.batch)  # type: ignore[attr-defined]
+        self.other_ground = OtherGround(self._leg.batch)  # type: ignore[attr-defined]
         self.ended = ""
         self.is_asking = False
         self._observation: Any = None
@@ -141,7 +141,7 @@ class Simulation:
             self.hand = None
         self.ended = ""
         self._starts = True
-        self.same_motion.begin(self._leg.record())
+        self.other_ground.begin(self._leg.record())
         return self._chunk({})
 
     def step(self) -> Chunk | None:
@@ -176,8 +176,8 @@ class Simulation:
         except HoofEnvError:
             raise
         except (Exception, SystemExit) as error:
-            said = f"{type(error).__name__}: {error}"
-            raise ParameterError(f"policy {self.policy_name}: expected actions, it raised {said}") from error
+            cause = f"{type(error).__name__}: {error}"
+            raise ParameterError(f"policy {self.policy_name}: expected actions, it raised {cause}") from error
         finally:
             self.is_asking = False
         if not is_finite:
@@ -186,7 +186,7 @@ class Simulation:
         return action
 
     def _chunk(self, terms: dict[str, float]) -> Chunk:
-        """Return the last substeps as they are shown and written."""
+        """Return the last substeps as the page shows and recordings have them."""
         leg = self._leg
         record = leg.record()
         columns = records.substeps(self.env, record)
@@ -196,7 +196,7 @@ class Simulation:
         for i, prefix in enumerate(self.legs):
             for name in DRIVES:
                 drives[prefix + name] = np.array(record[name][:, i, 0], float)
-        return Chunk(shown, drives, self.same_motion.columns(record, self.legs), terms)
+        return Chunk(shown, drives, self.other_ground.columns(record, self.legs), terms)
 
     # Touching
 
@@ -208,8 +208,9 @@ class Simulation:
             value: the value, in the setting's unit.
 
         Returns:
-            False if a running episode cannot take it, as the exponent, or stiffness that needs shorter
-            substeps: nothing has changed then, and an environment with this argument takes it.
+            True if the running episode has the value now. False if it cannot change within an episode, such
+            as the exponent, or stiffness that needs shorter substeps: nothing has changed, and the value must
+            be an argument of a new environment.
 
         Raises:
             ParameterError: the setting is unknown, has no effect, or is out of range.
@@ -225,7 +226,7 @@ class Simulation:
         vary(batch, 0, changed)
         batch.has_overrides[0] = True
         self.parameters = changed
-        self.same_motion.set_ground(changed)
+        self.other_ground.set_ground(changed)
         if self._observation is not None:
             # The last instant with the new parameters: from it the next substeps are recorded.
             self._leg.set_state(self._leg.get_state())
@@ -246,7 +247,7 @@ class Simulation:
             raise ParameterError(f"gait: expected one of {', '.join(limits) or 'no parameter'}, got {name!r}")
         low, high = limits[name]
         wanted = (self.hand or self.gait_now()) | {name: check_number(name, value, low=low, high=high)}
-        constant_gait(GaitParameters(*wanted.values()), self.env)  # refuses what cannot be commanded
+        constant_gait(GaitParameters(*wanted.values()), self.env)  # raises for a gait beyond the limits
         self.hand = wanted
 
     def gait_now(self) -> dict[str, float]:

@@ -10,23 +10,23 @@ from pathlib import Path
 from typing import Any
 
 from hoof_env.view import layout
-from hoof_env.view.answers import ELSEWHERE, Answers, Setup
+from hoof_env.view.session import RUN_IN_NEW_TAB, Session, Setup
 from hoof_env.view.worker import Worker
 
-TICK = 1 / 30  # time between two states that are sent [s]
+TICK = 1 / 30  # time between two states [s]
 LOOK = 8  # time after which a tick that came too early looks again [ms]
-LONGEST_TICK = 0.1  # time of which a late tick makes up [s]
+MAX_TICK_SECONDS = 0.1  # longest time that one tick simulates [s]
 PATIENCE = 2.0  # time after which a page says what it waits for [s]
 
-LATE_POLICY = f"The policy has not answered for {PATIENCE:g} s. Pause, or choose another one; all else waits."
+LATE_POLICY = f"The policy has not answered for {PATIENCE:g} s. Pause, or choose another one; the page waits."
 LATE = "This takes a while, as when kernels are compiled or a policy is loaded."
 
 
 class Tab:
     """The page of one tab.
 
-    Its methods run in the server's thread, which serves all tabs and never waits: what may take long is done
-    by the tab's own thread, and fetched at the next tick.
+    Its methods run in the server's thread, which serves all tabs and never waits: the tab's own thread does
+    slow work, and the next tick sends the results.
 
     Args:
         doc: Bokeh's document of the tab.
@@ -35,7 +35,7 @@ class Tab:
         out: folder of recordings.
 
     Attributes:
-        answers: simulation, and what it says to the page.
+        session: simulation and its messages to the page.
         wire: messages between page and server.
 
     Raises:
@@ -44,8 +44,8 @@ class Tab:
 
     def __init__(self, doc: Any, setup: Setup, keep: Callable[[Setup], str], out: Path) -> None:
         self._doc = doc
-        self.answers = Answers(setup, keep, out)
-        self.wire = layout.fill(doc, self.answers.player)
+        self.session = Session(setup, keep, out)
+        self.wire = layout.fill(doc, self.session.player)
         self._worker = Worker()
         self._asked: list[dict[str, Any]] = []
         self._late_since: float | None = None
@@ -58,14 +58,14 @@ class Tab:
     @property
     def is_open(self) -> bool:
         """False when the page was closed."""
-        return self.answers.is_open
+        return self.session.is_open
 
     def _tick(self) -> None:
-        """Send what is new, and let time pass."""
+        """Send messages, and let time pass."""
         is_busy = self._worker.is_busy
         if not is_busy and self._late_since is not None:
             took = f"It took {time.monotonic() - self._late_since:.1f} s."
-            self.answers.outbox.appendleft(("told", {"kind": "note", "status": took}))
+            self.session.outbox.appendleft(("told", {"kind": "note", "status": took}))
             self._late_since = None
         self._send()
         if is_busy:
@@ -75,11 +75,11 @@ class Tab:
                 self._doc.add_timeout_callback(self._look, LOOK)
             return
         now = time.monotonic()
-        passed = min(now - self._last, LONGEST_TICK)
+        passed = min(now - self._last, MAX_TICK_SECONDS)
         self._last = now
         self._answer()
-        if self.answers.playing:
-            self._worker.do(partial(self.answers.go, passed))
+        if self.session.playing:
+            self._worker.do(partial(self.session.go, passed))
 
     def _look(self) -> None:
         """Look again after a tick that came too early."""
@@ -87,56 +87,56 @@ class Tab:
         self._tick()
 
     def _send(self) -> None:
-        """Send what is new."""
-        while self.answers.outbox:
-            part, value = self.answers.outbox.popleft()
+        """Send the messages of the session."""
+        while self.session.outbox:
+            part, value = self.session.outbox.popleft()
             if part == "told":
                 value = value | {"at": time.monotonic()}  # two messages are never equal
             setattr(self.wire, part, value)
 
     def _on_asked(self, attr: str, old: Any, new: Any) -> None:
-        """Hear what the page asks."""
+        """Take a request of the page."""
         self._asked.append({name: value for name, value in new.items() if name != "count"})
         if not self._worker.is_busy:
             self._answer()
 
     def _answer(self) -> None:
-        """Do what the page has asked."""
+        """Let the tab's thread handle the requests."""
         if self._asked:
-            self._worker.do(partial(self.answers.answer, self._asked))
+            self._worker.do(partial(self.session.answer, self._asked))
             self._asked = []
 
     def _wait(self) -> None:
-        """Say what the page waits for if it takes long, and do what is possible meanwhile."""
-        answers = self.answers
+        """Tell the cause of a long wait, and handle requests that need not wait."""
+        session = self.session
         if self._worker.busy_for < PATIENCE:
             return
         if self._late_since is None:
             self._late_since = time.monotonic() - self._worker.busy_for
-            answers.tell(status=LATE_POLICY if answers.player.simulation.is_asking else LATE, kind="warning")
+            session.tell(status=LATE_POLICY if session.player.simulation.is_asking else LATE, kind="warning")
         asked = self._asked
         self._asked = []
         for request in asked:
             name = request.get("name")
             if name == "play":
-                answers.set_playing(request.get("value"))
-            elif name in ELSEWHERE:
+                session.set_playing(request.get("value"))
+            elif name in RUN_IN_NEW_TAB:
                 # This thread, too, may be left behind.
-                threading.Thread(target=answers.answer_elsewhere, args=(request,), daemon=True).start()
+                threading.Thread(target=session.answer_in_new_tab, args=(request,), daemon=True).start()
             else:
                 self._asked.append(request)
 
     def close(self) -> None:
-        """Let the simulation go when the tab's thread is free, or after a while if it is not."""
-        self.answers.is_open = False
+        """Close the simulation when the tab's thread is free, or after `PATIENCE` if it is not."""
+        self.session.is_open = False
         is_busy = self._worker.is_busy
-        self._worker.do(self.answers.close)
+        self._worker.do(self.session.close)
         self._worker.end()
         if is_busy:
             threading.Timer(PATIENCE, self._leave).start()
 
     def _leave(self) -> None:
-        """End a policy that does not answer, and close without it."""
-        if self.answers.player.simulation.is_asking:
+        """Interrupt a policy that does not return, and close the session."""
+        if self.session.player.simulation.is_asking:
             self._worker.interrupt(PATIENCE)
-            self.answers.close()
+            self.session.close()

@@ -1,4 +1,4 @@
-"""Thread in which a tab works, so that none of the others waits for a slow policy."""
+"""Thread of a tab: other tabs do not wait for its slow policy."""
 
 from __future__ import annotations
 
@@ -11,13 +11,13 @@ from queue import Queue
 
 
 class Interrupted(BaseException):
-    """End of a job that is not wanted any more. A policy's `except Exception` does not catch it."""
+    """Interruption of a job. A policy's `except Exception` does not catch it."""
 
 
 class Worker:
     """Thread that does one job after the other.
 
-    It does not keep the process from ending, as a policy may never return.
+    It is a daemon, because a policy may never return.
     """
 
     def __init__(self) -> None:
@@ -27,21 +27,21 @@ class Worker:
         self._thread.start()
 
     def _run(self) -> None:
-        """Do jobs until there is a None."""
+        """Do jobs until the queue has a None."""
         for job in iter(self._jobs.get, None):
             with suppress(Interrupted):
                 job()
             self._jobs.task_done()
 
     def do(self, job: Callable[[], None]) -> None:
-        """Do a job, which raises nothing, after those that came before."""
+        """Queue a job, which must not raise."""
         if not self.is_busy:
             self._began = time.monotonic()
         self._jobs.put(job)
 
     @property
     def is_busy(self) -> bool:
-        """True while a job is not done."""
+        """True while jobs are unfinished."""
         return self._jobs.unfinished_tasks > 0
 
     @property
@@ -50,14 +50,13 @@ class Worker:
         return time.monotonic() - self._began if self.is_busy else 0.0
 
     def end(self) -> None:
-        """Let the thread end when its jobs are done."""
+        """End the thread after its jobs."""
         self._jobs.put(None)
 
     def interrupt(self, patience: float) -> None:
         """End the present job, and wait for some time [s] until the thread ends.
 
-        Only Python's own code can be interrupted: a call that never returns from elsewhere leaves the thread
-        behind.
+        Only Python code can be interrupted: a compiled function that never returns leaves the thread behind.
         """
         thread = ctypes.c_ulong(self._thread.ident or 0)
         ctypes.pythonapi.PyThreadState_SetAsyncExc(thread, ctypes.py_object(Interrupted))

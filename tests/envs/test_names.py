@@ -11,13 +11,13 @@ import gymnasium as gym
 import numpy as np
 import pytest
 
-from hoof_env import records
 from hoof_env.dynamics import layout
 from hoof_env.dynamics.names import RENAMED, NamedColumns, present_name
 from hoof_env.envs.outcome import MOVED
 from hoof_env.gait import PARAMETERS
-from hoof_env.records import RECORD, substeps
-from hoof_env.render.instant import Instant
+from hoof_env.record.columns import RECORD
+from hoof_env.record.instant import UNITS, Instant
+from hoof_env.records import substeps
 
 LEG = "hoof_env/HorseLeg-v0"
 HORSE = "hoof_env/Horse-v0"
@@ -140,7 +140,7 @@ def test_old_names_are_refused_with_the_present_ones():
     assert {*RENAMED.values()} <= set.union(
         *places().values(), set(layout.leg_state(layout.Features(1, True)))
     )
-    assert records.UNITS["crank_angle_rate"] == "rad/s"
+    assert UNITS["crank_angle_rate"] == "rad/s"
 
 
 if __name__ == "__main__":

@@ -9,7 +9,7 @@ import pytest
 from family import HORSE, actions, same
 
 from hoof_env.dynamics.engine import TrunkEngine
-from hoof_env.envs.recording import SHOWN
+from hoof_env.envs.recording import KEPT_SECONDS
 
 LEG = "hoof_env/HorseLeg-v0"
 
@@ -62,7 +62,7 @@ def test_what_waits_is_bounded_and_begins_with_the_episode(runs):
     for _ in range(400):
         env.step(np.zeros(4, np.float32))
     env.render()
-    assert len(runs) <= SHOWN / 0.02 + 2
+    assert len(runs) <= KEPT_SECONDS / 0.02 + 2
     env.reset(seed=0)
     runs.clear()
     same(env.render(), fresh().render())

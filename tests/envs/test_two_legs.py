@@ -14,9 +14,10 @@ from hoof_env import records
 from hoof_env.envs import manual
 from hoof_env.errors import ParameterError
 from hoof_env.leg.geometry import load_geometry
+from hoof_env.record.instant import BodyInstant, Instant, instants
+from hoof_env.record.surroundings import Surroundings
 from hoof_env.render.horse_scene import HorseScene
-from hoof_env.render.instant import BodyInstant, Instant, Surroundings, instants
-from hoof_env.render.picture import HorsePicture, LegPicture, LegsPicture
+from hoof_env.render.picture import picture_of
 from hoof_env.render.renderer import Renderer
 from hoof_env.simd import block_at, maximum, minimum, read
 from hoof_env.simd.math import clip
@@ -42,7 +43,7 @@ class TwoLegs(OneLeg):
 
     kernels = BodyKernels(2, Episode, (), 1, command_both, keep_gait)
     hips: ClassVar = {"near_": (0.0, 0.0), "off_": (0.0, 0.0)}
-    picture = LegsPicture()
+    picture = "legs"
     action_names = tuple(f"{leg}{name}" for leg in ("near_", "off_") for name in OneLeg.action_names)
 
     def parts(self, s):
@@ -69,7 +70,7 @@ def surroundings_of_legs(count, picture):
     return Surroundings(load_geometry("identified"), lift_off_n=50.0, hips=hips, picture=picture)
 
 
-@pytest.mark.parametrize("picture", [LegsPicture(), HorsePicture()], ids=["legs", "horse"])
+@pytest.mark.parametrize("picture", ["legs", "horse"])
 @pytest.mark.parametrize("count", [2, 6, 9])
 def test_pictures_have_room_for_legs(picture, count):
     """Curves, footfall and their words lie in the card, and hooves left of it."""
@@ -92,8 +93,9 @@ def test_pictures_have_room_for_legs(picture, count):
 
 def test_pictures_refuse_legs_that_they_cannot_show():
     for count, picture, words in (
-        (2, LegPicture(), "picture: expected a LegsPicture of 2 legs, got a LegPicture"),
-        (10, LegsPicture(), "picture: expected at most 9 legs, got 10"),
+        (2, "leg", "picture: expected 'legs' for 2 legs, got 'leg'"),
+        (10, "legs", "picture: expected at most 9 legs, got 10"),
+        (2, "cow", "picture: expected one of horse, leg, legs, got 'cow'"),
     ):
         with pytest.raises(ParameterError, match=words):
             Renderer(surroundings_of_legs(count, picture))
@@ -148,7 +150,7 @@ def test_pictures_and_records_have_both_legs():
         x, y = round(pixels["J"].real), round(pixels["J"].imag)
         assert dark[y - 4 : y + 5, x - 4 : x + 5].any()
     assert [one.highest for one in renderer._panel.each] == [leg.grf for leg in seen[0].legs]
-    drawing = here.picture.drawing(here, 0)
+    drawing = picture_of(here).drawing(here, 0)
     (arrows,) = (place for place in drawing.places if (place.source, place.column) == ("arrows", "xs"))
     assert arrows.pieces == 3 * 2
     assert len(drawing.row(seen[0], [])) == drawing.length

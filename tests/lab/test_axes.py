@@ -35,7 +35,7 @@ def test_markers_decide_where_corners_have_another_order(tmp_path):
 
 def test_travel_along_another_axis_and_backward_are_said(tmp_path):
     aside = read_record(plate(tmp_path / "y.c3d", forward="y"))
-    assert "plate_1: the horizontal force along y is larger than that along x" in aside.notes[0]
+    assert "plate_1: the horizontal force along y is larger than the force along x" in aside.notes[0]
     assert "--forward-a=y or --forward-b=y (or =-y) changes that" in aside.notes[0]
     assert f"warning: y.c3d: {aside.notes[0]}" in report(compare(aside, aside))
     right = read_record(tmp_path / "y.c3d", forward="y")
@@ -47,7 +47,9 @@ def test_travel_along_another_axis_and_backward_are_said(tmp_path):
     assert "--forward-a=-x or --forward-b=-x" in back.notes[0]
     assert read_record(tmp_path / "x.c3d", forward="-x").notes == ()
     wrong = read_record(tmp_path / "x.c3d", up="y")
-    assert "the force along z is larger than that along y" not in "".join(wrong.notes)  # what the option says
+    assert "the force along z is larger than the force along y" not in "".join(
+        wrong.notes
+    )  # what the option says
 
 
 def test_a_text_with_z_up_is_said(tmp_path):
@@ -55,7 +57,7 @@ def test_a_text_with_z_up_is_said(tmp_path):
     names = ["time [s]", *(f"left_force_{axis} [N]" for axis in "xyz")]
     np.savetxt(tmp_path / "x.csv", rows, delimiter=",", header=",".join(names), comments="")
     found = read_record(tmp_path / "x.csv")
-    assert "left: the force along z is larger than that along y" in found.notes[0]
+    assert "left: the force along z is larger than the force along y" in found.notes[0]
     assert "--up-a=z or --up-b=z" in found.notes[0]
     found = read_record(tmp_path / "x.csv", up="z")
     assert found.notes == ()

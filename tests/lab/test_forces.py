@@ -14,6 +14,7 @@ from hoof_env import Terrain, records
 from hoof_env.constants import GRAVITY
 from hoof_env.envs.policies import make_policy
 from hoof_env.lab.forces import above_threshold, in_units, limbs_of, loaded, onto_surface
+from hoof_env.record.columns import RECORD
 from hoof_env.tasks.horse_gaits import LEGS
 
 ANGLES = (-0.05, 0.0, 0.05)
@@ -168,7 +169,7 @@ def test_nothing_is_left_below_the_threshold_and_all_above(upward, threshold):
 
 def test_body_weights_are_forces_over_the_weight(slopes):
     record, weight = slopes[0.0]
-    about = {"weight_n": weight, "units": records.RECORD}
+    about = {"weight_n": weight, "units": RECORD}
     found, said = in_units(record, about, "BW")
     np.testing.assert_allclose(found["force_y"] * weight, record["force_y"])
     np.testing.assert_array_equal(found["cop_x"], record["cop_x"])

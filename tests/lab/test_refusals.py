@@ -67,7 +67,7 @@ FILES = [
     ("short.csv", STEADY + "1,2\n", {}, DataFileError, "line 3: expected numbers, got 2 cells under 3"),
     ("nan.csv", STEADY + "1,2,nan\n", {}, DataFileError, "force_y: expected finite numbers, got nan"),
     ("twice.csv", "time,force_y,force_y\n0,1,2\n1,2,3\n", {}, DataFileError, "expected names that differ"),
-    ("uneven.csv", STEADY + "1,1,2\n3,1,2\n", {}, DataFileError, "times that increase evenly"),
+    ("uneven.csv", STEADY + "1,1,2\n3,1,2\n", {}, DataFileError, "expected evenly spaced times"),
     ("unitless.csv", "time,force_x,force_y\n0,1,2\n1,1,2\n", {}, ParameterError,
      "units: expected one of N, kN, N/kg, BW"),
     ("pounds.csv", "time,force_x [lbf],force_y [lbf]\n0,1,2\n1,1,2\n", {}, ParameterError, "which says lbf"),
@@ -78,7 +78,7 @@ FILES = [
     ("hours.csv", "time [h],force_x [N],force_y [N]\n0,1,2\n1,1,2\n", {}, ParameterError,
      "in s or ms, got h"),
     ("gap.csv", STEADY + "".join(f"0.0{k},1,2\n" for k in (1, 2, 4, 5)), {}, DataFileError,
-     "of 0.02 behind 0.02 in row 3"),
+     "of 0.02 after 0.02 in row 3"),
     ("rows.mot", "x\nnRows=3\nendheader\ntime ground_force_vy\n0 1\n1 1\n", {}, DataFileError,
      "expected 3 rows, as its"),
     ("columns.mot", "x\nnColumns=3\nendheader\ntime ground_force_vy\n0 1\n1 1\n", {}, DataFileError,
@@ -102,11 +102,11 @@ FILES = [
      "for left, got p-1 upward and p-2 downward; a minus before"),
     ("axes.csv", NAMED.replace("_y", "_z") + text(ROWS),
      {"mapping": {"force_y": "left_force_z"}, "up": "z"}, ParameterError,
-     r"up, forward: expected none beside columns of axes\.csv"),
+     r"up, forward: expected neither with columns of axes\.csv"),
     # a sample is missing
     *(
         ("missing.csv", lacks(missing, rate, decimals), {}, DataFileError,
-         rf"of {int(2000 / rate) / 1000}\d* behind .* in row {missing}; .* \(--rate-a, --rate-b\)")
+         rf"of {int(2000 / rate) / 1000}\d* after .* in row {missing}; .* \(--rate-a, --rate-b\)")
         for missing in (1, 200, 450, 898)
         for rate, decimals in ((600, 4), (1000, 3), (100, 2), (960, 6))
     ),

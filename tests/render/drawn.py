@@ -9,7 +9,9 @@ from hoof_env.dynamics.parts import Limb, Trunk
 from hoof_env.gait import load_gait
 from hoof_env.ground.contact import Ground
 from hoof_env.leg.geometry import load_geometry
-from hoof_env.render.instant import BodyInstant, Instant, Surroundings, columns_of_engine, leg_instants
+from hoof_env.record.columns import columns_of_engine
+from hoof_env.record.instant import BodyInstant, Instant, leg_instants
+from hoof_env.record.surroundings import Surroundings
 from hoof_env.render.renderer import Renderer
 from tests.legs import FIRST_FIT
 

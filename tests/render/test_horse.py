@@ -13,7 +13,7 @@ from hoof_env import records
 from hoof_env.constants import GRAVITY
 from hoof_env.envs.policies import make_policy
 from hoof_env.film import frames
-from hoof_env.render.instant import instants
+from hoof_env.record.instant import instants
 from hoof_env.render.renderer import Renderer
 from hoof_env.tasks.horse_gaits import LEGS
 

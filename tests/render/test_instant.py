@@ -10,7 +10,8 @@ from hoof_env.ground.contact import Ground
 from hoof_env.ground.terrain import Terrain
 from hoof_env.leg.geometry import load_geometry
 from hoof_env.leg.kinematics import FrameMotion, pose
-from hoof_env.render.instant import POINTS, UNITS, Instant, columns_of_engine, ground_at, leg_instants
+from hoof_env.record.columns import columns_of_engine, ground_at
+from hoof_env.record.instant import POINTS, UNITS, Instant, leg_instants
 from tests.legs import FIRST_FIT
 
 LEG, RUN = load_geometry(FIRST_FIT), load_gait("run", FIRST_FIT)

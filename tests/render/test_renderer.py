@@ -19,10 +19,12 @@ from hoof_env.ground.contact import Ground
 from hoof_env.ground.terrain import Terrain
 from hoof_env.leg.geometry import load_geometry
 from hoof_env.leg.mechanism_list import flesh_of
+from hoof_env.record.columns import columns_of_engine
+from hoof_env.record.instant import Instant, leg_instants
+from hoof_env.record.surroundings import Surroundings
 from hoof_env.render.brush import Brush
 from hoof_env.render.colours import COAT, HOOF
 from hoof_env.render.ground import footprint
-from hoof_env.render.instant import Instant, Surroundings, columns_of_engine, leg_instants
 from hoof_env.render.kinds import find_patches, kinds_of
 from hoof_env.render.outline import TRUNK_M
 from hoof_env.render.panel import Stances

@@ -20,4 +20,4 @@ def page(tmp_path):
 def _patient(monkeypatch):
     """However slow the machine is, a tick goes on by all of its time."""
     pytest.importorskip("bokeh")
-    monkeypatch.setattr("hoof_env.view.player.LONGEST_WORK", math.inf)
+    monkeypatch.setattr("hoof_env.view.player.MAX_WORK_SECONDS", math.inf)

@@ -43,12 +43,12 @@ class Page:
             self.wait()
 
     @property
-    def answers(self):
-        return self.tab.answers
+    def session(self):
+        return self.tab.session
 
     @property
     def player(self):
-        return self.tab.answers.player
+        return self.tab.session.player
 
     @property
     def news(self):

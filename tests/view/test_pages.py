@@ -17,10 +17,10 @@ from bokeh.embed import file_html
 from bokeh.models import Div
 from bokeh.resources import INLINE
 
-from hoof_env.view.answers import HANDLERS
 from hoof_env.view.controls import CONDITIONS, PAPER_ID, setting_sliders
-from hoof_env.view.layout import template
 from hoof_env.view.playback import Playback
+from hoof_env.view.session import HANDLERS
+from hoof_env.view.templates import template
 from tests.view.pages import HORSE, LEG, Page
 
 

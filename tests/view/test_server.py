@@ -101,7 +101,7 @@ def test_names_of_a_page_that_other_machines_reach():
 
 def test_no_more_tabs_than_the_limit_however_fast_they_are_opened(tmp_path, monkeypatch):
     """Requests that come in the same instant, before any browser is connected."""
-    monkeypatch.setattr(server, "MOST_TABS", 2)
+    monkeypatch.setattr(server, "MAX_TABS", 2)
     monkeypatch.setattr(server, "LINGER", 6000)  # longer than a slow machine needs for four pages
     running, url = start(SETUP, port=0, out=tmp_path)
     loop = running.io_loop

@@ -14,18 +14,18 @@ from hoof_env.errors import HoofEnvError, ParameterError
 from hoof_env.gait import PARAMETERS
 from hoof_env.ground.laws import FACTORS
 from hoof_env.lab.forces import THRESHOLD, above_threshold
-from hoof_env.render.instant import instants
-from hoof_env.render.outline import ARROW_M, LEAST_FORCE
+from hoof_env.record.instant import instants
+from hoof_env.render.outline import ARROW_M, MIN_FORCE_SHARE
 from hoof_env.view import history
 from hoof_env.view.history import RESOLUTION, thinned
+from hoof_env.view.other_ground import OtherGround
 from hoof_env.view.player import Player
 from hoof_env.view.recording import Recording
-from hoof_env.view.same_motion import SameMotion
 from hoof_env.view.simulation import Simulation
 
 LEG, HORSE, TERRAIN = "hoof_env/HorseLeg-v0", "hoof_env/Horse-v0", "hoof_env/HorseLegTerrain-v0"
 FIXED = "hoof_env/HorseLegFixed-v0"
-KEPT = 4.0  # in place of half a minute
+KEPT_SECONDS = 4.0  # in place of half a minute
 
 
 def played(simulation, seconds, speed=1.0):
@@ -100,7 +100,7 @@ def test_the_law_gives_the_simulated_force_for_the_simulated_ground(env_id, argu
     simulation = Simulation(env_id, arguments)
     simulation.reset()
     env = simulation.env.unwrapped
-    same = SameMotion(env.batch, (arguments["restitution"],))
+    same = OtherGround(env.batch, (arguments["restitution"],))
     same.begin(env.record())
     worst, most, seen = 0.0, 0.0, 0
     for _ in range(60):
@@ -126,8 +126,8 @@ def test_a_law_from_outside_has_no_such_curve_and_the_page_says_so():
     batch = Simulation(LEG).env.unwrapped.batch
     task = replace(batch.task, contact_law=max)
     others = SimpleNamespace(task=task, settings=batch.settings, body=batch.body)
-    assert "outside the package" in SameMotion(others).refusal
-    assert SameMotion(batch).refusal == ""
+    assert "outside the package" in OtherGround(others).refusal
+    assert OtherGround(batch).refusal == ""
 
 
 def test_a_touch_acts_at_once_as_an_environment_made_so_would():
@@ -155,7 +155,7 @@ def test_a_touch_acts_at_once_as_an_environment_made_so_would():
         changed += np.any(chunk.columns["toe_normal"][same] != before["toe_normal"][rows])
     assert changed
     record = simulation.env.unwrapped.record()
-    same = SameMotion(simulation.env.unwrapped.batch, (0.9,))
+    same = OtherGround(simulation.env.unwrapped.batch, (0.9,))
     same.set_ground(simulation.parameters)
     np.testing.assert_allclose(
         same.forces(record)[0], (record["toe_normal"] + record["heel_normal"])[..., 0], atol=1e-6
@@ -249,12 +249,12 @@ def test_a_wrong_set_up_is_refused_with_words(arguments, message):
 
 
 def test_one_episode_follows_the_other_and_memory_is_bounded(monkeypatch):
-    monkeypatch.setattr(history, "KEPT", KEPT)
+    monkeypatch.setattr(history, "KEPT_SECONDS", KEPT_SECONDS)
     simulation = Simulation(LEG, {"episode_seconds": 0.5})
     player = Player(simulation)
     player.reset(simulation.reset())
     ends, sizes = 0, []
-    while player.shown < 2.2 * KEPT:
+    while player.shown < 2.2 * KEPT_SECONDS:
         ends += player.go(0.25) == "time is up"
         player.curves()
         player.steps()
@@ -262,9 +262,9 @@ def test_one_episode_follows_the_other_and_memory_is_bounded(monkeypatch):
         kept = player.history
         columns = sum(len(part) * len(part["time"]) for part in (*kept._curves, *kept._steps))
         sizes.append(columns + sum(len(row) for row in kept._rows))
-    assert ends == pytest.approx(2.2 * KEPT / 0.5, abs=2)
+    assert ends == pytest.approx(2.2 * KEPT_SECONDS / 0.5, abs=2)
     assert simulation.seed == ends
-    assert player.history.span[0] > player.shown - KEPT - 0.5
+    assert player.history.span[0] > player.shown - KEPT_SECONDS - 0.5
     assert max(sizes) < 1.15 * sizes[len(sizes) // 2]
     at = player.history.row_at(player.shown - 2.0)
     assert abs(at[0] - player.shown + 2.0) < 0.26
@@ -343,7 +343,7 @@ def test_arrows_are_the_forces_at_the_scale_that_the_page_states(env_id):
         tips = outlines[..., 3]
         tails = (outlines[..., 0] + outlines[..., 6]) / 2
         for k, leg in enumerate(now.legs):
-            if leg.grf < 2 * LEAST_FORCE * drawing.full_scale:
+            if leg.grf < 2 * MIN_FORCE_SHARE * drawing.full_scale:
                 continue
             seen += 1
             forces = [
@@ -367,7 +367,7 @@ def test_elastic_and_inelastic_are_the_forces_of_the_papers_restitutions():
     for _ in range(60):
         chunk = simulation.step()
         env = simulation.env.unwrapped
-        by_law = SameMotion(env.batch, (1.0, 0.0)).forces(env.record())[..., 0]
+        by_law = OtherGround(env.batch, (1.0, 0.0)).forces(env.record())[..., 0]
         np.testing.assert_array_equal([chunk.normals["elastic"], chunk.normals["inelastic"]], by_law)
         # Elastic ground is a spring: K depth^n, without a loss.
         depth = np.array([chunk.columns[f"{point}_depth"] for point in ("toe", "heel")])

@@ -12,8 +12,8 @@ import pytest
 pytest.importorskip("bokeh")
 
 from hoof_env.view import tab as tab_module
+from hoof_env.view.messages import collect_warnings
 from hoof_env.view.simulation import Simulation
-from hoof_env.view.words import heard
 from tests.view.pages import LEG, Page
 
 MOST = 60.0  # time after which a test ends that hangs [s]
@@ -167,27 +167,9 @@ def test_a_tab_that_is_closed_while_its_policy_blocks_writes_its_recording(tmp_p
     assert not page.tab._worker._thread.is_alive()
 
 
-def test_each_thread_hears_its_own_warnings(monkeypatch):
-    """Two threads that overlap; others are shown, and nothing is left behind."""
-    began, ended = threading.Event(), threading.Event()
-    shown, other = [], []
-    monkeypatch.setattr(warnings, "showwarning", lambda message, *more: shown.append(str(message)))
-
-    def listen():
-        with heard() as said:
-            began.set()
-            ended.wait(MOST)
-            warnings.warn("other", stacklevel=1)
-        other.extend(said)
-
+def test_warnings_are_collected_and_filters_stay():
     before = (warnings.showwarning, list(warnings.filters))
-    thread = threading.Thread(target=listen)
-    with heard() as said:
-        thread.start()
-        began.wait(MOST)
+    with collect_warnings() as texts:
         warnings.warn("mine", stacklevel=1)
-    warnings.warn("free", stacklevel=1)
-    ended.set()
-    thread.join()
-    assert (said, other, shown) == (["mine"], ["other"], ["free"])
+    assert texts == ["mine"]
     assert (warnings.showwarning, list(warnings.filters)) == before

@@ -14,10 +14,10 @@ from hoof_env import records
 pytest.importorskip("bokeh")
 
 
-from hoof_env.view import answers as answers_module
-from hoof_env.view.answers import HANDLERS
+from hoof_env.view import session as session_module
 from hoof_env.view.controls import CONDITIONS, PAPER_ID, paper_values
 from hoof_env.view.server import Pages
+from hoof_env.view.session import HANDLERS
 from hoof_env.view.simulation import Simulation
 from tests.view.pages import LEG, SETUP, Page, opened
 
@@ -142,7 +142,7 @@ def test_no_state_is_lost_or_doubled_whatever_is_asked_meanwhile(page, seed):
 
 def test_a_warning_waits_until_the_page_has_opened(tmp_path, monkeypatch):
     warned = lambda **setup: warnings.warn("A zip.", stacklevel=1) or Simulation(**setup)  # noqa: E731
-    monkeypatch.setattr(answers_module, "Simulation", warned)
+    monkeypatch.setattr(session_module, "Simulation", warned)
     page = Page(tmp_path)
     page.tick(0.2)
     assert page.tab.wire.told == {}
@@ -177,7 +177,7 @@ def test_a_push_adds_its_impulse_over_the_mass(page):
         ({"name": "push", "value": None}, "push"),
         ({"name": "push", "value": 1e9}, "forward"),
         ({"name": "stop everything"}, "request"),
-        ({"name": "touch"}, "TypeError: Answers.touch() missing"),
+        ({"name": "touch"}, "TypeError: Session.touch() missing"),
     ],
 )
 def test_a_refusal_says_why_and_the_page_lives_on(page, request_, words):
@@ -248,7 +248,7 @@ def test_a_policy_that_fails_pauses_the_page_until_another_drives(tmp_path, pred
     page.tick(0.1)
     assert words in told[0]["status"]
     assert (told[0]["kind"], told[0]["playing"]) == ("error", False)
-    assert page.answers.playing is False
+    assert page.session.playing is False
     page.ask("step")  # may show what was simulated before
     assert words in page.ask("step")["status"]
     page.ask("reset", policy="run")
@@ -264,7 +264,7 @@ def test_no_error_of_a_tick_stops_the_page_without_words(page, monkeypatch, part
     with monkeypatch.context() as broken:
         broken.setattr(page.player, part, raising)
         page.tick(0.1)
-    assert page.answers.playing is False
+    assert page.session.playing is False
     assert page.tab.wire.told["status"] == "RuntimeError: out of order"
     assert "in raising" in capfd.readouterr().err  # the whole trace, for the author of what is broken
     page.ask("play", value=True)
@@ -293,7 +293,7 @@ def test_an_error_of_the_thread_that_writes_is_told(page, monkeypatch):
 
 
 def test_an_error_of_a_new_page_is_told_on_it(tmp_path, monkeypatch):
-    monkeypatch.setattr(answers_module, "Simulation", raising)
+    monkeypatch.setattr(session_module, "Simulation", raising)
     refused = opened(Pages(SETUP, tmp_path))
     assert refused.template_variables["reason"] == "RuntimeError: out of order"
 
@@ -319,7 +319,7 @@ def test_the_policies_that_the_page_offers_can_be_chosen(page):
     assert {"walk", "run", "open-loop", "shipped"} <= set(offered)
     assert page.ask("reset", policy="shipped")["kind"] == "note"
     page.tick(0.1)
-    assert page.answers.playing
+    assert page.session.playing
 
 
 def test_the_conditions_of_the_paper_are_the_paper(page):

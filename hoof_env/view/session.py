@@ -1,4 +1,4 @@
-"""Answers of a tab to its page: states while it plays, and what the page asks for."""
+"""Session of a tab: its simulation, its messages to the page, and the requests of the page."""
 
 from __future__ import annotations
 
@@ -11,23 +11,23 @@ from typing import Any
 from hoof_env.errors import ParameterError, check_choice, check_number, parse_pairs
 from hoof_env.view import controls, figures, layout
 from hoof_env.view.layout import SPEEDS
+from hoof_env.view.messages import collect_warnings, error_text
 from hoof_env.view.player import Player
 from hoof_env.view.recording import Recording
 from hoof_env.view.simulation import Simulation
-from hoof_env.view.words import heard, words_of
 
 CURVES_EVERY = 2  # states between two pieces of the curves
-MOST_SUBSTEPS = 10_000  # of a control step: during one, Python does nothing else
+MAX_SUBSTEPS = 10_000  # of a control step: during one, Python does nothing else
 
 Setup = dict[str, Any]
 """Arguments of `Simulation`, by name."""
 
 
-class Answers:
-    """Simulation of a tab, and what it says to the page.
+class Session:
+    """Simulation of a tab, and its messages to the page.
 
-    Its methods run in the thread of the tab, one after the other. What they say waits in `outbox`, as the
-    document is the server's.
+    Its methods run in the thread of the tab, one after the other. Their messages wait in `outbox`, because
+    only the server's thread may change the document.
 
     Args:
         setup: arguments of the simulation.
@@ -37,7 +37,7 @@ class Answers:
     Attributes:
         player: simulation and clock.
         playing, speed: True while the clock goes on, and its speed over real time.
-        outbox: news and messages that the page has not got yet, with the name of their part of the wire.
+        outbox: news and messages that were not sent yet, with the name of their part of the wire.
         is_open: False when the page was closed.
 
     Raises:
@@ -47,7 +47,7 @@ class Answers:
     def __init__(self, setup: Setup, keep: Callable[[Setup], str], out: Path) -> None:
         self._keep = keep
         self._out = out
-        with heard() as self._warned:
+        with collect_warnings() as self._warned:
             simulation = Simulation(**setup)
         self.player = Player(simulation)
         self.player.reset(simulation.reset())
@@ -57,21 +57,21 @@ class Answers:
         self.is_open = True
         self._states = 0
 
-    # Jobs, which nothing leaves that is raised in them
+    # Jobs (they never raise)
 
     def go(self, passed: float) -> None:
-        """Let real time pass [s], and send the state; pause where there is none."""
+        """Let real time pass [s], and send the state; pause if the simulation cannot go on."""
         if not self.playing:
             return
         try:
-            self._say_end(self.player.go(self.speed * passed))
+            self._report_end(self.player.go(self.speed * passed))
             self._send()
         except Exception as error:
             self.playing = False
             self.refuse(error)
 
     def answer(self, requests: Sequence[Mapping[str, Any]]) -> None:
-        """Do what the page asks; a refusal is told and changes nothing."""
+        """Handle requests of the page; a request that is refused changes nothing and sends a message."""
         for request in requests:
             more = dict(request)
             try:
@@ -80,9 +80,9 @@ class Answers:
             except Exception as error:
                 self.refuse(error)
 
-    def answer_elsewhere(self, request: Mapping[str, Any]) -> None:
-        """Do one of the requests `ELSEWHERE` on a new page, as the simulation of this one is not free."""
-        more = {} if request["name"] == "condition" else {"elsewhere": True}
+    def answer_in_new_tab(self, request: Mapping[str, Any]) -> None:
+        """Handle one of the requests `RUN_IN_NEW_TAB` on a new page while this page's simulation is busy."""
+        more = {} if request["name"] == "condition" else {"in_new_tab": True}
         self.answer([{**request, **more}])
 
     def close(self) -> None:
@@ -99,18 +99,18 @@ class Answers:
         self.outbox.append(("told", {"kind": "note"} | message))
 
     def refuse(self, error: Exception) -> None:
-        """Say why something is refused, or what went wrong."""
-        self.tell(status=words_of(error), kind="error", playing=self.playing)
+        """Send the text of an error."""
+        self.tell(status=error_text(error), kind="error", playing=self.playing)
 
-    def said(self, text: str, kind: str) -> None:
-        """Tell the end of a recording from its own thread, in the terminal where the page is closed."""
+    def report(self, text: str, kind: str) -> None:
+        """Report the end of a recording: to the page, or in the terminal if the page is closed."""
         if self.is_open:
             self.tell(status=text, kind=kind)
         else:
             print(f"hoof-env view: {text}", flush=True)
 
-    def _say_end(self, ended: str) -> None:
-        """Say that an episode ended."""
+    def _report_end(self, ended: str) -> None:
+        """Report the end of an episode and its reason, if it ended."""
         if ended:
             seed = self.player.simulation.seed
             text = f"The episode ended: {ended}. The next one has seed {seed}."
@@ -131,7 +131,7 @@ class Answers:
             self._stop_recording()
 
     def _send_anew(self, row: Any = None) -> None:
-        """Send all that is shown at the time of a row, by default at present, after a jump in time."""
+        """Send all curves up to the time of a row, by default up to now, after a jump in time."""
         player = self.player
         player.curves()
         player.steps()
@@ -144,44 +144,44 @@ class Answers:
     # Requests
 
     def show(self) -> None:
-        """Send all that is shown, and warnings, as a page asks that has just opened."""
+        """Send all curves, and warnings, to a page that has just opened."""
         self._send_anew()
-        # Not earlier: a page does not hear what is told before it is there.
+        # Only now: messages that are sent before the page is open are lost.
         if self._warned and self.playing:
             self.tell(status=" ".join(self._warned), kind="warning")
         self._warned = []
 
     def play(self, value: bool | None = None) -> None:
-        """Play or pause; None for the other of both."""
+        """Play or pause; None toggles."""
         self.set_playing(value)
         self._send_anew()
         self.tell(span=self.player.history.span)
 
     def set_playing(self, value: bool | None) -> None:
-        """Let the clock go on or not; None for the other of both."""
+        """Start or stop the clock; None toggles."""
         self.playing = not self.playing if value is None else bool(value)
         self.tell(playing=self.playing)
 
     def step(self) -> None:
         """Take one control step, and pause."""
         self.playing = False
-        self._say_end(self.player.step())
+        self._report_end(self.player.step())
         self._send_anew()
         self.tell(playing=False, span=self.player.history.span)
 
-    def reset(self, seed: Any = None, policy: str | None = None, elsewhere: bool = False) -> None:
-        """Start an episode anew, on another page if asked."""
-        if elsewhere:
+    def reset(self, seed: Any = None, policy: str | None = None, in_new_tab: bool = False) -> None:
+        """Start an episode anew, on this page or in a new tab."""
+        if in_new_tab:
             here = self.player.simulation
             chosen = {"seed": here.seed if seed is None else seed, "policy": policy or here.policy}
             self._go({"arguments": here.arguments | here.parameters} | chosen)
             return
-        with heard() as said:
+        with collect_warnings() as warned:
             chunk = self.player.simulation.reset(seed, policy or None)
         self._stop_recording()
         self.player.reset(chunk)
         self._send_anew()
-        text = " ".join(said) or f"Seed {self.player.simulation.seed}."
+        text = " ".join(warned) or f"Seed {self.player.simulation.seed}."
         is_driven = self.player.simulation.hand is not None
         self.tell(status=text, hand=is_driven, playing=self.playing)
 
@@ -228,7 +228,7 @@ class Answers:
         self._go({"env_id": controls.PAPER_ID, "arguments": arguments, "policy": gait, "seed": 0})
 
     def setup(
-        self, env_id: str, arguments: str, preset: str, policy: str, seed: Any, elsewhere: bool = False
+        self, env_id: str, arguments: str, preset: str, policy: str, seed: Any, in_new_tab: bool = False
     ) -> None:
         """Go to another environment, preset, policy or seed."""
         pairs = parse_pairs("arguments", arguments.split())
@@ -237,7 +237,7 @@ class Answers:
         seed = seed or 0
         here = self.player.simulation
         if env_id == here.env_id and pairs == here.arguments:
-            self.reset(seed, policy, elsewhere)
+            self.reset(seed, policy, in_new_tab)
             return
         self._go({"env_id": env_id, "arguments": pairs, "policy": policy or None, "seed": seed})
 
@@ -256,7 +256,7 @@ class Answers:
     def record(self, suffix: str = ".csv") -> None:
         """Begin a recording, or end it and write its file."""
         if self.player.recording is None:
-            self.player.recording = Recording(self.player.simulation, self._out, suffix, self.said)
+            self.player.recording = Recording(self.player.simulation, self._out, suffix, self.report)
             self.tell(recording=True, status="Recording. Press again to stop.")
         else:
             self._stop_recording()
@@ -271,24 +271,24 @@ class Answers:
 
 
 HANDLERS: dict[str, Callable[..., None]] = {
-    "show": Answers.show,
-    "play": Answers.play,
-    "step": Answers.step,
-    "reset": Answers.reset,
-    "speed": Answers.set_speed,
-    "back": Answers.back,
-    "touch": Answers.touch,
-    "drive": Answers.drive,
-    "release": Answers.release,
-    "push": Answers.push,
-    "condition": Answers.condition,
-    "setup": Answers.setup,
-    "record": Answers.record,
+    "show": Session.show,
+    "play": Session.play,
+    "step": Session.step,
+    "reset": Session.reset,
+    "speed": Session.set_speed,
+    "back": Session.back,
+    "touch": Session.touch,
+    "drive": Session.drive,
+    "release": Session.release,
+    "push": Session.push,
+    "condition": Session.condition,
+    "setup": Session.setup,
+    "record": Session.record,
 }
 """Requests of a page by name."""
 
-ELSEWHERE = ("reset", "setup", "condition")
-"""Requests that a new page can do as well."""
+RUN_IN_NEW_TAB = ("reset", "setup", "condition")
+"""Requests that a new page can handle while this one is busy."""
 
 
 def try_out(setup: Setup) -> None:
@@ -297,13 +297,13 @@ def try_out(setup: Setup) -> None:
     Raises:
         HoofEnvError: the set-up is refused, or its control steps are too long to be shown.
     """
-    with heard():
+    with collect_warnings():
         simulation = Simulation(**setup)
     env: Any = simulation.env.unwrapped
     substeps = env.engine.substeps * env.dt / env.sim_dt
-    if substeps > MOST_SUBSTEPS:
+    if substeps > MAX_SUBSTEPS:
         raise ParameterError(
-            f"sim_dt, dt: expected at most {MOST_SUBSTEPS} substeps in a control step, got {substeps:.6g}"
+            f"sim_dt, dt: expected at most {MAX_SUBSTEPS} substeps in a control step, got {substeps:.6g}"
         )
     simulation.reset()
     simulation.env.close()

@@ -52,20 +52,18 @@ def test_a_rate_that_does_not_fit_the_times_is_said(tmp_path):
     path = table(tmp_path / "x.csv", LATE)
     found = read_record(path, rate=50)
     assert found.time[0] == 0.5
-    assert "times of time make a rate of 100 Hz and not of 50 Hz" in found.notes[0]
+    assert "times of time imply 100 Hz, not the given 50 Hz" in found.notes[0]
     found = read_record(table(tmp_path / "y.csv", 100 * LATE, LATE, "time"), rate=100)
     assert (found.time[0], len(found.notes)) == (0.0, 1)
-    assert "neither s nor ms at a rate of 100 Hz; the record begins at 0 s" in found.notes[0]
+    assert "fit 100 Hz neither in s nor in ms; the record begins at 0 s" in found.notes[0]
 
 
 def test_milliseconds_without_a_unit_are_said_with_the_remedy(tmp_path):
     found = read_record(table(tmp_path / "x.csv", 1000 * LATE, LATE, "time"))
-    assert (
-        "a rate of 0.1 Hz; if they are in ms, write time [ms] above them, or give the rate" in found.notes[0]
-    )
+    assert "imply 0.1 Hz; if they are in ms, write time [ms] above them, or give the rate" in found.notes[0]
     truth = read_record(table(tmp_path / "y.csv", LATE))
     said = report(compare(truth, found))
-    assert "warning: x.csv: times of time have no unit and are taken as s, which makes a rate of 0.1" in said
+    assert "warning: x.csv: times of time have no unit; read as s they imply 0.1" in said
     assert "or give the rate (--rate-b)" in said
     assert read_record(tmp_path / "x.csv", rate=100).time[0] == pytest.approx(0.5)
 

@@ -1,10 +1,9 @@
-"""Times of the samples of a record, from a column of times or a rate.
+"""Times of a record's samples, from a column of times or a sampling rate.
 
-A record has one clock, the clock of its file: with a rate it begins with the first of the column of times.
+Times are those of the file's clock; with a given rate, the record begins at the first time of the column.
 
-Times need not be exact. Programs write them with few decimals, so that steps differ by the last digit:
-differences up to half a unit of that digit do not count as uneven. A missing sample does, if the last digit
-is finer than a step.
+Times need not be exact. Programs write few decimals, so steps differ in the last digit; differences of up to
+half a unit of that digit are not uneven. A missing sample is, if the last digit is finer than a step.
 """
 
 from __future__ import annotations
@@ -19,43 +18,43 @@ from hoof_env.lab.tables import Table
 
 Floats = NDArray[np.float64]
 
-TIMES = dict.fromkeys(("s", "sec", "secs", "second", "seconds"), 1.0) | dict.fromkeys(
+SECONDS_BY_UNIT = dict.fromkeys(("s", "sec", "secs", "second", "seconds"), 1.0) | dict.fromkeys(
     ("ms", "msec", "msecs", "millisecond", "milliseconds"), 1e-3
 )
 """Units of time in seconds, by their spellings in small letters."""
 
-UNEVEN = 0.01
+MAX_UNEVENNESS = 0.01
 """Largest difference of a sampling interval from the mean interval, as a share of the mean."""
 
-COARSE = 0.9
+MAX_DIGIT_SHARE = 0.9
 """Share of a step above which a unit of the last digit would hide a missing sample."""
 
-FEW = 3
-"""Number of uneven steps from which on they are due to rounding, which recurs; a missing sample does not."""
+MIN_UNEVEN_STEPS = 3
+"""Least number of uneven steps that rounding explains. Rounding recurs, a missing sample does not."""
 
-SLOW = 10.0
+MIN_RATE_HZ = 10.0
 """Lowest rate of a force record [Hz]."""
 
-FAST = 1e5
+MAX_RATE_HZ = 1e5
 """Highest rate of a force record [Hz]."""
 
-ROUND = (1000, 100, 50, 10, 5, 1)
-"""Numbers of which rates are multiples, the likeliest first [Hz]."""
+ROUND_RATES_HZ = (1000, 100, 50, 10, 5, 1)
+"""Likely common divisors of rates, the likeliest first [Hz]."""
 
-MANY = 10
-"""Number of values between two powers of ten that show with how many decimals they were written."""
+MIN_NUMBERS_FOR_DIGIT = 10
+"""Least number of values of one magnitude that show the number of decimals of their program."""
 
-DIGITS = 9
-"""Largest number of decimals that is looked for."""
+MAX_DECIMALS = 9
+"""Largest number of decimals that is tried."""
 
-SAME = 0.1
-"""Largest difference of a step from the step of the stated rate, as a share of the latter."""
+MAX_RATE_ERROR = 0.1
+"""Largest difference of a step from the step of the given rate, as a share of the latter."""
 
 
 def times_of(
     path: Path, table: Table, name: str, rate: float | None, n: int, few: str
 ) -> tuple[Floats, list[str]]:
-    """Return the times of a record, evenly spaced, shape (n,) [s], and doubts about them.
+    """Return the times of a record, evenly spaced, shape (n,) [s], and warnings about them.
 
     Args:
         path: the file, for error messages.
@@ -67,7 +66,7 @@ def times_of(
 
     Raises:
         ParameterError: the column and the rate are missing, or the column's unit is not one of time.
-        DataFileError: the times are not finite, or do not increase evenly.
+        DataFileError: the times are not finite, or not evenly spaced.
     """
     name = _spelled(table, name)
     if rate is not None:
@@ -79,7 +78,7 @@ def times_of(
             f"--rate-b); it has {few}"
         )
     unit = table.units.get(name)
-    if unit and unit.casefold() not in TIMES:
+    if unit and unit.casefold() not in SECONDS_BY_UNIT:
         raise ParameterError(f"map: expected times of {path.name} in s or ms, got {unit}")
     if name in table.unread:
         raise DataFileError(f"record {str(path)!r}: {table.unread[name]}")
@@ -89,19 +88,19 @@ def times_of(
         raise DataFileError(
             f"record {str(path)!r}: {name}: expected finite numbers, got {column[row]} in row {row + 1}"
         )
-    time = _even(path, name, column) * TIMES[(unit or "s").casefold()]
-    # A rate that no force plate has is a sign of a wrong unit. It is taken all the same, with a note.
+    time = _even(path, name, column) * SECONDS_BY_UNIT[(unit or "s").casefold()]
+    # An implausible rate suggests a wrong unit. The times are accepted, with a warning.
     measured = (n - 1) / float(time[-1] - time[0])
-    if SLOW <= measured <= FAST:
+    if MIN_RATE_HZ <= measured <= MAX_RATE_HZ:
         return time, []
     if unit:
         return time, [
-            f"times of {name} in {unit} make a rate of {measured:g} Hz, which is none of a force record; if "
-            "the unit is wrong, change it in the file, or give the rate (--rate-a, --rate-b)"
+            f"times of {name} in {unit} imply {measured:g} Hz, implausible for a force plate; if the unit is "
+            "wrong, change it in the file, or give the rate (--rate-a, --rate-b)"
         ]
     return time, [
-        f"times of {name} have no unit and are taken as s, which makes a rate of {measured:g} Hz; if they "
-        f"are in ms, write {name} [ms] above them, or give the rate (--rate-a, --rate-b)"
+        f"times of {name} have no unit; read as s they imply {measured:g} Hz; if they are in ms, write "
+        f"{name} [ms] above them, or give the rate (--rate-a, --rate-b)"
     ]
 
 
@@ -112,66 +111,68 @@ def _spelled(table: Table, name: str) -> str:
 
 
 def _start(table: Table, name: str, rate: float) -> tuple[float, list[str]]:
-    """Return the first time [s] of a record with a given rate, by its column of times, else 0; and doubts
-    about it."""
+    """Return the first time [s] of a record with a given rate, from its column of times, or 0 if the column
+    cannot tell; and warnings about it."""
     column = table.columns.get(name)
     if column is None or not np.isfinite(column[[0, -1]]).all() or column[-1] == column[0]:
         return 0.0, []
     unit = table.units.get(name, "").casefold()
     step = float(column[-1] - column[0]) / (len(column) - 1)
     if unit:
-        scale = TIMES.get(unit)
+        scale = SECONDS_BY_UNIT.get(unit)
     else:
         # Without a unit, s or ms, whichever agrees with the rate.
-        scale = next((seconds for seconds in (1.0, 1e-3) if abs(step * seconds * rate - 1) < SAME), None)
-    if scale is not None and (unit or abs(step * scale * rate - 1) < SAME):
+        agrees = (seconds for seconds in (1.0, 1e-3) if abs(step * seconds * rate - 1) < MAX_RATE_ERROR)
+        scale = next(agrees, None)
+    if scale is not None and (unit or abs(step * scale * rate - 1) < MAX_RATE_ERROR):
         notes = []
-        if abs(step * scale * rate - 1) > SAME:
+        if abs(step * scale * rate - 1) > MAX_RATE_ERROR:
             notes = [
-                f"times of {name} make a rate of {1 / (step * scale):g} Hz and not of {rate:g} Hz, which is "
-                "taken; the record begins at the first of them"
+                f"times of {name} imply {1 / (step * scale):g} Hz, not the given {rate:g} Hz, which is used; "
+                "the record begins at the first of these times"
             ]
         return float(column[0]) * scale, notes
     return 0.0, [
-        f"steps of {name}, {step:g}, are neither s nor ms at a rate of {rate:g} Hz; the record begins at 0 s"
+        f"steps of {name}, {step:g}, fit {rate:g} Hz neither in s nor in ms; the record begins at 0 s"
     ]
 
 
 def _even(path: Path, name: str, column: Floats) -> Floats:
-    """Return a column of times without the rounding of its last digit; raise `DataFileError` unless its steps
-    are even."""
+    """Return a column of times without the rounding of its last digit; raise `DataFileError` unless the times
+    are evenly spaced."""
     steps = np.diff(column)
     mean = float(column[-1] - column[0]) / len(steps)
-    if mean > 0 and np.abs(steps - mean).max() <= UNEVEN * mean:
+    if mean > 0 and np.abs(steps - mean).max() <= MAX_UNEVENNESS * mean:
         return column
     digit = _last_digit(column)
     # With a digit as coarse as a step, a missing sample would look like rounding.
-    hidden = digit > COARSE * steps.min() and (np.abs(steps - mean) > digit / 2).sum() < FEW
+    uneven = int((np.abs(steps - mean) > digit / 2).sum())
+    hidden = digit > MAX_DIGIT_SHARE * steps.min() and uneven < MIN_UNEVEN_STEPS
     if mean > 0 and digit > 0 and not hidden:
         smooth = _line(column, digit / 2)
         if smooth is not None:
             return smooth
     worst = int(np.abs(steps - mean).argmax())
     raise DataFileError(
-        f"record {str(path)!r}: {name}: expected times that increase evenly, got steps of {steps.min():g} "
-        f"to {steps.max():g}, of {steps[worst]:g} behind {column[worst]:g} in row {worst + 1}; if the "
-        "samples are even nevertheless, give their rate (--rate-a, --rate-b)"
+        f"record {str(path)!r}: {name}: expected evenly spaced times, got steps of {steps.min():g} to "
+        f"{steps.max():g}, of {steps[worst]:g} after {column[worst]:g} in row {worst + 1}; if the samples "
+        "are evenly spaced, give their rate (--rate-a, --rate-b)"
     )
 
 
 def _last_digit(column: Floats) -> float:
-    """Return a unit of the last decimal of numbers, 0 if they are not rounded.
+    """Return one unit of the numbers' last decimal, 0 if they are not rounded.
 
-    Programs that keep some number of digits write fewer decimals of larger numbers, so that each power of ten
-    is looked at alone, and the coarsest unit is returned.
+    Programs that write a fixed number of digits write fewer decimals of larger numbers. Each power of ten is
+    therefore examined alone, and the coarsest unit is returned.
     """
     size = np.floor(np.log10(np.maximum(np.abs(column), 1.0))).astype(int)
     coarsest = 0.0
     powers, counts = np.unique(size, return_counts=True)
     # A few numbers may be round by chance.
-    for power in powers[counts >= min(MANY, counts.max())]:
+    for power in powers[counts >= min(MIN_NUMBERS_FOR_DIGIT, counts.max())]:
         values = column[size == power]
-        for decimals in range(DIGITS + 1):
+        for decimals in range(MAX_DECIMALS + 1):
             scaled = values * 10.0**decimals
             if np.abs(scaled - np.rint(scaled)).max() < 1e-3:
                 coarsest = max(coarsest, 10.0**-decimals)
@@ -185,8 +186,8 @@ def _line(column: Floats, most: float) -> Floats | None:
     """Fit even times to a column of times.
 
     Returns:
-        Times of which none is farther than `most` from those of the column, None if there are none. Their
-        rate is a whole number, the roundest that fits, if one does.
+        Times within `most` of the column's, None if no even times are. Their rate is the roundest whole
+        number that fits, if one does.
     """
     k = np.arange(len(column))
     # A little more than half a digit, for the rounding of the numbers themselves.
@@ -202,7 +203,7 @@ def _line(column: Floats, most: float) -> Floats | None:
     high = mean + 2 * most / (len(column) - 1)
     # The column may be in s or in ms: a rate of 200 Hz has steps of 0.005 or 5.
     for scale in (1.0, 1e3):
-        for round_to in ROUND:
+        for round_to in ROUND_RATES_HZ:
             rate = round(scale / mean / round_to) * round_to
             if rate > 0 and low <= scale / rate <= high and off(scale / rate) <= most:
                 return _through(column, scale / rate, k)

@@ -10,7 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hoof_env.ground.laws import REGULAR_LAWS, SMALLEST_RESTITUTION
-from hoof_env.render.instant import POINTS, Columns
+from hoof_env.record.columns import Columns
+from hoof_env.record.instant import POINTS
 
 EXTREMES = {"elastic": 1.0, "inelastic": 0.0}
 """Restitutions of the paper's two conditions [-]."""
@@ -18,7 +19,7 @@ EXTREMES = {"elastic": 1.0, "inelastic": 0.0}
 Floats = NDArray[np.float64]
 
 
-class SameMotion:
+class OtherGround:
     """Normal forces of other ground, for the simulated motion of the legs.
 
     A rigid hoof is where its leg has it, and the force is Eq. 14 there. A spring in the hoof gives way to the

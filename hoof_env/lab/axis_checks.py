@@ -1,4 +1,4 @@
-"""Doubts about the axes of a force record: another force is larger, or propulsion comes before braking."""
+"""Checks of a force record's axes: which force is the largest, and whether braking precedes propulsion."""
 
 from __future__ import annotations
 
@@ -12,26 +12,26 @@ from hoof_env.lab.stances import whole_stances
 
 Floats = NDArray[np.float64]
 
-IDLE = 0.1
+UNLOADED_SHARE = 0.1
 """Share of the highest force of all limbs below which a limb counts as unloaded."""
 
-LOADED = 0.2
+LOADED_SHARE = 0.2
 """Share of a limb's highest vertical force above which its other forces count."""
 
-SMALL = 0.01
+ZERO_FORCE_SHARE = 0.01
 """Share of a limb's highest vertical force below which a horizontal force counts as 0."""
 
-BACKWARD = -0.2
-"""Mean `order` of all limbs below which every limb with propulsion first is remarked."""
+MIN_MEAN_ORDER = -0.2
+"""Mean `order` of all limbs below which each limb with propulsion first causes a warning."""
 
-ALONE = -0.35
-"""The `order` of one limb below which it is remarked, whatever the others."""
+MIN_ORDER = -0.35
+"""The `order` of one limb below which it causes a warning, whatever the mean."""
 
-BOTH = 0.1
+MIN_PHASE_SHARE = 0.1
 """Least share of braking, and of propulsion, in the fore-aft force that defines an order."""
 
-OPTION = re.compile(r"--(?P<name>\w+)-a(?P<value>=\S+)?(?: or |, )--(?P=name)-b(?:=\S+)?")
-"""Options in notes, which name both records, as a record does not know whether it is A or B."""
+OPTION_OF_BOTH = re.compile(r"--(?P<name>\w+)-a(?P<value>=\S+)?(?: or |, )--(?P=name)-b(?:=\S+)?")
+"""Options in notes. They name both records, because a record does not know whether it is A or B."""
 
 
 def for_one(note: str, which: str) -> str:
@@ -41,24 +41,24 @@ def for_one(note: str, which: str) -> str:
         note: the note with the options of both records.
         which: "-a" or "-b", or "" for commands with options without such an ending.
     """
-    return OPTION.sub(rf"--\g<name>{which}\g<value>", note)
+    return OPTION_OF_BOTH.sub(rf"--\g<name>{which}\g<value>", note)
 
 
-def sideways(
+def suspect_axes(
     forces: Mapping[str, Floats],
     sizes: Mapping[str, Mapping[str, Floats]],
     ahead: str,
     upward: str,
     options: tuple[str, str],
 ) -> list[str]:
-    """Warn of limbs with a largest force that is not the vertical one, or a larger horizontal force that is
-    not the fore-aft one.
+    """Warn of limbs whose largest force is not the vertical one, or whose largest horizontal force is not the
+    fore-aft one.
 
     Args:
         forces: forces forward and upward by limb, shape (n, 2).
         sizes: absolute forces by limb and axis of the file, shape (n,).
-        ahead, upward: axes that are taken, as "x" or "-x".
-        options: values of the options up and forward; an axis that they name is not doubted.
+        ahead, upward: axes taken as forward and up, such as "x" or "-x".
+        options: values of the options up and forward; an axis that they name causes no warning.
 
     Returns:
         Warnings, with the options that choose other axes.
@@ -70,22 +70,22 @@ def sideways(
         others = {axis: size for axis, size in axes.items() if axis != upward[-1]}
         largest = max(others, key=lambda axis: float(others[axis].max()), default="")
         peak = float(vertical.max())
-        if largest and others[largest].max() > max(peak, IDLE * highest):
+        if largest and others[largest].max() > max(peak, UNLOADED_SHARE * highest):
             if options[0] == "auto":
                 wrong.setdefault(("up", largest), []).append(limb)
-            # With a doubtful vertical, the horizontal forces are not to be judged.
+            # Without a certain vertical axis the horizontal forces cannot be judged.
             continue
-        loaded = vertical > LOADED * peak
-        if peak <= IDLE * highest or options[1] != "auto":
+        loaded = vertical > LOADED_SHARE * peak
+        if peak <= UNLOADED_SHARE * highest or options[1] != "auto":
             continue
         # Means under load and not peaks, which an impact may cause.
         means = {axis: float(size[loaded].mean()) for axis, size in others.items()}
         most = max(means, key=lambda axis: means[axis], default=ahead[-1])
-        if most != ahead[-1] and means[most] > max(SMALL * peak, means.get(ahead[-1], 0.0)):
+        if most != ahead[-1] and means[most] > max(ZERO_FORCE_SHARE * peak, means.get(ahead[-1], 0.0)):
             wrong.setdefault(("forward", most), []).append(limb)
     reasons = {
-        "up": f"is larger than that along {upward}, which is taken for the vertical force",
-        "forward": f"is larger than that along {ahead}, which is taken for the direction of travel",
+        "up": f"is larger than the force along {upward}, which is taken for the vertical force",
+        "forward": f"is larger than the force along {ahead}, which is taken for the direction of travel",
     }
     return [
         f"{', '.join(limbs)}: the {'' if which == 'up' else 'horizontal '}force along {axis} "
@@ -95,8 +95,8 @@ def sideways(
 
 
 def order(force: Floats, rate: float) -> float:
-    """Compute the order of braking and propulsion, which is positive if braking comes first, as in an animal
-    that travels forward.
+    """Compute the order of braking and propulsion: positive if braking comes first, as in an animal that
+    travels forward.
 
     It is 0.5 for half a sine of braking and another of propulsion, -0.5 for propulsion first, and 0 if there
     is only one of them, or no whole stance.
@@ -105,7 +105,7 @@ def order(force: Floats, rate: float) -> float:
         force: forces forward and upward, shape (n, 2).
         rate: sampling rate [Hz].
     """
-    level = LOADED * float(force[:, 1].max())
+    level = LOADED_SHARE * float(force[:, 1].max())
     moments = 0.0
     sizes = 0.0
     parts = np.zeros(2)
@@ -115,19 +115,19 @@ def order(force: Floats, rate: float) -> float:
         moments += float(forward @ np.linspace(-1.0, 1.0, last - first))
         sizes += float(np.abs(forward).sum())
         parts += np.maximum(forward, 0.0).sum(), np.maximum(-forward, 0.0).sum()
-    if not sizes > 0 or parts.min() < BOTH * sizes:
+    if not sizes > 0 or parts.min() < MIN_PHASE_SHARE * sizes:
         return 0.0
     return moments / sizes
 
 
-def backward(forces: Mapping[str, Floats], time: Floats, ahead: str, by_axis: bool) -> list[str]:
+def suspect_direction(forces: Mapping[str, Floats], time: Floats, ahead: str, by_axis: bool) -> list[str]:
     """Warn of limbs with propulsion before braking.
 
     Args:
         forces: forces forward and upward by limb, shape (n, 2).
         time: times, shape (n,) [s].
-        ahead: axis that is taken for forward, as "x" or "-x".
-        by_axis: True if the options of axes have an effect on the file.
+        ahead: axis taken as forward, such as "x" or "-x".
+        by_axis: True if options for axes affect the file.
 
     Returns:
         One warning with the remedy, or none.
@@ -136,11 +136,11 @@ def backward(forces: Mapping[str, Floats], time: Floats, ahead: str, by_axis: bo
     highest = max(float(np.abs(force[:, 1]).max()) for force in forces.values())
     orders = {}
     for limb, force in forces.items():
-        if np.isfinite(force).all() and force[:, 1].max() > IDLE * highest:
+        if np.isfinite(force).all() and force[:, 1].max() > UNLOADED_SHARE * highest:
             orders[limb] = order(force, rate)
     known = [value for value in orders.values() if value != 0.0]
-    # A limb alone must be clearer than the mean of all, as its order scatters more.
-    least = 0.0 if known and float(np.mean(known)) < BACKWARD else ALONE
+    # The order of one limb scatters more than the mean of all and must therefore be clearer.
+    least = 0.0 if known and float(np.mean(known)) < MIN_MEAN_ORDER else MIN_ORDER
     limbs = [limb for limb, value in orders.items() if value < least]
     if not limbs:
         return []
