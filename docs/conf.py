@@ -71,8 +71,8 @@ nitpicky = True
 nitpick_ignore_regex = [
     ("py:obj", ".*"),  # not every name in a docstring is public
     ("py:class", r"hoof_env\.envs\.batch\..*"),
-    ("py:class", r"hoof_env\.leg\.mechanism\..*"),
-    ("py:class", r"hoof_env\.(dynamics\.engine_calls|envs\.(properties|row_states))\..*"),
+    ("py:class", r"hoof_env\.leg\.(mechanism|mjcf|profile)\..*"),
+    ("py:class", r"hoof_env\.(dynamics\.(engine_calls|layout)|envs\.(properties|row_states))\..*"),
     ("py:.*", r"(?!hoof_env\.).*"),  # other people's names; their inventories need a network
 ]
 
