@@ -122,6 +122,11 @@ def test_a_room_imports_what_stands_above_it(room):
         assert [wrong for path in files_of(room) for wrong in wrong_imports(path, room)] == []
 
 
+def test_files_of_laboratories_need_no_pictures():
+    imports = {module for path in files_of("hoof_env/lab") for module, _ in imported(path)}
+    assert "hoof_env/render" not in {*map(room_of, imports)}
+
+
 @pytest.mark.parametrize("room", FLOOR)
 def test_modules_of_a_room_import_each_other_in_no_circle(room):
     assert circle_of({module_name(path): path for path in files_of(room)}) == []
