@@ -6,6 +6,8 @@ Each part yields pairs of a case's name and its `Digests`, as those of bits_case
 from __future__ import annotations
 
 from collections.abc import Callable
+from contextlib import suppress
+from importlib import import_module
 from typing import Any
 
 import numpy as np
@@ -115,32 +117,41 @@ def run_engine(
     return digests
 
 
+SOLVERS = (
+    ("paper_solver.solver", "paper_solver.integrators"),
+    ("eq8.solver", "eq8.integrators"),
+    ("dynamics.constrained", "dynamics.constrained"),
+)
+"""Modules of the paper's solver and of its integrators: at present, and in earlier commits."""
+
+
+def solver_modules() -> tuple[Any, Any]:
+    """Import the paper's solver and its integrators, by the names that the commit has for them."""
+    for solver, integrators in SOLVERS:
+        with suppress(ModuleNotFoundError):
+            return import_module(f"hoof_env.{solver}"), import_module(f"hoof_env.{integrators}")
+    raise ModuleNotFoundError(f"expected one of the modules {SOLVERS} in hoof_env, found none")
+
+
 def solvers() -> Cases:
     """The paper's own solver, and the leg that the package has."""
     from hoof_env import ConstrainedLeg, Ground, load_gait, load_geometry
 
-    # the solver's room had another name in an earlier commit
-    try:
-        from hoof_env.paper_solver.integrators import INTEGRATORS
-        from hoof_env.paper_solver.solver import new_trace
-    except ModuleNotFoundError:
-        from hoof_env.eq8.integrators import INTEGRATORS  # type: ignore[import-not-found,no-redef]
-        from hoof_env.eq8.solver import new_trace  # type: ignore[import-not-found,no-redef]
-
+    solver, integrators = solver_modules()
     leg = load_geometry("identified")
     digests = Digests()
     digests.add("leg", leg.to_dict())
     digests.add("small", leg.scaled(0.3).to_dict())
     yield "geometry", digests
-    for integrator in INTEGRATORS:
+    for integrator in integrators.INTEGRATORS:
         for name in ("walk", "run"):
             gait = load_gait(name, "identified")
-            solver = ConstrainedLeg(leg, Ground(restitution=0.5), integrator=integrator)
+            leg_solver = ConstrainedLeg(leg, Ground(restitution=0.5), integrator=integrator)
             digests = Digests()
-            digests.add("start", solver.reset(gait))
-            trace = new_trace(200)
-            digests.add("result", solver.advance(gait.to_array(), trace))
+            digests.add("start", leg_solver.reset(gait))
+            trace = solver.new_trace(200)
+            digests.add("result", leg_solver.advance(gait.to_array(), trace))
             digests.add("trace", trace)
-            digests.add("reactions", solver.reactions())
-            digests.add("closure", solver.closure().error)
+            digests.add("reactions", leg_solver.reactions())
+            digests.add("closure", leg_solver.closure().error)
             yield f"ConstrainedLeg {integrator} {name}", digests
