@@ -245,7 +245,8 @@ class Limb:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Mechanics:
-    """Legs on a trunk over the ground, and the scheme that moves them, as settings ask for."""
+    """Legs on a trunk over the ground, and the scheme that moves them: all that follows from the settings of
+    an engine."""
 
     limbs: Sequence[Limb]
     profiles: Sequence[LegProfile]  # of each leg

@@ -41,7 +41,7 @@ class Unit(NamedTuple):
 
 KILONEWTONS = Unit("kN", 1000.0, 2)
 NEWTONS = Unit("N", 1.0, 0)
-LIGHT = 10.0  # lift-off force, a share of the weight, below which forces are in newtons [N]
+LIGHT = 10.0  # lift-off force of a leg below which its forces are shown in newtons [N]
 MIN_LIGHT_FULL_SCALE_N = 10.0  # least full scale of its curve [N]
 
 

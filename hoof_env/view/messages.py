@@ -23,8 +23,8 @@ def error_text(error: BaseException) -> str:
 def collect_warnings() -> Iterator[list[str]]:
     """Collect warnings; yield a list, which has their texts after the block.
 
-    Python's warning filters are common to all threads: where the blocks of two tabs overlap in time, one may
-    get the warnings of the other.
+    Python's warning filters are common to all threads. Where the blocks of two tabs overlap in time, one tab
+    may get the warnings of the other, and later warnings may not reach the terminal.
     """
     texts: list[str] = []
     with warnings.catch_warnings(record=True) as caught:
