@@ -64,7 +64,7 @@ def played(policy: str, strength: float, seeds: range) -> list[dict[str, float]]
 
 def falls_of(policy: str, strength: float, episodes: int) -> tuple[float, float]:
     """Return the share of episodes in which a policy falls, and that of those which succeed, see
-    `hoof_env.envs.batch_reports.is_success`.
+    `hoof_env.episodes.summaries.is_success`.
 
     Args:
         policy: name or path of the policy.

@@ -84,9 +84,9 @@ class MujocoEpisode:
     """
 
     def __init__(self, env: Any, contact: Sequence[float]) -> None:
-        batch = env.unwrapped.batch
-        engine = batch.engine
-        self.batch = batch
+        leg = env.unwrapped
+        engine = leg.engine
+        self.env = leg
         self.trunk = engine.trunk
         geometry = engine.limbs[0].geometry
         self.geometry = geometry
@@ -95,8 +95,8 @@ class MujocoEpisode:
         self.gait = np.array([state[name] for name in PARAMETERS])
         self.gait_rate = np.zeros(4)
         self.filters = engine.filters.to_array()
-        self.reach = batch.body.reach(engine, batch.dt)
-        self.lead = float(batch.task_record["lead"].item())
+        self.reach = leg.body.reach(engine, leg.dt)
+        self.lead = float(leg.batch.plan.record["lead"].item())
         theta = state["crank_angle"]
         text = geometry.to_mjcf(
             theta=theta, swing=report["swing_angle"], trunk=self.trunk, motor=SERVO, ground=engine.ground
@@ -179,17 +179,17 @@ class MujocoEpisode:
 
     def step(self, action: Any) -> tuple[float, bool]:
         """Play a control step; return its reward and whether the episode has failed."""
-        body = self.batch.body
+        body = self.env.body
         heading = self.gait + self.lead * self.gait_rate
         command = np.clip(heading + self.reach * np.clip(action, -1.0, 1.0), body.low, body.high)
         sums = Sums()
         before = float(self.data.qpos[self.x])
-        for _ in range(round(self.batch.dt / self.h)):
+        for _ in range(round(self.env.dt / self.h)):
             self._substep(command, sums)
-        self.time += self.batch.dt
+        self.time += self.env.dt
         progress = float(self.data.qpos[self.x]) - before
         height = float(self.data.qpos[self.z])
-        record = self.batch.task_record
+        record = self.env.batch.plan.record
         failed = not record["lowest"].item() < height < record["highest"].item()
         return self._reward(progress, sums, failed), failed
 
@@ -221,7 +221,7 @@ class MujocoEpisode:
             if z >= 0.0:
                 foot.approach = 0.0
             elif foot.height >= 0.0:
-                foot.approach = max(speed, self.batch.engine.ground.approach_floor)
+                foot.approach = max(speed, self.env.engine.ground.approach_floor)
             foot.x, foot.height = float(x), float(z)
             foot.normal = foot.friction = 0.0
         force = np.zeros(6)
@@ -254,9 +254,9 @@ class MujocoEpisode:
 
     def _reward(self, progress: float, sums: Sums, failed: bool) -> float:
         """Return the sum of all terms of `hoof_env.tasks.reward`."""
-        w = self.batch.weights
-        dt = self.batch.dt
-        asked = float(self.batch.target_speed[0]) * dt
+        w = self.env.weights
+        dt = self.env.dt
+        asked = float(self.env.batch.plan.commands.speeds[0]) * dt
         allowance = min(self.allowance + BEARING * dt, BEARING * LONGEST_STRIDE)
         impulse = sums.impulse / self.weight
         borne = min(impulse, allowance)
@@ -271,7 +271,7 @@ class MujocoEpisode:
             - 1e-3 * w["energy"] * sums.work
             - w["slip"] * sums.slip
             + w["support"] * min(pace * borne, abs(pace) * borne)
-            - (w["failure"] * (self.batch.episode_seconds - self.time) if failed else 0.0)
+            - (w["failure"] * (self.env.episode_seconds - self.time) if failed else 0.0)
         )
 
     def pose_at(self, theta: float) -> Floats:

@@ -66,7 +66,7 @@ def play_there(
     begin = float(there.data.qpos[there.x])
     value = 0.0
     failed = False
-    steps = round(there.batch.episode_seconds / there.batch.dt)
+    steps = round(there.env.episode_seconds / there.env.dt)
     for k in range(steps):
         observation = there.observe()
         action, _ = policy.predict(observation, episode_start=np.array([k == 0]), deterministic=True)
@@ -152,7 +152,7 @@ def film(here: Sequence[Floats], there: Sequence[Floats], path: Path) -> None:
 def bars_here(env: Any, policy: Any, seed: int, like: MujocoEpisode) -> list[Floats]:
     """Play an episode in the environment; return the bars of each control step, in the links of `like`."""
     observation, _ = env.reset(seed=seed, options=start_of(policy))
-    engine = env.unwrapped.batch.engine
+    engine = env.unwrapped.engine
     frames: list[Floats] = []
     done = False
     while not done:

@@ -21,9 +21,8 @@ from numpy.typing import NDArray
 import hoof_env
 from hoof_env._output import check_folder, free_memory, staged
 from hoof_env.envs import made
-from hoof_env.envs.batch import EpisodeBatch
+from hoof_env.envs.base import LegBase
 from hoof_env.envs.policies import start_of
-from hoof_env.envs.recording import surroundings_of
 from hoof_env.errors import (
     MissingExtraError,
     OutputError,
@@ -53,12 +52,11 @@ def surroundings(env: Any) -> Surroundings:
     """Return the surroundings of a single environment of this package, wrapped or not; raise `ParameterError`
     for another environment."""
     leg = env.unwrapped
-    batch = getattr(leg, "batch", None)
-    if not isinstance(batch, EpisodeBatch) or isinstance(leg, gym.vector.VectorEnv):
+    if not isinstance(leg, LegBase) or isinstance(leg, gym.vector.VectorEnv):
         raise ParameterError(
             f"environment: expected a single one of this package behind it, got {type(leg).__name__}"
         )
-    return surroundings_of(batch)
+    return leg.surroundings()
 
 
 def substeps(env: Any, record: Columns | None = None) -> Columns:

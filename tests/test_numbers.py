@@ -108,7 +108,7 @@ def leg(figure: str) -> float:
     env = HorseLegEnv()
     env.reset(seed=0)
     if figure == "hip_height":
-        return env.batch.body.height
+        return env.body.height
     mass = env.weight / 9.81
     if figure == "mass":
         return mass

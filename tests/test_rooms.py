@@ -15,7 +15,7 @@ ROOT = Path(__file__).parents[1]
 
 FLOORS = (
     ("hoof_env/_version.py", "hoof_env/constants.py", "hoof_env/errors.py"),
-    ("hoof_env/_collector.py", "hoof_env/_output.py", "hoof_env/_plotting.py"),
+    ("hoof_env/_collector.py", "hoof_env/_display.py", "hoof_env/_output.py", "hoof_env/_plotting.py"),
     ("hoof_env/simd",),
     ("hoof_env/leg",),
     ("hoof_env/ground", "hoof_env/gait.py"),
@@ -23,7 +23,7 @@ FLOORS = (
     ("hoof_env/record",),
     ("hoof_env/paper_solver",),
     ("hoof_env/tasks",),
-    ("hoof_env/render",),
+    ("hoof_env/render", "hoof_env/episodes"),
     ("hoof_env/envs", "hoof_env/__init__.py"),
     ("hoof_env/paper", "hoof_env/policies"),
     ("hoof_env/lab",),
@@ -140,9 +140,11 @@ def test_every_file_has_its_room():
 
 def test_it_can_fail(tmp_path):
     path = tmp_path / "module.py"
-    path.write_text("def f():\n    from hoof_env.envs.batch import EpisodeBatch\n    import agents.train\n")
+    path.write_text(
+        "def f():\n    from hoof_env.episodes.batch import EpisodeBatch\n    import agents.train\n"
+    )
     assert list(wrong_imports(path, "hoof_env/ground")) == [
-        "module.py:2 imports hoof_env.envs.batch.EpisodeBatch",
+        "module.py:2 imports hoof_env.episodes.batch.EpisodeBatch",
         "module.py:3 imports agents.train",
     ]
     assert not list(wrong_imports(path, "agents"))

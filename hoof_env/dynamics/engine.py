@@ -302,8 +302,12 @@ class TrunkEngine:
     def arrays(self) -> tuple[NDArray[Any], ...]:
         """First arguments of the kernels of `advance`; their memory stays in place, but a copy has its
         own."""
+        return self.arrays_of(self.mechanics)
+
+    def arrays_of(self, mechanics: Mechanics) -> tuple[NDArray[Any], ...]:
+        """Return `arrays` with the model of other mechanics."""
         m = self._memory
-        return (m.data, *self.mechanics.model, m.constants, m.reactions)
+        return (m.data, *mechanics.model, m.constants, m.reactions)
 
     @property
     def columns(self) -> int:
@@ -315,8 +319,9 @@ class TrunkEngine:
         """Results of the last call, values of `parts.Result`, shape (num_envs,)."""
         return self._memory.result.astype(np.int64)
 
-    def alone(self) -> TrunkEngine:
-        """Return a new engine like this one for one environment."""
+    def alone(self, *, reactions: bool | None = None) -> TrunkEngine:
+        """Return a new engine like this one for one environment; `reactions` says whether it computes joint
+        reactions, None that it does where this one does."""
         return TrunkEngine(
             self.limbs,
             self.trunk,
@@ -328,7 +333,7 @@ class TrunkEngine:
             step_error=self.step_error,
             harmonics=self.features.harmonics,
             filters=self.filters,
-            reactions=self.reacts,
+            reactions=self.reacts if reactions is None else reactions,
             strides=self.counts_strides,
             limits=self.motion_limits,
             contact_law=self.contact_law,

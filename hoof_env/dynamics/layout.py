@@ -180,7 +180,7 @@ class TrunkReport(Layout):
 
 
 class TrunkMemory(Layout):
-    """A trunk in the engine's array. What infos measure stands together, see `envs.infos`."""
+    """A trunk in the engine's array. What infos measure stands together, see `episodes.infos`."""
 
     settings: TrunkSettings
     account: Account

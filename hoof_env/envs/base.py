@@ -14,21 +14,26 @@ from gymnasium.envs.registration import EnvSpec
 from gymnasium.error import ClosedEnvironmentError, ResetNeeded
 from numpy.typing import ArrayLike, NDArray
 
-from hoof_env.envs.batch import EpisodeBatch
-from hoof_env.envs.batch_pushes import push_now
-from hoof_env.envs.batch_reports import summaries_of
-from hoof_env.envs.batch_states import state_of
-from hoof_env.envs.conditions import CHANGEABLE
+from hoof_env._display import html_table, line_of
+from hoof_env.dynamics.engine import TrunkEngine
+from hoof_env.dynamics.memory import which as which_of
 from hoof_env.envs.drawn_recording import DrawnRecording
-from hoof_env.envs.properties import LegProperties
-from hoof_env.envs.recording import Recording
-from hoof_env.envs.settings_changes import SettingsChanges
-from hoof_env.errors import FixedSettingError, ParameterError, check_choice
+from hoof_env.episodes.batch import EpisodeBatch
+from hoof_env.episodes.recording import Recording, commands_of_step, surroundings_of
+from hoof_env.episodes.row_plans import CHANGEABLE
+from hoof_env.episodes.states import state_of
+from hoof_env.episodes.summaries import summaries_of
+from hoof_env.errors import FixedSettingError, ParameterError, check_choice, check_number
 from hoof_env.gait import GaitParameters
+from hoof_env.ground.terrain import Terrain
+from hoof_env.leg.geometry import Geometry
+from hoof_env.record.surroundings import Surroundings
 from hoof_env.render.size import check_side
+from hoof_env.tasks.body import Body
 from hoof_env.tasks.plain import as_plain, json_value, to_json
 from hoof_env.tasks.registry import Task, task_of
-from hoof_env.tasks.settings import PER_EPISODE, SETTINGS, Settings
+from hoof_env.tasks.schedules import SPEED, check_unscheduled
+from hoof_env.tasks.settings import PER_EPISODE, SETTINGS, ResolvedSettings, Settings
 
 
 def fixed_setting(name: str) -> FixedSettingError:
@@ -49,35 +54,18 @@ def array_of(value: Any) -> NDArray[Any]:
         return np.empty(0, object)
 
 
-# Asking the system for entropy takes as long as a step.
-ANY_SEED = np.random.SeedSequence(0)
-"""Seed of generators that get a state at once."""
-
-
-def generator_of(state: Any) -> np.random.Generator:
-    """Make a generator from the state of a `PCG64`.
-
-    Raises:
-        ParameterError: `state` is not such a state.
-    """
-    generator = np.random.Generator(np.random.PCG64(ANY_SEED))
-    try:
-        generator.bit_generator.state = state
-    except (TypeError, ValueError, KeyError):
-        raise ParameterError(f"state['generator']: expected the state of a PCG64, got {state!r}") from None
-    return generator
-
-
-class LegBase(LegProperties, SettingsChanges):
+class LegBase:
     """Base of the single and the vector environment.
 
     Attributes:
         task, settings: task and its settings.
+        batch: episodes, a batch of one in the single environment.
         spec: Gymnasium's specification. Its `max_episode_steps` is the environment's own limit, from
             `episode_seconds` and `dt`, unless it has one already.
     """
 
     task: Task
+    batch: EpisodeBatch
     metadata: dict[str, Any]
     render_mode: str | None
     _size: tuple[int, int]
@@ -96,6 +84,7 @@ class LegBase(LegProperties, SettingsChanges):
         render_mode: str | None,
         size: tuple[int, int],
         num_threads: int = 1,
+        max_episode_steps: int | None = None,
     ) -> list[Any]:
         """Make the batch of `n` environments; return the spaces of an observation and of an action.
 
@@ -108,10 +97,12 @@ class LegBase(LegProperties, SettingsChanges):
         self.task = task_of(task)
         self.render_mode = render_mode
         # Kept for `change_settings`, which replaces some and starts from the task's defaults again.
-        self._given = [{name: as_plain(name, value) for name, value in given.items()}] * n
-        self.batch = EpisodeBatch(self.task, self.task.settings(given), n, num_threads)
-        self.metadata = {**self.metadata, "render_fps": max(1, round(1 / self.batch.dt))}
-        sizes = len(self.batch.names), len(self.batch.action_names)
+        self._given: list[Mapping[str, Any]] = [
+            {name: as_plain(name, value) for name, value in given.items()}
+        ] * n
+        self.batch = EpisodeBatch(self.task, self.task.settings(given), n, num_threads, max_episode_steps)
+        self.metadata = {**self.metadata, "render_fps": max(1, round(1 / self.dt))}
+        sizes = len(self.observation_names), len(self.action_names)
         return [spaces.Box(-1.0, 1.0, (size,), np.float32) for size in sizes]
 
     def __setattr__(self, name: str, value: Any) -> None:
@@ -144,13 +135,13 @@ class LegBase(LegProperties, SettingsChanges):
             spec = copy.copy(spec)
             spec.kwargs = {name: as_plain(name, value) for name, value in spec.kwargs.items()}
             if spec.max_episode_steps is None:
-                spec.max_episode_steps = self.batch.steps_per_episode
+                spec.max_episode_steps = self.steps_per_episode
         self._spec = spec
 
     @property
     def settings(self) -> Settings:
         """Settings of the episode; of a vector environment those of every episode that starts from now on."""
-        return self.batch.asked
+        return self.batch.plan.asked
 
     def episode_summary(self) -> dict[str, Any]:
         """Return figures of the episode so far by name, as in `info["episode_summary"]`; in a vector
@@ -181,7 +172,7 @@ class LegBase(LegProperties, SettingsChanges):
     def _checked(self) -> NDArray[np.float32]:
         """Return the observation of the first environment, of which entries from outside are checked."""
         self.batch.check_observed()
-        observation: NDArray[np.float32] = self.batch.observations[0].copy()
+        observation: NDArray[np.float32] = self.batch.rows.observations[0].copy()
         return observation
 
     def action_for(self, gait: str | GaitParameters | NDArray[np.float64]) -> NDArray[np.float32]:
@@ -202,9 +193,7 @@ class LegBase(LegProperties, SettingsChanges):
             raise ParameterError(
                 f"action_for: expected actions that are rates, got actions that are {self.action_form}"
             )
-        actions: NDArray[np.float32] = self._each(
-            self.batch.body.action_for(gait, self.engine, self.batch.dt)
-        )
+        actions: NDArray[np.float32] = self._each(self.body.action_for(gait, self.engine, self.dt))
         return actions
 
     def push(self, forward: ArrayLike, upward: ArrayLike = 0.0, envs: ArrayLike | None = None) -> None:
@@ -219,9 +208,68 @@ class LegBase(LegProperties, SettingsChanges):
             ResetNeeded: there is no episode yet.
         """
         self._check_started("push")
-        push_now(self.batch, forward, upward, envs)
+        self.batch.push(forward, upward, envs)
         for recording in self._watched.values():
             recording.replace()
+
+    @property
+    def commanded_speed(self) -> Any:
+        """Present commanded speed [m/s]; in a vector environment of shape (num_envs,). None where no speed is
+        commanded."""
+        if not self.batch.plan.commands.speeds:
+            return None
+        return self._each(self.batch.rows.named.target[: self.batch.num_envs])
+
+    def command_speed(self, speed: float) -> None:
+        """Command a speed from now to the end of the episode, in all environments.
+
+        Args:
+            speed: the speed, 0.1 to 20 [m/s].
+
+        Raises:
+            ParameterError: no speed is commanded here, or it is out of range.
+            ResetNeeded: there is no episode yet.
+        """
+        self._check_started("command_speed")
+        if not self.batch.plan.commands.speeds:
+            raise ParameterError(f"target_speed: expected an id with a commanded speed, got {self.task.id}")
+        number = check_number("target_speed", speed, low=0.1, high=20.0)
+        self.batch.plan.commands.command(self.batch.rows, slice(self.batch.num_envs), number)
+
+    def touch(self, parameters: Mapping[str, float]) -> bool:
+        """Change physical parameters in the middle of an episode, in the first environment, for somebody who
+        plays with it; the next reset takes them back. Return False, and change nothing, where the present
+        engine cannot run them: they need shorter substeps, or the paper's solver runs.
+
+        Args:
+            parameters: all parameters that differ from the settings, by the names of `settings.PER_EPISODE`.
+
+        Raises:
+            ParameterError: an unknown parameter, one without effect, or one out of range.
+        """
+        plan = self.batch.plan
+        plan.body.check_options({"parameters": dict(parameters)}, self.engine.trunk, plan.settings)
+        needed = plan.randomization.substeps_under(parameters, None)
+        if needed > self.engine.substeps or self.batch.paper:
+            return False
+        plan.randomization.put(self.batch.rows, 0, parameters, self.engine)
+        self.batch.rows.has_overrides[0] = True
+        return True
+
+    def surroundings(self, env: int = 0) -> Surroundings:
+        """Return what is around an environment: ground, trunk, hips, weight, and the kind of its picture."""
+        return surroundings_of(self.batch, env)
+
+    def commands_between(
+        self, before: NDArray[np.float64], after: NDArray[np.float64]
+    ) -> list[tuple[NDArray[np.float64], int]]:
+        """Return the commands of a control step, shape (legs, gait parameters), each with the number of
+        substeps in which it acts.
+
+        Args:
+            before, after: memory of the engine before and after the step, see `TrunkEngine.column`.
+        """
+        return commands_of_step(self.batch, before, after)
 
     def _check_open(self, call: str) -> None:
         """Raise `ClosedEnvironmentError` after `close`; `call` is the name of the method."""
@@ -305,3 +353,149 @@ class LegBase(LegProperties, SettingsChanges):
                 " or truncated = True. You should always call 'reset()' once you receive either -- any"
                 " further steps are undefined behavior."
             )
+
+    # Properties that follow from the settings
+
+    def __repr__(self) -> str:
+        return line_of(type(self).__name__, id=self.task.id, environments=self.batch.num_envs)
+
+    def _repr_html_(self) -> str:
+        """Return what is observed and what actions do, as a table."""
+        entries = zip(self.observation_names, self.observation_units, strict=True)
+        both = [("observation", *entry) for entry in entries]
+        both += [("action", name, "-1 to 1") for name in self.action_names]
+        return html_table(("space", "entry", "unit"), both, f"{self.task.id}: {self.task.summary}")
+
+    @property
+    def resolved_settings(self) -> ResolvedSettings:
+        """Settings with values in place of None: the ground of the preset, the solver's own scheme and
+        step."""
+        return self.batch.settings
+
+    @property
+    def body(self) -> Body:
+        """Body, one leg or a horse."""
+        return self.batch.plan.body
+
+    @property
+    def terms(self) -> tuple[str, ...]:
+        """Keys of the reward's terms in infos."""
+        return self.batch.terms
+
+    @property
+    def weights(self) -> dict[str, float]:
+        """Weights of the reward's terms by name."""
+        return dict(self.batch.plan.weights)
+
+    @property
+    def episode_seconds(self) -> float:
+        """Time limit of an episode [s]."""
+        return self.batch.plan.episode_seconds
+
+    @property
+    def steps_per_episode(self) -> int:
+        """Largest number of control steps of an episode."""
+        return self.batch.plan.steps_per_episode
+
+    @property
+    def geometry(self) -> Geometry:
+        """Geometry of a leg."""
+        return self.body.geometry
+
+    @property
+    def gaits(self) -> dict[str, GaitParameters]:
+        """Gaits of the preset by name; of a horse they are `HorseGait`s."""
+        of_body: Any = self.body.gaits
+        gaits: dict[str, GaitParameters] = of_body
+        return gaits
+
+    @property
+    def engine(self) -> TrunkEngine:
+        """Engine that simulates all environments."""
+        return self.batch.engine
+
+    @property
+    def terrain(self) -> Terrain:
+        """Terrain under the legs."""
+        return self.batch.engine.terrain
+
+    @property
+    def dt(self) -> float:
+        """Control step [s]."""
+        return self.batch.plan.dt
+
+    @property
+    def sim_dt(self) -> float:
+        """Substep of the settings [s], which the engine may divide."""
+        return self.resolved_settings.sim_dt
+
+    @property
+    def observation_names(self) -> tuple[str, ...]:
+        """Names of the observation's entries, in order."""
+        return self.batch.plan.observation_names
+
+    @property
+    def action_names(self) -> tuple[str, ...]:
+        """Names of the actions; a horse's carry the leg as prefix."""
+        return self.batch.plan.action_names
+
+    @property
+    def observation_units(self) -> tuple[str, ...]:
+        """Units of `raw_observation`, in the order of its names."""
+        return tuple(entry.unit for entry in self.batch.plan.observed.entries)
+
+    @property
+    def action_form(self) -> str:
+        """Meaning of actions: "rates" of the gait parameters of one leg, offsets from a horse's
+        gait and their spans, as in "offsets of 0.4 and 0.04 rad", or the form of a map of one's own.
+        States and files of policies contain it, so that those of another form are refused."""
+        return self.batch.plan.action_form
+
+    # Changes of settings
+
+    def change_settings(self, *, envs: ArrayLike | None = None, **changes: Any) -> None:
+        """Change settings from the next reset on, for a curriculum. The present episode continues with the
+        old ones. In a vector environment each environment takes the new ones when it starts again, by itself
+        or by `reset`.
+
+        Args:
+            envs: environments that take them, as indices or as a mask; None for all.
+            changes: some of the settings of `row_plans.CHANGEABLE`, as for `gymnasium.make`. Afterwards the
+                environment is as if it had been made with them.
+
+        Raises:
+            ParameterError: a value is out of range, or the settings do not fit together; nothing has changed
+                then.
+            FixedSettingError: another setting.
+        """
+        self._check_open("change_settings")
+        for name in changes:
+            if name in SETTINGS and name not in CHANGEABLE:
+                raise FixedSettingError(
+                    f"change_settings: expected some of {', '.join(CHANGEABLE)}, got {name!r}, which stays as"
+                    " it was made"
+                )
+        new = {name: as_plain(name, value) for name, value in changes.items()}
+        rows = which_of(envs, self.batch.num_envs)
+        if not rows.size:
+            self.batch.plan_of(self.task.settings({**self._given[0], **new}))
+        # Rows that were given the same settings share the mapping, and go on to share it.
+        groups: dict[int, list[int]] = {}
+        for row in rows.tolist():
+            groups.setdefault(id(self._given[row]), []).append(row)
+        given = [{**self._given[group[0]], **new} for group in groups.values()]
+        asked = [self.task.settings(each) for each in given]
+        if SPEED in new and "schedule" not in new:
+            for settings in asked:
+                check_unscheduled(SPEED, settings)
+        self.batch.change(asked, [*groups.values()])
+        for each, group in zip(given, groups.values(), strict=True):
+            for row in group:
+                self._given[row] = each
+
+    def _take_given(self) -> None:
+        """Go on, after a state, from the settings of its rows."""
+        shared: dict[int, dict[str, Any]] = {}
+        for row in range(self.batch.num_envs):
+            asked = self.batch.row_plans.pending_of(row).asked
+            self._given[row] = shared.setdefault(id(asked), dict(vars(asked)))

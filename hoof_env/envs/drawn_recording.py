@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from typing import Any
 
-from hoof_env.envs.batch import EpisodeBatch
-from hoof_env.envs.recording import Recording, surroundings_of
+from hoof_env.episodes.batch import EpisodeBatch
+from hoof_env.episodes.recording import Recording, surroundings_of
 from hoof_env.record.instant import instants
 from hoof_env.render.renderer import Renderer
 from hoof_env.render.size import USUAL_SIZE

@@ -15,13 +15,13 @@ from numpy.typing import NDArray
 
 from hoof_env.dynamics.parts import broken
 from hoof_env.envs.arguments import EnvArguments, takes
-from hoof_env.envs.base import LegBase, array_of, generator_of
-from hoof_env.envs.batch_reports import ending_of
-from hoof_env.envs.batch_starts import check_options
-from hoof_env.envs.batch_states import check_single, set_state
+from hoof_env.envs.base import LegBase, array_of
 from hoof_env.envs.drawn_recording import DrawnRecording
-from hoof_env.envs.infos import name_columns
-from hoof_env.envs.step import SOME_SWITCHED
+from hoof_env.envs.generators import generator_of
+from hoof_env.episodes.infos import name_columns
+from hoof_env.episodes.states import check_single, set_state
+from hoof_env.episodes.step import SOME_SWITCHED
+from hoof_env.episodes.summaries import ending_of
 from hoof_env.errors import ParameterError, count, flag
 from hoof_env.render.size import USUAL_SIZE
 from hoof_env.simd.compile import BLOCKS
@@ -68,27 +68,26 @@ class HorseLegEnv(LegBase, gym.Env[NDArray[np.float32], NDArray[np.float32]]):
 
     def _attach(self) -> None:
         """Collect what a step reads, writes or calls: looking it up costs as much as a substep."""
-        batch = self.batch
-        terms = self.task.terms
-        weighted = [(k, term) for k, term in enumerate(terms) if batch.weights[term.name]]
+        batch, rows = self.batch, self.batch.rows
+        weighted = [(k, term) for k, term in enumerate(self.task.terms) if batch.plan.weights[term.name]]
         # Terms that can differ from 0 before the end of an episode; infos start with 0 for the others.
         paid = [(term.key, k) for k, term in weighted if term.compute is not failure]
         self._views: tuple[Any, ...] = (
-            batch.actions[0].data,
-            batch.direct_kernel(),
-            batch.held,
+            rows.actions[0].data,
+            batch.direct_step(),
+            batch.calls.held,
             bool(batch.drawn_names),
             paid,
-            batch.episode_rows.terms[:, 0],
-            batch.rewards.data,
-            self._checked if batch.has_own_entries else batch.observations[0].copy,
+            rows.named.terms[:, 0],
+            rows.rewards.data,
+            self._checked if batch.plan.observed.has_user_entries else rows.observations[0].copy,
             batch.measurements.reader(batch.engine.arrays[0][:, 0]),
         )
 
     @property
     def weight(self) -> float:
         """Weight of trunk and leg [N]."""
-        return float(self.batch.episode_rows.weight[0])
+        return float(self.batch.rows.named.weight[0])
 
     def _each(self, values: Any) -> Any:
         return values[0] if np.ndim(values) > 1 else float(values[0])
@@ -120,12 +119,12 @@ class HorseLegEnv(LegBase, gym.Env[NDArray[np.float32], NDArray[np.float32]]):
             ParameterError: a bad seed or option; nothing has changed then.
         """
         self._check_open("reset")
-        checked = check_options(self.batch, options)  # first, so that a refused reset changes nothing
+        checked = self.batch.check_options(options)  # first, so that a refused reset changes nothing
         super().reset(seed=None if seed is None else count("seed", seed, low=0))
         self.batch.restart_schedules([] if seed is None else [0])
-        before = self.batch.held
+        before = self.batch.calls
         parameters = self.batch.reset([0], [self.np_random], checked)
-        if self.batch.held is not before:  # `change_settings` took effect: other arrays
+        if self.batch.calls is not before:  # `change_settings` took effect: other arrays
             self._attach()
         self._phase = "running"
         if self._watched:
@@ -163,7 +162,7 @@ class HorseLegEnv(LegBase, gym.Env[NDArray[np.float32], NDArray[np.float32]]):
         except (TypeError, ValueError, BufferError):
             self._read_action(action)
         # not through the batch, unless kernels are looked into: a call costs as much as a substep
-        happened = self.batch.kernel(held) if BLOCKS else kernel(held)
+        happened = self.batch.calls.step(held) if BLOCKS else kernel(held)
         measured = measure()  # before a push that is due, which changes speeds at once
         ended = happened != 0 and self._follow(happened)
         info = self._begun[0]()  # has all keys already, in the order of the reset's info
@@ -176,7 +175,7 @@ class HorseLegEnv(LegBase, gym.Env[NDArray[np.float32], NDArray[np.float32]]):
         failed = truncated = False
         if ended:
             info.update(zip(self.batch.terms, terms, strict=True))
-            failed = bool(self.batch.episode_rows.ended[0] == FAILED)
+            failed = bool(self.batch.rows.named.ended[0] == FAILED)
             truncated = not failed
             if self._phase == "running":
                 self._phase = "ended"
@@ -199,31 +198,31 @@ class HorseLegEnv(LegBase, gym.Env[NDArray[np.float32], NDArray[np.float32]]):
 
     def _begin(self) -> None:
         """Make the info that steps of this episode copy: values of its start, keys for those of a step."""
-        row = self.batch.start_values[:, 0].copy()
-        body = self.batch.body
-        first = self.batch.start_row_count
+        row = self.batch.rows.start_values[:, 0].copy()
+        body = self.body
+        first = len(self.batch.plan.start_names)
         info = dict[str, Any](zip(body.start_names, row, strict=False))
         info["gait"] = gait = name_columns(row[len(body.start_names) : first], body.gait_names)
         if self.batch.drawn_names:
             info["parameters"] = name_columns(row[first:], self.batch.drawn_names)
-        if self.batch.target_speed:
-            info["target_speed"] = self.batch.episode_rows.target[0]
+        if self.batch.plan.commands.speeds:
+            info["target_speed"] = self.batch.rows.named.target[0]
         info |= {"measured": None, **dict.fromkeys(self.batch.terms, np.float64(0.0))}
         self._began_with = self._start_and_target()
         self._begun = (info.copy, gait.copy)
 
     def _start_and_target(self) -> tuple[bytes, float]:
         """Return the part of infos that no step measures, to notice when it changes."""
-        return self.batch.start_values.tobytes(), float(self.batch.episode_rows.target[0])
+        return self.batch.rows.start_values.tobytes(), float(self.batch.rows.named.target[0])
 
     def _read_action(self, action: Any) -> None:
         """Convert and store an action; raise `ParameterError` for a wrong shape or type."""
         array = array_of(action)
-        count = len(self.batch.action_names)
+        count = len(self.action_names)
         if array.shape != (count,) or array.dtype.kind not in "fiu":
             raise ParameterError(f"action: expected {count} finite numbers in [-1, 1], got {action!r}")
         with np.errstate(over="ignore"):  # to infinity, which the kernel refuses
-            self.batch.actions[0] = array
+            self.batch.rows.actions[0] = array
 
     def render(self) -> NDArray[np.uint8] | None:
         """Draw the present state, a uint8 array of shape (H, W, 3) or a window; warn without a mode."""
@@ -263,7 +262,7 @@ class HorseLegEnv(LegBase, gym.Env[NDArray[np.float32], NDArray[np.float32]]):
             self._take_given()
             self._attach()
         self.np_random = generator
-        self._phase = "ended" if self.batch.episode_rows.ended[0] else "running"
+        self._phase = "ended" if self.batch.rows.named.ended[0] else "running"
         if self._start_and_target() != self._began_with:  # a planner's states are of one episode
             self._begin()
         if self._watched:
@@ -306,7 +305,7 @@ class RandomizeParameters(gym.Wrapper[Any, Any, Any, Any], RecordConstructorArgs
         leg = env.unwrapped
         if not isinstance(leg, HorseLegEnv):
             raise ParameterError(f"env: expected a leg of this package, got {type(leg).__name__}")
-        check_options(leg.batch, {"parameters": ranges})
+        leg.batch.check_options({"parameters": ranges})
         RecordConstructorArgs.__init__(self, ranges=dict(ranges), enabled=enabled)
         gym.Wrapper.__init__(self, env)
         self.ranges = dict(ranges)

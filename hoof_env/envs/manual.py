@@ -16,17 +16,17 @@ from pathlib import Path
 from string import Template
 from typing import Any
 
+from hoof_env._display import Markdown
 from hoof_env._output import markdown_table
 from hoof_env.dynamics.layout import Features
 from hoof_env.dynamics.memory import LIFT_OFF
 from hoof_env.envs.horse_leg import HorseLegMOEnv
-from hoof_env.envs.infos import measured_names
 from hoof_env.envs.manual_bodies import page_of_body
 from hoof_env.envs.manual_common import own_sections, sections_left, shared_sections, without_common
 from hoof_env.envs.manual_words import HERE, TABLES, WORDS, rows_of
 from hoof_env.envs.policies import STANDS_FOR
 from hoof_env.envs.shipped import is_one_episode, shipped_returns
-from hoof_env.envs.shown import Markdown
+from hoof_env.episodes.infos import measured_names
 from hoof_env.errors import DataFileError, OutputError, check_choice
 from hoof_env.render.size import USUAL_SIZE
 from hoof_env.tasks import observation

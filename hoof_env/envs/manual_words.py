@@ -10,7 +10,7 @@ from typing import Any
 
 from hoof_env.dynamics.parts import ONE_LEG
 from hoof_env.dynamics.stepping import SCHEMES
-from hoof_env.envs.batch_reports import SUMMARY
+from hoof_env.episodes.summaries import SUMMARY
 from hoof_env.gait import WIDEST, FilterSettings
 from hoof_env.ground.laws import FRICTION_LAWS, NORMAL_LAWS
 from hoof_env.leg.presets import preset_names, presets_of_paper

@@ -84,11 +84,11 @@ def open_loop(parameters: Mapping[str, Any], env: Any, blind: bool = True) -> Sc
         if env.action_form != "rates":
             raise ParameterError("constant: expected an environment of one leg, got a horse")
         constant = np.asarray(parameters["constant"], float)
-        env.batch.body.check_reachable("constant", constant)
+        env.body.check_reachable("constant", constant)
         return Scripted(towards(env, lambda observation, time: constant), env.dt)
     numbers_at = _phase_gait(parameters, env, blind)
     if env.action_form == "rates":
-        body = env.batch.body
+        body = env.body
 
         def gait_at(observation: Any, time: Any) -> Any:
             return np.clip(numbers_at(observation, time)[..., 0, :], body.low, body.high)

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from hoof_env.envs.shown import line_of
+from hoof_env._display import line_of
 from hoof_env.errors import ParameterError, check_choice
 from hoof_env.gait import LIMITS, GaitParameters, paper_gaits
 from hoof_env.leg.profile import leg_profile
@@ -82,7 +82,7 @@ def start_of(policy: Any) -> dict[str, Any]:
 
 def policy_names(env: Any) -> list[str]:
     """Return the names that `make_policy` accepts for an environment, see `body.Body.policy_names`."""
-    return list(env.unwrapped.batch.body.policy_names)
+    return list(env.unwrapped.body.policy_names)
 
 
 def heading_seen(env: Any) -> Any:
@@ -102,8 +102,8 @@ def heading_seen(env: Any) -> Any:
     first = names.index("crank speed")
     middle = first + len(LIMITS)
     last = middle + len(LIMITS)
-    body = leg.batch.body
-    lead = lead_of(body.filters, leg.batch.dt)
+    body = leg.body
+    lead = lead_of(body.filters, leg.dt)
     rate_bounds = body.filters.to_array()[:, 1]
 
     def heading(observation: Any) -> Any:
@@ -123,9 +123,9 @@ def heading_seen(env: Any) -> Any:
 def towards(env: Any, gait_at: Any) -> Any:
     """Return a function of observations and times that returns the actions towards the gait that `gait_at`
     returns for them, as fast as is allowed; see `LegBase.action_for`."""
-    batch = env.unwrapped.batch
+    leg = env.unwrapped
     heading = heading_seen(env)
-    reach = batch.body.reach(batch.engine, batch.dt)
+    reach = leg.body.reach(leg.engine, leg.dt)
 
     def act(observation: Any, time: Any) -> Action:
         return action_towards(np.asarray(gait_at(observation, time), float), heading(observation), reach)
@@ -175,7 +175,7 @@ def make_policy(name: str, env: Any, seed: int = 0) -> Scripted:
 
 def _scripted(name: str, env: Any, leg: Any, seed: int) -> Scripted:
     """Make the policy of a known name, see `make_policy`; `leg` is the unwrapped environment."""
-    count = len(leg.batch.action_names)
+    count = len(leg.action_names)
     if name in ("zero", "reference"):
         return Scripted(lambda observation, time: np.zeros(count, np.float32), leg.dt)
     if name == "random":
@@ -210,7 +210,7 @@ def constant_gait(gait: GaitParameters, env: Any, starts_in_it: bool = False) ->
         ParameterError: the gait cannot be commanded.
     """
     values = gait.to_array()
-    env.unwrapped.batch.body.check_reachable("gait", values)
+    env.unwrapped.body.check_reachable("gait", values)
     start = {"gait": gait} if starts_in_it else None
     return Scripted(towards(env, lambda observation, time: values), env.unwrapped.dt, start)
 
@@ -230,7 +230,7 @@ def _at_a_posture(name: str, env: Any, middle: float) -> Scripted:
             f"policy {name!r}: expected 'crank' among the observed groups, got {leg.settings.observation!r}"
         )
     sine, cosine = map(leg.observation_names.index, seen)
-    brakes = leg.batch.body.rates[0]
+    brakes = leg.body.rates[0]
     offsets = np.linspace(*LIMITS["swing_offset"], 14) if name == "airborne" else [middle]
     rests = np.array([(0.0, offset, 0.0, 0.0) for offset in offsets])
     posture, target = extreme_posture(leg_profile(leg.geometry), rests, name == "drag")

@@ -13,10 +13,8 @@ from stable_baselines3.common.vec_env import VecEnv
 
 from hoof_env.envs.arguments import Sb3Arguments, takes
 from hoof_env.envs.base import fixed_setting
-from hoof_env.envs.batch_starts import check_options
-from hoof_env.envs.infos import row_of
-from hoof_env.envs.rows import PER_ENV
-from hoof_env.envs.vector import HorseLegVectorEnv
+from hoof_env.envs.vector import PER_ENV, HorseLegVectorEnv
+from hoof_env.episodes.infos import row_of
 from hoof_env.errors import ParameterError
 from hoof_env.tasks.settings import SETTINGS
 
@@ -73,7 +71,7 @@ class Sb3VecEnv(VecEnv):
         self.envs = envs
         self.render_mode = envs.render_mode
         self._actions: NDArray[Any] | None = None
-        self.terms = {name: np.zeros(num_envs) for name in envs.batch.terms}
+        self.terms = {name: np.zeros(num_envs) for name in envs.terms}
         super().__init__(num_envs, envs.single_observation_space, envs.single_action_space)
 
     def __setattr__(self, name: str, value: Any) -> None:
@@ -100,7 +98,7 @@ class Sb3VecEnv(VecEnv):
                 rows.append(env)
         # All before the first reset, so that refused options change nothing.
         for options, _ in groups:
-            check_options(self.envs.batch, options)
+            self.envs.batch.check_options(options)
         self.reset_infos: list[dict[str, Any]] = [{} for _ in range(self.num_envs)]
         for options, rows in groups:
             mask = np.zeros(self.num_envs, bool)

@@ -8,7 +8,7 @@ those of `SyncVectorEnv` do.
 from __future__ import annotations
 
 import copy
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any, ClassVar
 
 import gymnasium as gym
@@ -19,20 +19,107 @@ from gymnasium.vector.utils import batch_space
 from numpy.typing import NDArray
 
 from hoof_env.envs.arguments import VectorArguments, takes
-from hoof_env.envs.batch_reports import endings_of, infos_of
-from hoof_env.envs.batch_starts import check_options
+from hoof_env.envs.base import LegBase, array_of, fixed_setting
 from hoof_env.envs.drawn_recording import DrawnRecording
-from hoof_env.envs.infos import name_columns
-from hoof_env.envs.row_states import RowStates
-from hoof_env.envs.rows import RowAttributes, RowSeeds
-from hoof_env.envs.vector_checks import check_actions, check_drawn, check_mask
+from hoof_env.envs.generators import Generators, generator_of
+from hoof_env.episodes.infos import name_columns
+from hoof_env.episodes.states import set_state, spread_state
+from hoof_env.episodes.summaries import endings_of, infos_of
 from hoof_env.errors import ParameterError, count
 from hoof_env.render.size import USUAL_SIZE
 from hoof_env.tasks.episode import FAILED, TRUNCATED
+from hoof_env.tasks.settings import SETTINGS
 
 Floats = NDArray[np.float64]
 
-MOST_ENVS = 1_000_000  # largest number of environments
+MOST_ENVS = 1_000_000
+"""Largest number of environments."""
+
+MOST_DRAWN = 16
+"""Largest number of environments that are drawn by default; a picture takes as long as some hundred steps."""
+
+PER_ENV = (
+    "weight",
+    "render",
+    "episode_summary",
+    "raw_observation",
+    "record",
+    "np_random",
+    "np_random_seed",
+    "action_for",
+    "commanded_speed",
+)
+"""Attributes and methods with a value for each environment; the others have one value for all."""
+
+SINGLE_SPACES = {"action_space": "single_action_space", "observation_space": "single_observation_space"}
+"""Names of the vector environment for attributes of a single one."""
+
+
+def check_drawn(rendered: Any, n: int, render_mode: str | None) -> int:
+    """Return the number of environments that are drawn.
+
+    Args:
+        rendered: argument of `HorseLegVectorEnv`.
+        n: number of environments.
+        render_mode: render mode.
+
+    Raises:
+        ParameterError: more environments than there are, a number without a render_mode, or no number for
+            more than `MOST_DRAWN` environments.
+    """
+    if render_mode is None:
+        if rendered is not None:
+            raise ParameterError(f"rendered: expected none without a render_mode, got {rendered!r}")
+        return 0
+    if rendered is None and n > MOST_DRAWN:
+        raise ParameterError(
+            f"rendered: expected how many of the {n} environments to draw, as they are more than"
+            f" {MOST_DRAWN}; for Gymnasium's RecordVideo rendered=1 goes with record_first_only=True"
+        )
+    drawn = n if rendered is None else count("rendered", rendered)
+    if drawn > n:
+        raise ParameterError(f"rendered: expected at most num_envs={n}, got {drawn}")
+    return drawn
+
+
+def check_mask(given: Any, n: int) -> NDArray[np.bool_]:
+    """Return the reset option "reset_mask" of n environments, shape (n,); None stands for all.
+
+    Raises:
+        ParameterError: not a bool array of that shape, or one without a True.
+    """
+    if given is None:
+        return np.ones(n, bool)
+    good = isinstance(given, np.ndarray) and given.dtype == bool and given.shape == (n,)
+    if not (good and given.any()):
+        raise ParameterError(
+            f"options['reset_mask']: expected a bool array of shape ({n},) with at least one True, "
+            f"got {given!r}"
+        )
+    mask: NDArray[np.bool_] = given
+    return mask
+
+
+def check_actions(actions: Any, shape: tuple[int, int]) -> NDArray[np.float32]:
+    """Convert actions to float32.
+
+    Raises:
+        ParameterError: another shape or type, or numbers that are not finite.
+    """
+    array = array_of(actions)
+    if array.dtype.kind not in "fiu" or array.shape != shape:
+        raise ParameterError(
+            f"actions: expected finite numbers in [-1, 1], shape {shape}, "
+            f"got {array.dtype} of shape {array.shape}"
+        )
+    # Too large numbers become infinite in float32, which is refused below.
+    with np.errstate(over="ignore"):
+        array = array.astype(np.float32, copy=False)
+    # The kernel checks, too, but does not know which rows are wrong.
+    if not np.isfinite(array).all():
+        rows = np.flatnonzero(~np.isfinite(array).all(1)).tolist()
+        raise ParameterError(f"actions: expected finite numbers in [-1, 1], got others in rows {rows[:8]}")
+    return array
 
 
 def mode_of(value: Any) -> AutoresetMode:
@@ -49,9 +136,7 @@ def mode_of(value: Any) -> AutoresetMode:
         raise ParameterError(f"autoreset_mode: expected one of {names}, got {value!r}") from None
 
 
-class HorseLegVectorEnv(  # type: ignore[misc]  # generators are of all
-    RowSeeds, RowAttributes, RowStates, VectorEnv[NDArray[np.float32], NDArray[np.float32], NDArray[Any]]
-):
+class HorseLegVectorEnv(LegBase, VectorEnv[NDArray[np.float32], NDArray[np.float32], NDArray[Any]]):
     """`num_envs` environments of a task, stepped together.
 
     >>> import gymnasium as gym, hoof_env
@@ -107,9 +192,9 @@ class HorseLegVectorEnv(  # type: ignore[misc]  # generators are of all
     ) -> None:
         self.num_envs = count("num_envs", num_envs, most=MOST_ENVS)
         self.autoreset_mode = mode_of(autoreset_mode)
-        spaces = self._make(task, settings, self.num_envs, render_mode, (width, height), num_threads)
-        if max_episode_steps is not None:
-            self.batch.limit(count("max_episode_steps", max_episode_steps))
+        steps = None if max_episode_steps is None else count("max_episode_steps", max_episode_steps)
+        size = width, height
+        spaces = self._make(task, settings, self.num_envs, render_mode, size, num_threads, steps)
         self.single_observation_space, self.single_action_space = spaces
         self.observation_space = batch_space(self.single_observation_space, self.num_envs)
         self.action_space = batch_space(self.single_action_space, self.num_envs)
@@ -118,8 +203,7 @@ class HorseLegVectorEnv(  # type: ignore[misc]  # generators are of all
         self.drawn = check_drawn(rendered, self.num_envs, self.render_mode)
         self._watched = {env: DrawnRecording(self.batch, env, self._size) for env in range(self.drawn)}
         self._attributes: dict[str, dict[int, Any]] = {}
-        self._generators: list[np.random.Generator] = []
-        self._seeds: list[int] = []
+        self._generators = Generators(self.num_envs)
         self._ended = np.zeros(self.num_envs, bool)
         self._started = np.zeros(self.num_envs, bool)
 
@@ -146,8 +230,9 @@ class HorseLegVectorEnv(  # type: ignore[misc]  # generators are of all
         rest: Any = dict(options) if isinstance(options, Mapping) else options
         mask = check_mask(rest.pop("reset_mask", None) if isinstance(rest, dict) else None, self.num_envs)
         # Before the generators are seeded, so that a refused reset changes nothing.
-        checked = check_options(self.batch, rest, np.flatnonzero(mask))
-        self._seed(seed, mask)
+        checked = self.batch.check_options(rest, np.flatnonzero(mask))
+        seeded = self._generators.seed(seed, np.flatnonzero(mask).tolist())
+        self.batch.restart_schedules(seeded)
         parameters = self._start(np.flatnonzero(mask), checked)
         self._ended[mask] = False
         observations = self._observed()
@@ -188,9 +273,9 @@ class HorseLegVectorEnv(  # type: ignore[misc]  # generators are of all
                 f"step() was called although episodes {np.flatnonzero(again).tolist()} ended: "
                 "expected reset(options={'reset_mask': ...})"
             )
-        batch.actions[:n] = check_actions(actions, (n, len(batch.action_names)))
-        some_ended = batch.step(self._generators, again)
-        how = batch.episode_rows.ended[:n]
+        batch.rows.actions[:n] = check_actions(actions, (n, len(self.action_names)))
+        some_ended = batch.step(self._generators.all, again)
+        how = batch.rows.named.ended[:n]
         terminated = how == FAILED
         truncated = how == TRUNCATED
         # NEXT_STEP: these environments start in this call; their step above does not count.
@@ -200,7 +285,7 @@ class HorseLegVectorEnv(  # type: ignore[misc]  # generators are of all
             self._start(np.flatnonzero(again), {})
         done = terminated | truncated
         infos = infos_of(batch, some_ended)
-        rewards = batch.rewards[:n].copy()
+        rewards = batch.rows.rewards[:n].copy()
         if done.any():
             infos |= endings_of(batch, done)
         if done.any() and self.autoreset_mode == AutoresetMode.SAME_STEP:
@@ -222,7 +307,7 @@ class HorseLegVectorEnv(  # type: ignore[misc]  # generators are of all
         # Objects, as Gymnasium gives final observations: None for the other environments.
         last = np.full(self.num_envs, None, dtype=object)
         for env in np.flatnonzero(done):
-            last[env] = self.batch.observations[env].copy()
+            last[env] = self.batch.rows.observations[env].copy()
         self._remember()
         self._start(np.flatnonzero(done), {})
         infos: dict[str, Any] = infos_of(self.batch)
@@ -257,7 +342,7 @@ class HorseLegVectorEnv(  # type: ignore[misc]  # generators are of all
     @property
     def weight(self) -> Floats:
         """Weight of trunk and leg [N], shape (num_envs,)."""
-        return self.batch.episode_rows.weight[: self.num_envs].copy()
+        return self.batch.rows.named.weight[: self.num_envs].copy()
 
     def record(self, env: int = 0) -> dict[str, Floats]:
         """Return state and report of an environment at every substep of the last control step, see
@@ -288,3 +373,165 @@ class HorseLegVectorEnv(  # type: ignore[misc]  # generators are of all
         for env, recording in self._watched.items():
             if not self._ended[env]:  # else it has just started, and `_start` began its recording
                 recording.add()
+
+    # Generators
+
+    @property  # type: ignore[override]  # of all rows
+    def np_random(self) -> tuple[np.random.Generator, ...]:
+        """Generator of each environment. A generator that is assigned seeds all of them; a list assigns one
+        to each."""
+        return self._generators.all
+
+    @np_random.setter
+    def np_random(self, value: np.random.Generator | Sequence[np.random.Generator]) -> None:
+        self._generators.assign(value)
+
+    @property
+    def np_random_seed(self) -> tuple[int, ...]:  # type: ignore[override]
+        """Seed of each environment, -1 if its generator was assigned or is from a state; like that of
+        Gymnasium's `SyncVectorEnv`."""
+        # Reading `np_random` makes the generators, if there are none yet.
+        return tuple(self._generators.seeds) if self.np_random else ()
+
+    # Methods and attributes of each environment
+
+    def call(self, name: str, *args: Any, **kwargs: Any) -> tuple[Any, ...]:
+        """Return the results of a method, or the values of an attribute, of each environment.
+
+        Args:
+            name: name in `HorseLegEnv`, or one set by `set_attr`. A method of all environments together, such
+                as `get_state`, is called once, and each environment has its result.
+            args, kwargs: arguments of the method.
+
+        Raises:
+            AttributeError: there is no such method or attribute.
+            ParameterError: "reset" or "step", which take arrays of all environments.
+        """
+        return tuple(self.call_on(name, range(self.num_envs), *args, **kwargs))
+
+    def get_attr(self, name: str) -> tuple[Any, ...]:
+        """Return an attribute of each environment, see `call`."""
+        return self.call(name)
+
+    def set_attr(self, name: str, values: Any) -> None:
+        """Store an attribute per environment; `get_attr` returns it.
+
+        Args:
+            name: name of the attribute. "np_random" assigns the generators.
+            values: list or tuple with a value for each environment, or another object for all.
+
+        Raises:
+            FixedSettingError: a setting, or another attribute that the environments have.
+            ParameterError: a list of another length.
+        """
+        each = list(values) if isinstance(values, (list, tuple)) else [values] * self.num_envs
+        if len(each) != self.num_envs:
+            raise ParameterError(f"values: expected one or {self.num_envs}, got {len(each)}")
+        self.set_attr_of(name, dict(enumerate(each)))
+
+    def set_attr_of(self, name: str, values: Mapping[int, Any]) -> None:
+        """Store an attribute of some environments, values by index; see `set_attr`."""
+        if name == "np_random":
+            self.np_random = [values.get(env, present) for env, present in enumerate(self.np_random)]
+            return
+        if name in SETTINGS or hasattr(self, name):
+            raise fixed_setting(name)
+        self._attributes.setdefault(name, {}).update(values)
+
+    def call_on(self, name: str, envs: Iterable[int], /, *args: Any, **kwargs: Any) -> list[Any]:
+        """Return the results of a method or attribute of some environments, see `call`."""
+        chosen = list(envs)
+        # Methods of Gymnasium's wrappers, which take the name as their first argument.
+        if name == "get_wrapper_attr":
+            return self.call_on(*args, chosen, **kwargs)
+        if name == "has_wrapper_attr":
+            return [self._has(env, *args, **kwargs) for env in chosen]
+        if name in self._attributes:
+            if lacks := [env for env in chosen if env not in self._attributes[name]]:
+                raise AttributeError(f"environments {lacks} have no attribute {name!r}")
+            return [self._attributes[name][env] for env in chosen]
+        if name in ("reset", "step"):
+            raise ParameterError(f"call: {name!r} is of all together; expected envs.{name}(...)")
+        # Of these environments alone, as by `indices` of Stable-Baselines3.
+        if name == "change_settings":
+            if "envs" in kwargs and len(set(chosen)) < self.num_envs:
+                raise ParameterError(f"envs: expected none beside indices {chosen}, got {kwargs['envs']!r}")
+            some = None if len(set(chosen)) == self.num_envs else chosen
+            self.change_settings(*args, **{"envs": some, **kwargs})
+            return [None] * len(chosen)
+        if name == "settings":
+            return [self.batch.row_plans.pending_of(env).asked for env in chosen]
+        # Only environments that are asked for keep their substeps.
+        if name == "record":
+            return [self.record(env) for env in chosen]
+        name = SINGLE_SPACES.get(name, name)
+        if name.startswith("_") or not hasattr(self, name):
+            raise AttributeError(f"{type(self).__name__}: the environments have no attribute {name!r}")
+        value = getattr(self, name)
+        value = value(*args, **kwargs) if callable(value) else value
+        if name not in PER_ENV or value is None:
+            return [value] * len(chosen)
+        # Figures by name, an array of all environments each.
+        if isinstance(value, dict):
+            return [{key: values[env] for key, values in value.items()} for env in chosen]
+        return [value[env] for env in chosen]
+
+    def _has(self, env: int, name: str) -> bool:
+        """True if an environment has an attribute."""
+        try:
+            self.call_on(name, [env])
+        except AttributeError:
+            return False
+        return True
+
+    # States
+
+    def _observed(self) -> NDArray[np.float32]:
+        """Return the observations, a copy that later steps do not change."""
+        self.batch.check_observed()
+        return self.batch.rows.observations[: self.num_envs].copy()
+
+    def get_state(self) -> dict[str, Any]:
+        """Return everything that changes, generators included: episodes that continue from it have the same
+        bits.
+
+        Raises:
+            ResetNeeded: there are no episodes yet.
+        """
+        state = self._state_of_batch()
+        return {**state, "ended": self._ended.copy(), "generator": self._generators.states()}
+
+    def set_state(self, state: Mapping[str, Any]) -> NDArray[np.float32]:
+        """Restore a state of `get_state`; return the observations. With a state of a single environment every
+        row continues from it, so that many actions can be tried from one state.
+
+        Raises:
+            ParameterError: a state of another id, geometry, setting or number of environments.
+        """
+        if isinstance(state, Mapping) and isinstance(state.get("generator"), Mapping):
+            self._check_state(state)
+            state = spread_state(self.batch, state)
+        self._check_state(state, "ended")
+        n = self.num_envs
+        states = state["generator"]
+        ended = array_of(state["ended"]).copy()
+        if ended.dtype != bool or ended.ndim != 1:
+            raise ParameterError(
+                f"state['ended']: expected a bool array of shape ({n},), got {state['ended']!r}"
+            )
+        if ended.size != n:
+            raise ParameterError(f"state: expected one of {n} environments, got one of {ended.size}")
+        if not isinstance(states, (list, tuple)) or len(states) != n:
+            raise ParameterError(f"state['generator']: expected a list of {n}, got {states!r:.60}")
+        # The last checks: nothing has changed until here.
+        generators = [generator_of(values) for values in states]
+        set_state(self.batch, state)
+        if "rows" in state:
+            self._take_given()
+        self._ended = ended
+        self._started = np.ones(n, bool)
+        self._generators.assign(generators)
+        self._phase = "running"
+        for recording in self._watched.values():
+            recording.begin()
+        return self._observed()

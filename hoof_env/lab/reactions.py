@@ -11,8 +11,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from hoof_env.dynamics.engine import TrunkEngine
-from hoof_env.envs.recording import commands_of_step
 from hoof_env.errors import ParameterError
 from hoof_env.leg.mechanism import FRAME, Mechanism
 
@@ -48,31 +46,15 @@ class JointReactions:
     """
 
     def __init__(self, env: Any) -> None:
-        self._batch = batch = env.unwrapped.batch
-        if batch.paper:
+        self._env = leg = env.unwrapped
+        if leg.resolved_settings.solver == "paper":
             raise ParameterError('reactions: expected an environment with solver="exact", got solver="paper"')
-        e = batch.engine
         # The environment's engine has kernels without reactions, which are faster.
-        self._engine = TrunkEngine(
-            e.limbs,
-            e.trunk,
-            e.ground,
-            e.terrain,
-            sim_dt=e.sim_dt,
-            integrator=e.integrator,
-            substeps=e.substeps,
-            step_error=e.step_error,
-            harmonics=e.features.harmonics,
-            filters=e.filters,
-            reactions=True,
-            strides=e.counts_strides,
-            limits=e.motion_limits,
-            contact_law=e.contact_law,
-        )
+        self._engine = leg.engine.alone(reactions=True)
 
     def before(self) -> NDArray[np.float64]:
         """Return the memory of the environment's engine, for `after`."""
-        column: NDArray[np.float64] = self._batch.engine.column(0)
+        column: NDArray[np.float64] = self._env.engine.column(0)
         return column
 
     def now(self) -> NDArray[np.float64]:
@@ -86,7 +68,7 @@ class JointReactions:
         the columns of `reaction_units`."""
         self._engine.set_column(0, before)
         rows: list[NDArray[np.float64]] = []
-        for command, count in commands_of_step(self._batch, before, self.before()):
+        for command, count in self._env.commands_between(before, self.before()):
             for _ in range(min(count, steps - len(rows))):
                 self._engine.advance(command, 1)
                 rows.append(self._row())

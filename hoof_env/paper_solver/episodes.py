@@ -57,6 +57,27 @@ class Scheme(NamedTuple):
     integrator: str
 
 
+def check_settings(settings: Any) -> None:
+    """Check that the solver supports the settings of an environment, `tasks.settings.Settings`.
+
+    Raises:
+        ParameterError: it does not.
+    """
+    only = {
+        "trunk": "fixed",
+        "drive": "prescribed",
+        "terrain": None,
+        "randomize": None,
+        "schedule": None,
+        "hoof_stiffness": None,
+    }
+    for name, expected in only.items():
+        value = getattr(settings, name)
+        # An empty mapping is as good as None.
+        if value != expected and not (expected is None and not value):
+            raise ParameterError(f'{name}: expected {expected!r} with solver="paper", got {value!r}')
+
+
 class PaperSolver:
     """Legs solved as in the paper, one for each environment of an engine.
 
@@ -236,3 +257,18 @@ class PaperSolver:
             "travel": travel,
             "slip": slip,
         }
+
+
+def solver_of(settings: Any, engine: TrunkEngine, substeps: int) -> PaperSolver | None:
+    """Return the solver of the settings of an environment, None where the engine's kernels solve.
+
+    Args:
+        settings: settings, `tasks.settings.ResolvedSettings`.
+        engine: engine with the memory that the solver reads and writes.
+        substeps: substeps of a control step.
+    """
+    if settings.solver != "paper":
+        return None
+    s = settings
+    scheme = Scheme(s.sim_dt, s.baumgarte_alpha, s.baumgarte_beta, s.integrator)
+    return PaperSolver(scheme, engine, substeps)

@@ -9,7 +9,7 @@ from typing import Any, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from hoof_env.envs.shown import line_of
+from hoof_env._display import line_of
 from hoof_env.errors import ParameterError
 from hoof_env.policies.record import check_record
 

@@ -1,5 +1,5 @@
 """Memory of an episode, which changes from step to step, and record of a task's constants. The kernels of
-`envs.step` read both and write the first."""
+`episodes.step` read both and write the first."""
 
 from __future__ import annotations
 
@@ -131,7 +131,7 @@ def task_type(terms: int, entries: int, gait: int = ACTIONS, more: tuple[Any, ..
 
     Args:
         terms: number of the reward's terms.
-        entries: number of slots of the observation, see `envs.scene.Slots`.
+        entries: number of slots of the observation, see `episodes.scene.Slots`.
         gait: number of gait parameters of a leg.
         more: further fields of the body's own.
     """

@@ -29,24 +29,24 @@ class OtherGround:
     springs, forces are NaN until a hoof has been in the air.
 
     Args:
-        batch: batch of the environment.
+        env: environment, without wrappers.
         restitutions: nominal coefficients of restitution of the ground, 0 to 1.
 
     Attributes:
         refusal: reason for which there are no such forces, "" if there are.
     """
 
-    def __init__(self, batch: Any, restitutions: tuple[float, ...] = tuple(EXTREMES.values())) -> None:
-        self._batch = batch
+    def __init__(self, env: Any, restitutions: tuple[float, ...] = tuple(EXTREMES.values())) -> None:
+        self._env = env
         self._restitutions = restitutions
         self.refusal = ""
-        if batch.task.contact_law is not None:
+        if env.task.contact_law is not None:
             self.refusal = "the contact law is from outside the package, and has no restitution"
         self.set_ground({})
 
     def set_ground(self, parameters: Mapping[str, float]) -> None:
         """Take the ground of the settings, some of which have other values from now on."""
-        _, ground, limbs = self._batch.body.parts(replace(self._batch.settings, **parameters))
+        _, ground, limbs = self._env.body.parts(replace(self._env.resolved_settings, **parameters))
         lowest = 0.0 if ground.normal_law in REGULAR_LAWS else SMALLEST_RESTITUTION
         laws = [replace(ground, restitution=max(cr, lowest)).damping for cr in self._restitutions]
         self._chi, self._dashpot = np.array(laws).T[:, :, None, None]
@@ -55,7 +55,7 @@ class OtherGround:
 
     def begin(self, record: Mapping[str, Any]) -> None:
         """Take the start of an episode."""
-        shape = (len(self._restitutions), len(POINTS), self._batch.legs)
+        shape = (len(self._restitutions), len(POINTS), len(self._env.engine.limbs))
         self._time = float(record["time"][0].item())
         self._deflection = np.zeros(shape)
         self._rate = np.zeros(shape)
@@ -75,7 +75,7 @@ class OtherGround:
         depth = _points(record, "penetration")
         rate = _points(record, "penetration_rate")
         inverse_speed = _points(record, "inverse_approach_speed")
-        terrain = self._batch.engine.terrain
+        terrain = self._env.terrain
         stiffness = self._ground.stiffness * np.interp(_points(record, "x"), terrain.x, terrain.stiffness)
         if self._spring is None:
             elastic = stiffness * np.maximum(depth, 0.0) ** self._ground.exponent

@@ -8,8 +8,6 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from hoof_env import records
-from hoof_env.envs.batch_build import substeps_under
-from hoof_env.envs.batch_starts import vary
 from hoof_env.envs.policies import constant_gait, start_of
 from hoof_env.errors import HoofEnvError, ParameterError, check_choice, check_number, count
 from hoof_env.gait import PARAMETERS, GaitParameters, limits_of
@@ -86,7 +84,7 @@ class Simulation:
         self._player = self._find(policy, self.seed)
         self.parameters: dict[str, float] = {}
         self.hand: dict[str, float] | None = None
-        self.other_ground = OtherGround(self._leg.batch)  # type: ignore[attr-defined]
+        self.other_ground = OtherGround(self._leg)
         self.ended = ""
         self.is_asking = False
         self._observation: Any = None
@@ -95,7 +93,7 @@ class Simulation:
     @property
     def terms(self) -> tuple[str, ...]:
         """Names of the reward's terms."""
-        return tuple(self._leg.batch.terms)
+        return self._leg.terms
 
     @property
     def is_driven(self) -> bool:
@@ -109,7 +107,7 @@ class Simulation:
 
     def value_of(self, name: str) -> Any:
         """Return the present value of a setting."""
-        return self.parameters.get(name, getattr(self._leg.batch.settings, name))
+        return self.parameters.get(name, getattr(self._leg.resolved_settings, name))
 
     def _find(self, policy: Any, seed: int) -> Any:
         """Return a policy by its name, or the policy that is given."""
@@ -219,12 +217,8 @@ class Simulation:
         if name not in PER_EPISODE:
             return False
         changed = self.parameters | {name: number}
-        batch = self._leg.batch
-        batch.body.check_options({"parameters": changed}, batch.engine.trunk, batch.settings)
-        if substeps_under(batch, changed, None) > batch.engine.substeps or batch.paper:
+        if not self._leg.touch(changed):
             return False
-        vary(batch, 0, changed)
-        batch.has_overrides[0] = True
         self.parameters = changed
         self.other_ground.set_ground(changed)
         if self._observation is not None:
@@ -262,18 +256,13 @@ class Simulation:
         Raises:
             ParameterError: the environment has no commanded speed, or the value is out of range.
         """
-        batch = self._leg.batch
-        if not batch.target_speed:
-            raise ParameterError(f"target_speed: expected an id with a commanded speed, got {self.env_id}")
-        number = check_number("target_speed", value, low=0.1, high=20.0)
-        batch.episode_rows.target[0] = number
-        batch.episode_rows.switch[0] = np.inf
+        self._leg.command_speed(value)
 
     @property
     def commanded_speed(self) -> float | None:
         """Commanded speed [m/s], None where there is none."""
-        batch = self._leg.batch
-        return float(batch.episode_rows.target[0]) if batch.target_speed else None
+        speed: float | None = self._leg.commanded_speed
+        return speed
 
     def push(self, impulse: Any) -> None:
         """Push the trunk forward.

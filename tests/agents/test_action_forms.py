@@ -18,7 +18,7 @@ def test_a_position_is_gone_to_as_fast_as_the_filters_allow(form):
     positions = gym.make(env_id).unwrapped
     rates = gym.make(LEG, **action_forms.FASTEST).unwrapped
     assert positions.engine.substep == action_forms.SUBSTEP
-    assert positions.batch.dt == action_forms.USUAL.dt
+    assert positions.dt == action_forms.USUAL.dt
     begin, end = np.transpose(parts)
     for seed in range(3):
         action = np.random.default_rng(seed).uniform(-1.0, 1.0, 4).astype(np.float32)

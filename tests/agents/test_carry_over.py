@@ -14,9 +14,9 @@ AGENT = str(POLICIES / "HorseLeg-v0")
 
 @pytest.mark.parametrize("name", carry_over.DISTURBANCES)
 def test_each_disturbance_changes_the_settings_that_it_names_and_no_other(name):
-    plain = make_env(LEG).unwrapped.batch.settings
+    plain = make_env(LEG).unwrapped.resolved_settings
     settings = carry_over.settings_of(LEG, name, 1.0)
-    disturbed = make_env(LEG, **settings).unwrapped.batch.settings
+    disturbed = make_env(LEG, **settings).unwrapped.resolved_settings
     changed = {key for key, value in vars(disturbed).items() if value != getattr(plain, key)}
     assert changed
     assert changed <= set(settings)

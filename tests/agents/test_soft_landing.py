@@ -33,14 +33,14 @@ def steps(request, soft_terms):
     for _ in range(250):
         observation, _, _, _, info = env.step(policy.predict(observation)[0])
         measured = {name: float(info["measured"][name]) for name in info["measured"].names}
-        rows.append((info[f"reward_{request.param}"], measured, env.batch.engine.limbs[0].geometry.mass))
+        rows.append((info[f"reward_{request.param}"], measured, env.engine.limbs[0].geometry.mass))
     return request.param, rows, env
 
 
 def test_it_is_the_documented_quantity(steps, soft_terms):
     charge, rows, env = steps
     weight = soft_terms.WEIGHTS[charge]
-    body = 9.81 * (env.batch.engine.trunk.mass + rows[0][2])
+    body = 9.81 * (env.engine.trunk.mass + rows[0][2])
     for paid, m, _ in rows:
         begins = m["stances"] > 0
         if charge == "threshold":
@@ -93,4 +93,4 @@ def test_heavier_charges_differ_from_the_usual_in_one_weight(soft_terms):
 
 def weights_in(env_id):
     """Weights of an environment's terms by name."""
-    return dict(gym.make(env_id).unwrapped.batch.weights)
+    return dict(gym.make(env_id).unwrapped.weights)

@@ -62,7 +62,7 @@ def test_another_leg_is_trained_by_its_own_plan_with_more_figures(tmp_path, monk
         ("sac", 60_000)
     ] * 5
     (slow,) = {job.curves for job in stock.jobs(Args(preset="klann", half_rates=True))}
-    usual = gym.make("hoof_env/HorseLeg-v0").unwrapped.batch.settings
+    usual = gym.make("hoof_env/HorseLeg-v0").unwrapped.resolved_settings
     for name, rate in stock.leg_of(slow).items():
         assert rate == ("klann" if name == "preset" else getattr(usual, name) / 2)
     with pytest.raises(ParameterError, match="expected with --preset"):

@@ -174,5 +174,5 @@ def scaled(scaling, x, leg):
         return np.clip(x / float(part[1]), -1, 1)
     formula = scaling.replace("30 weights / s", "30 * weight").replace("3 weights", "(3 * weight)")
     formula = formula.replace("0.2 hip height", "0.2 * hip height")
-    formula = formula.replace("hip height", f"{leg.batch.body.height}")
+    formula = formula.replace("hip height", f"{leg.body.height}")
     return eval(formula, {"tanh": np.tanh, "x": x, "weight": leg.weight})

@@ -245,7 +245,7 @@ def members(envs: Any) -> list[Any]:
 def observed(one: Any) -> np.ndarray:
     """The last observations, whatever called for them."""
     shape = one.observation_space.shape
-    return one.unwrapped.batch.observations[: shape[0] if len(shape) > 1 else 1].reshape(shape).copy()
+    return one.unwrapped.batch.rows.observations[: shape[0] if len(shape) > 1 else 1].reshape(shape).copy()
 
 
 def assembled(frame: Any, new: list[Any]) -> Any:

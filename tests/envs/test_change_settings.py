@@ -9,7 +9,6 @@ import pytest
 from family import HORSE, actions, same
 
 from hoof_env import Sb3VecEnv
-from hoof_env.envs import conditions
 from hoof_env.envs.horse_leg import HorseLegEnv
 from hoof_env.errors import ParameterError
 
@@ -118,7 +117,7 @@ def test_a_state_has_the_settings_of_each_row():
     same(other.set_state(state), envs._observed())
     for action in actions(1, 25, 4):
         same(other.step(action)[:4], envs.step(action)[:4])
-    assert not other.batch.conditions.are_mixed
+    assert not other.batch.row_plans.are_mixed
     broken = {**state, "rows": {**state["rows"], "which": [0, 0, 0, 9]}}
     with pytest.raises(ParameterError, match=r"state\['rows'\]: expected settings of each environment"):
         other.set_state(broken)
@@ -158,14 +157,14 @@ def test_an_interrupted_call_leaves_the_newest_settings_and_the_other_rows(monke
     envs.change_settings(target_speed=2.0)
     envs.reset(seed=[None, 5, None, None], options={"reset_mask": np.array([False, True, False, False])})
     batch = envs.batch
-    assert batch.conditions.are_mixed
-    newest, before = batch.conditions.all[-1], batch.rewards.copy()
+    assert batch.row_plans.are_mixed
+    newest, before = batch.row_plans.plans[-1], batch.rows.rewards.copy()
 
     def interrupted(rows):
-        batch.rewards += 1.0
+        batch.rows.rewards += 1.0
         raise KeyboardInterrupt
 
     with pytest.raises(KeyboardInterrupt):
-        conditions.under_each(batch, np.arange(4), interrupted)
-    assert batch.asked is newest["asked"]
-    assert (batch.rewards[[1]] == before[[1]]).all()
+        batch.under_each(np.arange(4), interrupted)
+    assert batch.plan is newest
+    assert (batch.rows.rewards[[1]] == before[[1]]).all()

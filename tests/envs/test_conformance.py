@@ -122,8 +122,8 @@ def test_a_state_fits_the_environment_that_a_json_spec_makes():
     env = gym.make(IDS[0], target_speed=(0.5, 2.0), reward_weights={"peak": 0.5}, **settings)
     env.reset(seed=0)
     again = gym.make(gym.envs.registration.EnvSpec.from_json(env.spec.to_json())).unwrapped
-    assert again.batch.weights["peak"] == 0.5
-    same(again.set_state(env.unwrapped.get_state()), env.unwrapped.batch.observations[0])
+    assert again.weights["peak"] == 0.5
+    same(again.set_state(env.unwrapped.get_state()), env.unwrapped.batch.rows.observations[0])
     again.reset()
 
 

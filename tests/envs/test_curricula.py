@@ -66,10 +66,10 @@ def test_each_row_has_the_bits_of_one_that_was_given_its_changes(n):
 
     for part in range(3):
         follow(envs, singles, actions(part, 25, n), over, at)
-        assert envs.batch.conditions.are_mixed
+        assert envs.batch.row_plans.are_mixed
         settings = envs.call("settings")
         for one, asked in zip(singles, settings, strict=True):
-            assert to_json(one.batch.coming_settings(0)) == to_json(asked)
+            assert to_json(one.batch.row_plans.pending_of(0).asked) == to_json(asked)
         state = envs.get_state()
         if part == 0:
             envs = copy.deepcopy(envs)
@@ -84,20 +84,19 @@ def test_levels_that_act_at_starts_cost_no_further_run_of_a_kernel():
     """Strength, parameters and ranges of speeds are of the rows; weights are constants of a kernel."""
     envs = gym.make_vec(SPEED, 4, **SHORT).unwrapped
     envs.reset(seed=0)
-    conditions = envs.batch.conditions
     each = {"strength": 0.5}, {"randomize": {"trunk_mass": (45.0, 55.0)}}, {"target_speed": [1.0, 2.0]}
     for row, level in enumerate(each):
         envs.change_settings(envs=[row], **level)
     envs.reset()
-    assert len(conditions.all) == 4
-    assert conditions.are_mixed
-    assert not conditions.differ
+    assert len(envs.batch.row_plans.plans) == 4
+    assert envs.batch.row_plans.are_mixed
+    assert not envs.batch.row_plans.differ
     envs.change_settings(envs=[0], reward_weights={"peak": 1.0})
     envs.reset()
-    assert conditions.differ
+    assert envs.batch.row_plans.differ
     envs.change_settings(strength=1.0, reward_weights=None, randomize=None, target_speed=[1.0, 3.5])
     envs.reset()
-    assert len(conditions.all) == 1
+    assert len(envs.batch.row_plans.plans) == 1
 
 
 def test_rows_that_ask_for_what_others_have_share_it():
@@ -106,7 +105,7 @@ def test_rows_that_ask_for_what_others_have_share_it():
     for row in range(6):
         envs.change_settings(envs=[row], strength=0.5)
     envs.reset()
-    assert len(envs.batch.conditions.all) == 1
+    assert len(envs.batch.row_plans.plans) == 1
 
 
 def test_a_callback_of_stable_baselines_promotes_rows():
@@ -144,7 +143,8 @@ def test_refused_changes_change_nothing(words, kind, changes):
     envs.reset(seed=0)
     with pytest.raises(kind, match=words):
         envs.change_settings(**{"envs": [1], **changes})
-    assert not envs.batch.conditions.all
+    assert len(envs.batch.row_plans.plans) == 1
+    assert not envs.batch.row_plans.are_due(np.arange(3))
     assert envs.settings == gym.make(LEG, **SHORT).unwrapped.settings
 
 
@@ -190,14 +190,14 @@ def test_a_schedule_follows_the_steps_of_each_row(env_id):
     follow(envs, singles, taken[:5], over)
     envs.reset(options={"reset_mask": np.array([False, True, False])})
     singles[1].reset()
-    assert np.allclose(envs.batch.episode_rows.strength[:3], [0.0, 2.0 * 5 / 40, 0.0])
+    assert np.allclose(envs.batch.rows.named.strength[:3], [0.0, 2.0 * 5 / 40, 0.0])
     follow(envs, singles, taken[5:30], over)
     state = envs.get_state()
     fresh = gym.make_vec(env_id, 3, **settings).unwrapped
     fresh.set_state(state)
     follow(fresh, singles, taken[30:], over)
-    assert (fresh.batch.episode_rows.strength[:3] == 2.0).all()
-    friction = fresh.batch.start_values[-1]
+    assert (fresh.batch.rows.named.strength[:3] == 2.0).all()
+    friction = fresh.batch.rows.start_values[-1]
     assert ((friction >= 0.2) & (friction <= 0.4)).all()
     infos = fresh.reset(seed=4)[1]
     assert (infos["parameters"]["friction"] == 0.8).all()
@@ -220,7 +220,7 @@ def test_options_go_before_a_schedule():
     env = gym.make(LEG, schedule=SCHEDULE)
     _, info = env.reset(options={"strength": 0.7, "parameters": {"friction": 0.5}})
     assert info["parameters"]["friction"] == 0.5
-    assert env.unwrapped.batch.episode_rows.strength[0] == 0.7
+    assert env.unwrapped.batch.rows.named.strength[0] == 0.7
 
 
 @pytest.mark.parametrize(
@@ -263,4 +263,4 @@ def test_a_schedule_that_is_added_after_a_state_counts_all_steps():
     for each in (env, other):
         each.change_settings(schedule={"strength": [0.0, 2.0, 40]})
         each.reset()
-        assert each.batch.episode_rows.strength[0] == 2.0 * 7 / 40
+        assert each.batch.rows.named.strength[0] == 2.0 * 7 / 40

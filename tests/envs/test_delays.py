@@ -128,7 +128,7 @@ def test_states_pickles_and_copies_continue_with_the_same_bits(given):
 def test_delays_that_are_drawn_are_all_that_may_be():
     envs = make(LEG, 64, **DRAWN)
     envs.reset(seed=0)
-    rows = envs.batch.episode_rows
+    rows = envs.batch.rows.named
     assert set(rows.observation_delay[:64]) == {0.0, 1.0, 2.0}
     assert set(rows.action_delay[:64]) == {1.0, 2.0, 3.0}
 

@@ -155,7 +155,7 @@ def test_an_impulse_is_what_a_short_force_leaves(drive):
             state.append([engine.report["vy"][0], engine.state["crank_angle_rate"][0, 0]])
         errors.append(np.abs(np.subtract(*state)))
     assert (errors[1] < 0.6 * errors[0] + 1e-9).all()
-    assert (errors[1] < 5e-3 * impulse / env.batch.engine.total_mass).all()
+    assert (errors[1] < 5e-3 * impulse / env.engine.total_mass).all()
 
 
 def test_given_pushes_come_at_their_times():
@@ -175,12 +175,12 @@ def test_given_pushes_come_at_their_times():
             assert difference == {"momentum_x": 0.0, "momentum_y": 0.0}
         if k == 5:
             assert difference["momentum_x"] == pytest.approx(5.0)
-            assert env.batch.episode_rows.push_at[0] == 10
-    assert np.isinf(env.batch.episode_rows.push_at[0])
+            assert env.batch.rows.named.push_at[0] == 10
+    assert np.isinf(env.batch.rows.named.push_at[0])
     env.reset(seed=3)
     option.reset(seed=3)
-    assert env.batch.episode_rows.push_at[0] == 5
-    assert np.isinf(option.batch.episode_rows.push_at[0]), "the option was for one episode"
+    assert env.batch.rows.named.push_at[0] == 5
+    assert np.isinf(option.batch.rows.named.push_at[0]), "the option was for one episode"
 
 
 def test_strength_is_a_factor_of_pushes():

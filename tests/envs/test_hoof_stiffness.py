@@ -61,7 +61,9 @@ def test_states_pickles_and_infos_know_the_spring(soft):
 def test_the_default_damping_is_that_of_the_settings_whatever_is_drawn():
     env = gym.make(LEG, randomize={"trunk_mass": (30.0, 70.0)}, **SOFT)
     limb = env.unwrapped.engine.limbs[0]
-    assert limb.spring.damping == pytest.approx(0.2 * np.sqrt(4e4 * env.unwrapped.batch.settings.trunk_mass))
+    assert limb.spring.damping == pytest.approx(
+        0.2 * np.sqrt(4e4 * env.unwrapped.resolved_settings.trunk_mass)
+    )
     settings = env.unwrapped.engine._memory.limb_settings
     before = settings.copy()
     env.reset(seed=1)
@@ -81,7 +83,7 @@ def test_a_sole_whose_spring_goes_back_by_itself_bears_nothing():
     forces, gives = [], []
     for _ in range(100):
         envs.step(np.zeros((64, 16), np.float32))
-        engine = envs.unwrapped.batch.engine
+        engine = envs.unwrapped.engine
         forces.append([engine.report[f"{point}_normal"] for point in ("toe", "heel")])
         gives.append([engine.state[f"{point}_deflection_normal"] for point in ("toe", "heel")])
     force, goes_back = np.array(forces), np.array(gives) > 1e-4

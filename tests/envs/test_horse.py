@@ -12,8 +12,8 @@ from horses import SPEEDS, played, random_gaits
 from hoof_env import Sb3VecEnv
 from hoof_env.dynamics.advance import EngineKind
 from hoof_env.dynamics.layout import Features
-from hoof_env.envs.scene import TaskKind
-from hoof_env.envs.step import step_kernels
+from hoof_env.episodes.scene import TaskKind
+from hoof_env.episodes.step import step_kernels
 from hoof_env.errors import DataFileError, ParameterError
 from hoof_env.gait import PARAMETERS, WIDEST
 from hoof_env.leg.limb_masses import segment_masses, trunk_mass
@@ -83,13 +83,13 @@ def test_offsets_follow_actions_and_fade_under_zeros():
     for k, action in enumerate(taken):
         seen, *_ = env.step(action.astype(np.float32))
         expected += FOLLOWED * (np.clip(action, -1.0, 1.0) - expected)
-        np.testing.assert_allclose(env.batch.episode_rows.offset[:, 0], expected, rtol=1e-6, atol=1e-9)
+        np.testing.assert_allclose(env.batch.rows.named.offset[:, 0], expected, rtol=1e-6, atol=1e-9)
         np.testing.assert_allclose(seen[places], expected, atol=1e-6)
         if k == 19:
             assert 0.3 < expected.min() < expected.max() < 1.0
     assert 0.0 < np.abs(expected).max() < 0.05
     env.reset(seed=0)
-    assert not env.batch.episode_rows.offset.any()
+    assert not env.batch.rows.named.offset.any()
 
 
 def test_zeros_from_the_start_are_the_reference_gait():
@@ -155,7 +155,7 @@ def test_cranks_that_are_out_of_step_come_back():
 
     def ahead():
         """Of the other legs' mean phase [rad], by the gait that the kernels follow."""
-        theta, gait = env.engine.state["crank_angle"][:, 0], env.batch.episode_rows.gait[:, 0]
+        theta, gait = env.engine.state["crank_angle"][:, 0], env.batch.rows.named.gait[:, 0]
         found = []
         for i in range(4):
             first = 2 + 7 * (i // 2)
@@ -225,10 +225,10 @@ def test_zeros_travel_and_stay_upright(speed):
 def test_commands_change_a_little_at_a_time(size):
     env = make(HORSE, target_speed=(0.9, 2.6), target_seconds=(0.1, 0.1), size=size, episode_seconds=20.0)
     env.reset(seed=1)
-    seen = [float(env.batch.episode_rows.target[0])]
+    seen = [float(env.batch.rows.named.target[0])]
     for _ in range(500):
         *_, failed, _, _ = env.step(np.zeros(16, np.float32))
-        seen.append(float(env.batch.episode_rows.target[0]))
+        seen.append(float(env.batch.rows.named.target[0]))
         if failed:
             break
     steps = np.abs(np.diff(seen))
@@ -243,7 +243,7 @@ def test_the_reference_follows_the_command(size):
     envs = Sb3VecEnv(HORSE, 16, size=size, target_speed=(0.5, 4.0), target_seconds=(0.2, 0.5))
     envs.seed(1)
     envs.reset()
-    now, seen = envs.unwrapped.envs.batch.episode_rows, set()
+    now, seen = envs.unwrapped.envs.batch.rows.named, set()
     for _ in range(60):
         envs.step(np.zeros((16, 16), np.float32))
         expected = reference_gaits(now.target[:16] / size**0.5)
@@ -258,7 +258,7 @@ def test_commands_are_drawn_as_numbers_between_their_bounds():
     """One draw for the time and one for the speed, as `Generator.uniform` makes them."""
     env = make(HORSE, target_speed=(1.3, 2.6), target_seconds=(0.5, 1.0))
     env.reset(seed=3)
-    now, twin = env.batch.episode_rows, copy.deepcopy(env.np_random)
+    now, twin = env.batch.rows.named, copy.deepcopy(env.np_random)
     for _ in range(50):
         if now.steps[0] + 1 == now.switch[0]:
             break
@@ -289,8 +289,8 @@ def test_a_gait_that_is_given_lasts_while_commands_change():
     seen = set()
     for _ in range(40):
         env.step(np.zeros(16, np.float32))
-        same(env.batch.episode_rows.gait[:, 0], horse_gaits()["walk"].to_array())
-        seen.add(float(env.batch.episode_rows.target[0]))
+        same(env.batch.rows.named.gait[:, 0], horse_gaits()["walk"].to_array())
+        seen.add(float(env.batch.rows.named.target[0]))
     assert len(seen) >= 4
 
 
@@ -309,10 +309,12 @@ def test_gaits_by_name_class_and_numbers_are_the_same():
 def test_a_gait_for_each_environment_is_that_of_those_that_start():
     envs, gaits = gym.make_vec(HORSE, num_envs=3), random_gaits(3, seed=5)
     envs.reset(seed=0, options={"gait": gaits})
-    same(envs.unwrapped.batch.start_values[-len(NAMES) :, :], gaits.T)
+    same(envs.unwrapped.batch.rows.start_values[-len(NAMES) :, :], gaits.T)
     changed = gaits[::-1].copy()
     envs.reset(options={"gait": changed, "reset_mask": np.array([False, False, True])})
-    same(envs.unwrapped.batch.start_values[-len(NAMES) :, :], np.array([gaits[0], gaits[1], changed[2]]).T)
+    same(
+        envs.unwrapped.batch.rows.start_values[-len(NAMES) :, :], np.array([gaits[0], gaits[1], changed[2]]).T
+    )
 
 
 def test_commands_are_clipped_to_what_the_page_says():

@@ -8,8 +8,8 @@ import pytest
 from family import substeps
 
 from hoof_env.dynamics.layout import TRUNK_STATE
-from hoof_env.envs.batch_reports import summary_of
 from hoof_env.envs.policies import make_policy, policy_names
+from hoof_env.episodes.summaries import summary_of
 from hoof_env.errors import ParameterError
 from hoof_env.gait import GaitParameters, load_gait
 from hoof_env.tasks.observation import MIDDLE
@@ -125,7 +125,7 @@ def test_a_step_that_could_not_be_simulated_pays_for_nothing_but_the_failure():
     np.testing.assert_array_equal(seen, there)
     assert "finite" in str(info["end"])
     rest = env.settings.episode_seconds - before["seconds"]
-    assert reward == info["reward_failure"] == pytest.approx(-env.batch.weights["failure"] * rest)
+    assert reward == info["reward_failure"] == pytest.approx(-env.weights["failure"] * rest)
     assert info["episode_summary"] == {**before, "failed": 1.0}
     assert env.record()["time"].ravel().tolist() == [pytest.approx(0.4)]  # where it is
     assert np.isfinite(env.reset()[0]).all()

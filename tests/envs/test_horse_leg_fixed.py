@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 from family import LEGS, running_peak_charge, together
 
-from hoof_env.envs.batch_reports import summary_of
 from hoof_env.envs.policies import make_policy
+from hoof_env.episodes.summaries import summary_of
 from hoof_env.errors import DataFileError, ParameterError
 from hoof_env.gait import PARAMETERS
 from hoof_env.ground.contact import Ground, load_ground
@@ -147,7 +147,7 @@ def test_a_linkage_that_diverges_ends_the_episode_and_pays_nothing(settings):
         assert done or abs(reward) < 10
     assert "last good" in str(info["end"])
     rest = env.settings.episode_seconds - before["seconds"]
-    assert reward == info["reward_failure"] == pytest.approx(-env.batch.weights["failure"] * rest)
+    assert reward == info["reward_failure"] == pytest.approx(-env.weights["failure"] * rest)
     assert info["episode_summary"] == {**before, "failed": 1.0}
     assert env.record()["time"].ravel() == pytest.approx([time])  # where it is
 

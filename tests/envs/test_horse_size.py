@@ -34,7 +34,7 @@ def similar_world(size):
 
 def dimensionless(env, measured):
     """Places, speeds and loads of the instant."""
-    size, found = env.batch.body.size, []
+    size, found = env.body.size, []
     units = {"x": size, "y": size, "vx": size**0.5, "pitch": 1.0, "pitch_rate": size**-0.5}
     for leg in LEGS:
         units |= {f"{leg}_crank_angle": 1.0, f"{leg}_crank_speed": size**-0.5, f"{leg}_swing_sin": 1.0}
@@ -125,15 +125,19 @@ def test_ponies_travel(size):
 
 def test_a_pony_is_told_the_speeds_of_its_size():
     one, half = make(HORSE), make(HORSE, size=0.5, target_seconds=(1.0, 2.0))
-    np.testing.assert_allclose(half.batch.target_speed, np.sqrt(0.5) * np.array(one.batch.target_speed))
-    assert half.settings.target_speed == half.batch.target_speed
-    assert make(HORSE, size=0.5, target_speed=None).batch.target_speed == half.batch.target_speed
+    np.testing.assert_allclose(
+        half.batch.plan.commands.speeds, np.sqrt(0.5) * np.array(one.batch.plan.commands.speeds)
+    )
+    assert half.settings.target_speed == half.batch.plan.commands.speeds
+    assert (
+        make(HORSE, size=0.5, target_speed=None).batch.plan.commands.speeds == half.batch.plan.commands.speeds
+    )
 
 
 @pytest.mark.parametrize("given", [1.2, (1.172, 3.706), (1.0, 2.0)], ids=str)
 def test_speeds_that_are_named_are_what_is_commanded(given):
     """Those of a horse of size 1, too."""
-    found = make(HORSE, size=0.5, target_speed=given).batch.target_speed
+    found = make(HORSE, size=0.5, target_speed=given).batch.plan.commands.speeds
     assert found == (given if isinstance(given, tuple) else (given, given))
 
 
@@ -142,7 +146,7 @@ def test_own_tasks_keep_the_range_of_the_size_unless_they_name_one():
     try:
         register(names[0], base="horse")
         register(names[1], base="horse", target_speed=(1.172, 3.706))
-        plain, named = (make(name, size=0.5).batch.target_speed for name in names)
+        plain, named = (make(name, size=0.5).batch.plan.commands.speeds for name in names)
     finally:
         for name in names:
             gym.registry.pop(name, None), _OWN.pop(name, None)
@@ -155,7 +159,7 @@ def test_a_gait_of_an_info_is_the_same_gait_as_an_option(size):
     env, options = make(HORSE, size=size), {"phase": 0.2, "speed": 1.0, "pitch": 0.0, "target_speed": 1.5}
     _, info = env.reset(seed=0, options=options | {"gait": "walk"})
     assert info["gait"]["rate"] == pytest.approx(horse_gaits()["walk"].rate / size**0.5)
-    seen = env.batch.observations[0].copy()
+    seen = env.batch.rows.observations[0].copy()
     for given in (info["gait"], HorseGait.from_array(info["gait"]), env.gaits["walk"]):
         again, told = env.reset(seed=0, options=options | {"gait": given})
         same(again, seen)

@@ -8,7 +8,7 @@ import pytest
 from family import HORSE, make, same
 from horses import SEEDS, SPEEDS
 
-from hoof_env.envs.batch import EpisodeBatch
+from hoof_env.episodes.plan import make_plan
 from hoof_env.render.outline import LegOutline
 from hoof_env.tasks.horse import GAP, PHASE_SPREAD, PITCH_SPREAD, SPEED_SPREAD
 from hoof_env.tasks.horse_gaits import LEGS, _data, crank_angles, reference_gaits, trunk_motion
@@ -47,7 +47,7 @@ def test_an_episode_starts_as_the_reference_gait_goes_on(size):
     envs.reset(seed=0)
     for _ in range(300):
         *_, infos = envs.step(np.zeros((64, 16), np.float32))
-    measured, body = infos["measured"], envs.unwrapped.batch.body
+    measured, body = infos["measured"], envs.unwrapped.body
     gait = reference_gaits(np.array([SPEEDS[0]]))
     angles = crank_angles(np.tile(gait, (1000, 1)), np.arange(1000) / 1000, np.zeros((4, 1000)))[2]
     phase = np.interp(measured["left_hind_crank_angle"] % (2 * np.pi), *sorted_pairs(angles))
@@ -100,7 +100,7 @@ def started(seeds=SEEDS, options=None, **settings):
     """Horses at their start, heights of their hooves over the ground, and infos."""
     envs = gym.make_vec(HORSE, num_envs=seeds, **settings)
     infos = envs.reset(seed=0, options=options)[1]
-    return envs, heights(infos["measured"], envs.unwrapped.batch.engine.terrain), infos
+    return envs, heights(infos["measured"], envs.unwrapped.engine.terrain), infos
 
 
 @pytest.mark.parametrize("size", [1.0, 0.5])
@@ -152,13 +152,13 @@ def test_rigid_hooves_start_above_the_ground_and_soft_ones_in_it(stiffness, low,
     """By the outline that pictures draw: kernels of rigid hooves, which this alone would need, take a third
     of a minute to compile."""
     task = TASKS["horse"]
-    batch = EpisodeBatch(task, task.settings({"hoof_stiffness": stiffness}), 1, runs=False)
-    start = batch.body.draw(START, [np.random.default_rng(0)], batch.engine)
-    batch.body.complete_start(start, np.array([SPEEDS[0]]), START, batch.engine)
+    plan, engine = make_plan(task, task.settings({"hoof_stiffness": stiffness}))
+    start = plan.body.draw(START, [np.random.default_rng(0)], engine)
+    plan.body.complete_start(start, np.array([SPEEDS[0]]), START, engine)
     trunk = complex(start.trunk["x"][0], start.trunk["y"][0])
     pitch = float(start.trunk["pitch"][0])
     lowest = []
-    legs = zip(batch.engine.limbs, start.commands[..., 0], start.theta[:, 0], strict=True)
+    legs = zip(engine.limbs, start.commands[..., 0], start.theta[:, 0], strict=True)
     for limb, (_, offset, *waves), theta in legs:
         sines = [a * np.sin(k * theta) for k, a in enumerate(waves[::2], 1)]
         cosines = [b * np.cos(k * theta) for k, b in enumerate(waves[1::2], 1)]

@@ -11,7 +11,7 @@ import pytest
 from family import FALLS, IDS, actions, same, together
 from gymnasium.vector import AsyncVectorEnv, SyncVectorEnv
 
-from hoof_env.envs.infos import NamedArray, measured_names, name_columns, row_of
+from hoof_env.episodes.infos import NamedArray, measured_names, name_columns, row_of
 from hoof_env.errors import ParameterError
 from hoof_env.gait import PARAMETERS
 from hoof_env.tasks.one_leg import OneLeg
@@ -29,7 +29,7 @@ def test_reset_and_step_have_the_same_keys_of_numpys_numbers(env_id, settings):
     env = gym.make(env_id, episode_seconds=0.06, **settings)
     _, first = env.reset(seed=0)
     infos = [first, *(env.step(taken)[4] for taken in actions(0, 2, env_id=env_id))]
-    start, terms = env.unwrapped.batch.body.start_names, env.unwrapped.batch.terms
+    start, terms = env.unwrapped.body.start_names, env.unwrapped.terms
     more = {"parameters"} if settings else set()
     if env.unwrapped.settings.target_speed is not None:
         more.add("target_speed")
@@ -87,7 +87,7 @@ def test_nothing_is_measured_of_a_step_that_did_not_happen():
             state = leg.get_state()
             state["engine"]["limbs"][0, 6, 0] = 1e300
             leg.set_state(state)
-            leg.batch.engine._memory.stride_sums[:] = 1.0  # of some step before
+            leg.engine._memory.stride_sums[:] = 1.0  # of some step before
         infos, info = env.step(np.zeros((n, 4), np.float32))[4], single.step(np.zeros(4, np.float32))[4]
         same(np.asarray(infos["measured"][0]), np.asarray(info["measured"]))
         assert info["measured"]["result"] == 1

@@ -56,7 +56,7 @@ def world(f: float, env_id: str = LEG, **more: object) -> dict:
         powers = {k: v for k, v in powers.items() if k not in ("trunk_stiffness", "trunk_damping")}
     if env_id == FIXED:
         powers = {k: v for k, v in powers.items() if k != "trunk_drag"}
-    plain = gym.make(env_id).unwrapped.batch.settings
+    plain = gym.make(env_id).unwrapped.resolved_settings
     scaled = {name: getattr(plain, name) * f**power for name, power in powers.items()}
     gentle = {"friction_slow": 0.05 * f**0.5, "friction_fast": 0.5 * f**0.5}
     return scaled | gentle | {"preset": preset(f), "episode_seconds": 10.0 * f**0.5} | more
@@ -123,7 +123,7 @@ def test_scripted_gaits_of_all_sizes_are_alike(env_id, f):
 
 
 def test_the_published_leg_keeps_its_limits_and_filters_to_the_bit():
-    body = gym.make(LEG).unwrapped.batch.body
+    body = gym.make(LEG).unwrapped.body
     assert speed_scale_of(PUBLISHED) == 1.0
     assert limits_of(PUBLISHED) == LIMITS
     assert body.filters == FilterSettings()
@@ -132,7 +132,7 @@ def test_the_published_leg_keeps_its_limits_and_filters_to_the_bit():
 
 
 def test_the_crank_of_a_leg_at_a_third_turns_faster_by_the_root_of_three():
-    body = gym.make(LEG, preset=preset(1 / 3), trunk_mass=2.0).unwrapped.batch.body
+    body = gym.make(LEG, preset=preset(1 / 3), trunk_mass=2.0).unwrapped.body
     assert body.high[0] == pytest.approx(4 * np.pi * 3**0.5)
     np.testing.assert_allclose(body.rates, np.array([54.0, *[1.2 * 3**0.5] * 3]))
     assert body.filters.gain == pytest.approx(20.0 * 3**0.5)

@@ -342,7 +342,7 @@ def test_the_tables_have_what_there_is_and_nothing_else():
 @pytest.mark.parametrize("page", TASKS)
 def test_rewards_options_and_figures_are_those_of_the_environment(page):
     text, env = manual.page(page), gym.make(IDS[page], episode_seconds=0.02)
-    weights = env.unwrapped.batch.weights
+    weights = env.unwrapped.weights
     options = HORSE_OPTIONS if page in HORSES else OPTIONS
     _, started = env.reset(seed=0, options={"parameters": {"friction": 0.3}})
     info = env.step(np.zeros(env.action_space.shape, np.float32))[4]

@@ -13,7 +13,7 @@ import pytest
 
 from hoof_env.dynamics import layout
 from hoof_env.dynamics.names import RENAMED, NamedColumns, present_name
-from hoof_env.envs.outcome import MOVED
+from hoof_env.episodes.outcome import MOVED
 from hoof_env.gait import PARAMETERS
 from hoof_env.record.columns import RECORD
 from hoof_env.record.instant import UNITS, Instant
@@ -71,7 +71,7 @@ def places() -> dict[str, set[str]]:
         "kernel": kernel,
         "engine": {*env.engine.state, *env.engine.report},
         "info": {*info["measured"].keys()},
-        "start": {*env.batch.body.start_names},
+        "start": {*env.body.start_names},
         "record": {*env.record()},
         "summary": {*info["episode_summary"]},
         "file": {*RECORD, *Instant._fields, *substeps(env)},

@@ -51,7 +51,7 @@ def test_random_actions(env_id):
         low, high, ends = np.minimum(low, seen.min(0)), np.maximum(high, seen.max(0)), ends + truncated.sum()
         ends += terminated.sum()
     assert ends >= STEPS // 1100
-    names = zip(env.unwrapped.batch.names, high - low, strict=True)
+    names = zip(env.unwrapped.observation_names, high - low, strict=True)
     assert [name for name, span in names if span < 0.05] == []
 
 
@@ -183,7 +183,7 @@ def test_a_record_is_what_the_step_did():
         _, _, terminated, _, info = env.step(taken)
         trace = together([env.record()])
         work = np.sum(np.maximum(trace["crank_power"], 0) + np.maximum(trace["hip_power"], 0)) * 1e-3
-        charge = env.batch.weights["energy"] * work / 1000
+        charge = env.weights["energy"] * work / 1000
         assert info["reward_energy"] == pytest.approx(-charge, rel=1e-9, abs=1e-15)
         assert trace["crank_angle"][-1] == env.engine.state["crank_angle"].item() >= before
         if terminated:

@@ -90,7 +90,7 @@ def test_a_spec_and_a_state_hold_the_leg_itself():
     assert json.loads(json.dumps(state["settings"]))["preset"] == CONTENT
     again = gym.make(EnvSpec.from_json(env.spec.to_json()))
     assert again.unwrapped.geometry == env.unwrapped.geometry
-    same(again.unwrapped.set_state(state), env.unwrapped.batch.observations[0])
+    same(again.unwrapped.set_state(state), env.unwrapped.batch.rows.observations[0])
 
 
 def test_a_path_stays_a_path(tmp_path):

@@ -97,10 +97,10 @@ def test_an_action_of_step_length_lengthens_the_step_and_keeps_its_height(exampl
         env.reset(seed=0, options={"gait": "walk"})
         action = np.zeros(3, np.float32)
         action[which] = sign
-        before = step_of(*env.batch.engine.state["swing_sin"][0], *env.batch.engine.state["swing_cos"][0])
+        before = step_of(*env.engine.state["swing_sin"][0], *env.engine.state["swing_cos"][0])
         for _ in range(2):
             env.step(action)
-        state = env.batch.engine.state
+        state = env.engine.state
         change = step_of(*state["swing_sin"][0], *state["swing_cos"][0]) - before
         assert sign * change[which - 1] > 0.001
         assert abs(change[2 - which]) < 0.35 * abs(change[which - 1])
@@ -135,8 +135,8 @@ def test_change_of_constants_acts_from_the_next_episode_on(example):
 def test_constants_that_are_not_named_keep_those_of_the_registration(example):
     hoof_env.register("my_lab/Free-v0", base=ID, constants={"free": 700.0})
     for given in (None, {}, {"free": 700.0}):
-        assert gym.make("my_lab/Free-v0", constants=given).unwrapped.batch.constants == [700.0]
-    assert gym.make("my_lab/Free-v0", constants={"free": 5.0}).unwrapped.batch.constants == [5.0]
+        assert gym.make("my_lab/Free-v0", constants=given).unwrapped.batch.plan.constants == [700.0]
+    assert gym.make("my_lab/Free-v0", constants={"free": 5.0}).unwrapped.batch.plan.constants == [5.0]
 
 
 def with_constant(step, weight, free):

@@ -160,8 +160,8 @@ def test_a_step_that_could_not_be_simulated_pays_for_nothing_but_the_failure(own
     assert terminated
     assert info["reward_friction"] == info["reward_comfort"] == 0.0
     assert reward == info["reward_failure"]
-    rest = env.settings.episode_seconds - env.batch.episode_rows.time[0]
-    assert reward == -env.batch.weights["failure"] * rest < -1.0
+    rest = env.settings.episode_seconds - env.batch.rows.named.time[0]
+    assert reward == -env.weights["failure"] * rest < -1.0
     assert np.isfinite(observation).all()
 
 
@@ -301,7 +301,7 @@ def test_copies_share_their_kernels(own):
     env = gym.make(own.ID).unwrapped
     env.reset(seed=0)
     made = copy.deepcopy(env)
-    assert made.batch.kernels is env.batch.kernels
+    assert made.batch.calls.kernels is env.batch.calls.kernels
     twin = pickle.loads(pickle.dumps(env))
     for action in actions(2, 3):
         expected = env.step(action)[:2]

@@ -9,7 +9,7 @@ import pytest
 from family import HORSE, actions, same
 
 from hoof_env.dynamics.engine import TrunkEngine
-from hoof_env.envs.recording import KEPT_SECONDS
+from hoof_env.episodes.recording import KEPT_SECONDS
 
 LEG = "hoof_env/HorseLeg-v0"
 

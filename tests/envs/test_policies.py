@@ -44,8 +44,8 @@ def seen_in(env, gaits):
 
 def reach_in(env):
     """How far an action of 1 puts the command from where the gait is heading, shape (4,)."""
-    batch = env.unwrapped.batch
-    return batch.body.reach(batch.engine, batch.dt)
+    leg = env.unwrapped
+    return leg.body.reach(leg.engine, leg.dt)
 
 
 def gait_of(env):
@@ -188,7 +188,7 @@ def test_each_leg_of_a_horse_follows_its_own_crank_and_left_is_as_right():
         own = coefficients[0][:, :4] if "fore" in leg else coefficients[0][:, 4:]
         expected = np.clip(np.array([1.0, np.sin(angle), np.cos(angle)]) @ own, -1, 1)
         np.testing.assert_allclose(found[4 * k : 4 * k + 4], expected, atol=1e-6)
-        action = env.unwrapped.batch.action_names[4 * k]
+        action = env.unwrapped.action_names[4 * k]
         assert action.startswith(leg.replace(" ", "_"))
 
 

@@ -242,7 +242,7 @@ def test_states_of_a_horse_that_cannot_be(row, value):
     env = gym.make(HORSE).unwrapped
     env.reset(seed=0)
     state, before = env.get_state(), env.get_state()
-    state["episode"][env.batch.layout.rows(row).start] = value
+    state["episode"][env.batch.rows.layout.rows(row).start] = value
     with pytest.raises(ParameterError, match=r"state\['episode'\]: expected numbers"):
         env.set_state(state)
     same(env.get_state(), before)

@@ -418,7 +418,7 @@ def test_failing_is_out_of_reach_of_wild_feedback(task):
         observations, rewards, terminated, truncated, _ = envs.step(actions.astype(np.float32))
         assert not terminated.any()
         total += rewards
-        heights.append(np.ravel(envs.engine.report["y"])[:count] / envs.batch.body.height)
+        heights.append(np.ravel(envs.engine.report["y"])[:count] / envs.body.height)
     assert truncated.all()
     assert total.min() < -30
     assert np.min(heights) > (1 + LOWEST) / 2
@@ -433,8 +433,8 @@ def test_failing_at_the_end_does_not_pay(task):
     rewards = gait_rewards(task, "run")
     losses = -np.cumsum(rewards[::-1], axis=0)[::-1]
     left = DT * np.arange(len(rewards), 0, -1)
-    fall = np.sqrt(2 * (1 - LOWEST) * env.batch.body.height / 9.81)
-    spared = losses - env.batch.weights["failure"] * left[:, None]
+    fall = np.sqrt(2 * (1 - LOWEST) * env.body.height / 9.81)
+    spared = losses - env.weights["failure"] * left[:, None]
     assert 0.1 < fall < 1
     assert spared[left >= fall].max() < 0
 

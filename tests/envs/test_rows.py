@@ -76,7 +76,7 @@ def test_raw_observations_are_those_before_scaling(env_id, count, settings):
     for taken in 0.2 * actions(2, 25, 9, env_id=env_id):
         raw = envs.raw_observation()
         assert tuple(raw) == envs.observation_names
-        for k, entry in enumerate(envs.batch.entries):
+        for k, entry in enumerate(envs.batch.plan.observed.entries):
             expected = scaled(entry.scale.text, raw[entry.name], envs)
             assert expected.shape == (9,)
             np.testing.assert_allclose(expected, seen[:, k], atol=2e-7)

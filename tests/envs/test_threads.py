@@ -41,10 +41,10 @@ def test_a_bad_action_stops_all_blocks():
     envs = make(40, 4).unwrapped
     envs.reset(seed=0)
     before = envs.get_state()
-    envs.batch.actions[:] = 0.0
-    envs.batch.actions[39, 2] = np.nan  # of the last block alone
+    envs.batch.rows.actions[:] = 0.0
+    envs.batch.rows.actions[39, 2] = np.nan  # of the last block alone
     with pytest.raises(ParameterError, match="finite"):
-        envs.batch.step(envs._generators)
+        envs.batch.step(envs._generators.all)
     same(envs.get_state(), before)
 
 
@@ -53,7 +53,7 @@ def test_a_copy_has_no_more_threads_than_there_are_processors(monkeypatch):
     envs.reset(seed=4)
     kept = pickle.dumps(envs)
     monkeypatch.setattr(threads, "available", lambda: 3)
-    assert pickle.loads(kept).batch.engine.num_threads == 3
+    assert pickle.loads(kept).engine.num_threads == 3
     same(rolled(pickle.loads(kept)), rolled(envs))
 
 

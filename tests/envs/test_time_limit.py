@@ -29,7 +29,7 @@ def ends(env, steps):
 @pytest.mark.parametrize("env_id", [*IDS, MO])
 def test_the_spec_has_the_limit_of_the_environment(env_id):
     env = gym.make(f"hoof_env:{env_id}")
-    limit = env.unwrapped.batch.steps_per_episode
+    limit = env.unwrapped.steps_per_episode
     assert env.spec.max_episode_steps == env.unwrapped.spec.max_episode_steps == limit
     assert gym.spec(env_id).max_episode_steps is None  # of no wrapper: the environment alone ends episodes
     if env_id != MO:

@@ -13,7 +13,7 @@ from family import IDS, OTHER, ROUGH, actions, same
 
 from hoof_env import Sb3VecEnv
 from hoof_env.dynamics.parts import ONE_LEG
-from hoof_env.envs.batch import EpisodeBatch
+from hoof_env.episodes.batch import EpisodeBatch
 from hoof_env.errors import FixedSettingError, ParameterError
 from hoof_env.ground.laws import FRICTION_LAWS, NORMAL_LAWS
 from hoof_env.tasks.effects import check_effect
@@ -38,11 +38,11 @@ def episode(settings, steps=150):
     batch = EpisodeBatch(TASKS["leg"], settings, 1)
     generator = np.random.default_rng(1)
     batch.reset([0], [generator], {"crank_angle": 0.0})
-    seen = [batch.observations[0].copy()]
+    seen = [batch.rows.observations[0].copy()]
     for action in actions(3, steps):
-        batch.actions[0] = action
+        batch.rows.actions[0] = action
         batch.step([generator])
-        seen += [batch.observations[0].copy(), batch.episode[:, 0].copy()]
+        seen += [batch.rows.observations[0].copy(), batch.rows.episode[:, 0].copy()]
     return np.concatenate(seen).tobytes()
 
 
@@ -87,9 +87,9 @@ def test_what_an_environment_says_of_itself_makes_it_again(env_id):
     env = made.unwrapped
     env.reset(seed=0)
     from_spec = gym.make(gym.envs.registration.EnvSpec.from_json(made.spec.to_json())).unwrapped
-    same(from_spec.set_state(env.get_state()), env.batch.observations[0])
+    same(from_spec.set_state(env.get_state()), env.batch.rows.observations[0])
     again = gym.make(env_id, **json.loads(json.dumps(env.get_state()["settings"]))).unwrapped
-    same(again.set_state(env.get_state()), env.batch.observations[0])
+    same(again.set_state(env.get_state()), env.batch.rows.observations[0])
 
 
 def test_a_friction_law_without_a_lower_threshold_does_not_compare_with_one():
@@ -104,13 +104,13 @@ def test_reward_weights_that_are_not_named_keep_the_values_of_the_task(env_id):
     task = TASKS[gym.spec(env_id).kwargs["task"]]
     terms, plain = task.terms, check_weights(task.defaults.get("reward_weights"), task.terms)
     assert (plain != check_weights(None, terms)) == (env_id in (RAIL, FIXED, SPEED, TERRAIN, ROUGH))
-    assert gym.make(env_id).unwrapped.batch.weights == plain
+    assert gym.make(env_id).unwrapped.weights == plain
     for given in ({"peak": 1.0}, {}, None, {terms[0].name: 3.0, terms[1].name: 1.0}):
         for env in (gym.make(env_id, reward_weights=given), gym.make_vec(env_id, reward_weights=given)):
             leg = env.unwrapped
-            assert leg.batch.weights == {**plain, **(given or {})}
+            assert leg.weights == {**plain, **(given or {})}
             shown = leg.settings.reward_weights or {}
-            assert check_weights(shown, terms) == leg.batch.weights
+            assert check_weights(shown, terms) == leg.weights
             leg.reset(seed=0)
             assert (leg.get_state()["settings"]["reward_weights"] or {}) == shown
 

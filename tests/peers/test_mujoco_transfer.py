@@ -35,9 +35,9 @@ def test_in_the_air_both_move_alike(env):
         action, _ = policy.predict(observation)
         observation = env.step(action)[0]
         there.step(action)
-        report = env.unwrapped.batch.engine.report
+        report = env.unwrapped.engine.report
         assert report["toe_normal"].item() == 0.0
-        assert there.theta == pytest.approx(env.unwrapped.batch.engine.state["crank_angle"].item(), abs=2e-3)
+        assert there.theta == pytest.approx(env.unwrapped.engine.state["crank_angle"].item(), abs=2e-3)
         assert there.data.qpos[there.swing] == pytest.approx(report["swing_angle"].item(), abs=1e-2)
         for joint, name in ((there.x, "x"), (there.z, "y")):
             assert there.data.qpos[joint] == pytest.approx(report[name].item(), abs=2e-3)

@@ -46,7 +46,7 @@ def test_the_forces_of_the_record_bear_the_animal(played):
 def test_hips_stand_where_they_are_on_the_trunk(played):
     env, parts = played
     record = whole(parts)
-    for prefix, (x, _) in env.unwrapped.batch.body.hips.items():
+    for prefix, (x, _) in env.unwrapped.body.hips.items():
         arm = (record[f"{prefix}x"] - record["x"]) + 1j * (record[f"{prefix}y"] - record["y"])
         np.testing.assert_allclose(arm, x * np.exp(1j * record["pitch"]), atol=1e-12)
 

@@ -324,7 +324,7 @@ def test_copies_of_environments_go_on_alike(id, how):
         one, other = made.step(action), copied.step(action)
         assert one[0].tobytes() == other[0].tobytes()
         assert np.array_equal(one[1], other[1])
-        assert made.batch.engine._memory.data is not copied.batch.engine._memory.data
+        assert made.engine._memory.data is not copied.engine._memory.data
 
 
 def test_a_pickle_is_opened_in_a_new_process():

@@ -98,14 +98,14 @@ def test_a_control_step_does_too(id, count):
     made = (gym.make(id) if count == 1 else gym.make_vec(id, num_envs=count)).unwrapped
     made.reset(seed=0)
     batch = made.batch
-    arrays = batch.engine._memory.data, batch.episode, batch.observations, batch.rewards
+    arrays = batch.engine._memory.data, batch.rows.episode, batch.rows.observations, batch.rows.rewards
     kept = [x.copy() for x in arrays]
-    batch.kernels.step(batch.held)
+    batch.calls.kernels.step(batch.calls.held)
     wanted = [x.copy() for x in arrays]
     for array, before in zip(arrays, kept, strict=True):
         array[:] = before
     with on_machine(Sealed()):
-        batch.kernels.step(batch.held)
+        batch.calls.kernels.step(batch.calls.held)
     for array, after in zip(arrays, wanted, strict=True):
         np.testing.assert_array_equal(array[..., :count], after[..., :count])
     assert (wanted[0] != kept[0])[..., :count].any()

@@ -415,7 +415,7 @@ def test_an_empty_folder_and_a_full_one_give_the_same_bits(place):
             for _ in range(5):
                 observation, reward, *_ = env.step(env.action_space.sample())
                 found.update(observation.tobytes() + np.asarray(reward).tobytes())
-                found.update(env.unwrapped.batch.engine._memory.data.tobytes())
+                found.update(env.unwrapped.engine._memory.data.tobytes())
         print(found.hexdigest(), len(COMPILED))
     """
     first, count = ended(start_python(code, place))[0].split()

@@ -206,7 +206,7 @@ def test_a_debugger_sees_arrays_in_the_contact_of_an_environments_step():
             env.step(env.action_space.sample())
         finally:
             sys.settrace(before)
-    stages = env.batch.engine.substeps * round(env.batch.dt / env.batch.engine.sim_dt) * 2
+    stages = env.engine.substeps * round(env.dt / env.engine.sim_dt) * 2
     assert len(seen) == 2 * (stages + 1)  # toe and heel
     assert all(isinstance(x, np.ndarray) and x.shape == (1,) for pair in seen for x in pair)
     assert any(depth[0] > 0 and force[0] > 0 for depth, force in seen)

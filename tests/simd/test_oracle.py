@@ -249,8 +249,8 @@ def step_both(made, steps=1):
             if key.startswith("reward_"):
                 np.testing.assert_array_equal(found[4][key], info[key])
         count = made.batch.num_envs
-        assert_same_bits(memory_of(made.batch.engine), memory_of(other.batch.engine))
-        assert_same_bits(made.batch.episode[:, :count], other.batch.episode[:, :count])
+        assert_same_bits(memory_of(made.engine), memory_of(other.engine))
+        assert_same_bits(made.batch.rows.episode[:, :count], other.batch.rows.episode[:, :count])
     return other
 
 
@@ -319,4 +319,4 @@ def own_id():
 def test_a_control_step_of_ones_own_id(own_id, count):
     made = gym.make(own_id) if count == 1 else gym.make_vec(own_id, num_envs=9)
     other = step_both(made.unwrapped)
-    assert "angle" in other.batch.names
+    assert "angle" in other.observation_names

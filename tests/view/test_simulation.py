@@ -100,7 +100,7 @@ def test_the_law_gives_the_simulated_force_for_the_simulated_ground(env_id, argu
     simulation = Simulation(env_id, arguments)
     simulation.reset()
     env = simulation.env.unwrapped
-    same = OtherGround(env.batch, (arguments["restitution"],))
+    same = OtherGround(env, (arguments["restitution"],))
     same.begin(env.record())
     worst, most, seen = 0.0, 0.0, 0
     for _ in range(60):
@@ -123,11 +123,11 @@ def test_the_law_gives_the_simulated_force_for_the_simulated_ground(env_id, argu
 
 
 def test_a_law_from_outside_has_no_such_curve_and_the_page_says_so():
-    batch = Simulation(LEG).env.unwrapped.batch
-    task = replace(batch.task, contact_law=max)
-    others = SimpleNamespace(task=task, settings=batch.settings, body=batch.body)
+    leg = Simulation(LEG).env.unwrapped
+    task = replace(leg.task, contact_law=max)
+    others = SimpleNamespace(task=task, resolved_settings=leg.resolved_settings, body=leg.body)
     assert "outside the package" in OtherGround(others).refusal
-    assert OtherGround(batch).refusal == ""
+    assert OtherGround(leg).refusal == ""
 
 
 def test_a_touch_acts_at_once_as_an_environment_made_so_would():
@@ -155,7 +155,7 @@ def test_a_touch_acts_at_once_as_an_environment_made_so_would():
         changed += np.any(chunk.columns["toe_normal"][same] != before["toe_normal"][rows])
     assert changed
     record = simulation.env.unwrapped.record()
-    same = OtherGround(simulation.env.unwrapped.batch, (0.9,))
+    same = OtherGround(simulation.env.unwrapped, (0.9,))
     same.set_ground(simulation.parameters)
     np.testing.assert_allclose(
         same.forces(record)[0], (record["toe_normal"] + record["heel_normal"])[..., 0], atol=1e-6
@@ -367,11 +367,11 @@ def test_elastic_and_inelastic_are_the_forces_of_the_papers_restitutions():
     for _ in range(60):
         chunk = simulation.step()
         env = simulation.env.unwrapped
-        by_law = OtherGround(env.batch, (1.0, 0.0)).forces(env.record())[..., 0]
+        by_law = OtherGround(env, (1.0, 0.0)).forces(env.record())[..., 0]
         np.testing.assert_array_equal([chunk.normals["elastic"], chunk.normals["inelastic"]], by_law)
         # Elastic ground is a spring: K depth^n, without a loss.
         depth = np.array([chunk.columns[f"{point}_depth"] for point in ("toe", "heel")])
-        settings = env.batch.settings
+        settings = env.resolved_settings
         spring = settings.stiffness * np.maximum(depth, 0.0) ** settings.exponent
         np.testing.assert_allclose(chunk.normals["elastic"], spring.sum(axis=0), atol=1e-6)
         loaded += chunk.normals["elastic"].max() > 100

@@ -155,9 +155,9 @@ def test_a_warning_waits_until_the_page_has_opened(tmp_path, monkeypatch):
 def test_a_push_adds_its_impulse_over_the_mass(page):
     page.tick(0.1)
     leg = page.player.simulation.env.unwrapped
-    before = leg.batch.engine.state["momentum_x"].item()
+    before = leg.engine.state["momentum_x"].item()
     assert "60 N s" in page.ask("push", value=60)["status"]
-    assert leg.batch.engine.state["momentum_x"].item() == pytest.approx(before + 60)
+    assert leg.engine.state["momentum_x"].item() == pytest.approx(before + 60)
 
 
 @pytest.mark.parametrize(

@@ -7,7 +7,7 @@ moves them one place on. Both are numbers of one row after the other, so these l
 
 from __future__ import annotations
 
-from hoof_env.envs.scene import Scene
+from hoof_env.episodes.scene import Scene
 from hoof_env.simd import Pointer, Whole, whole
 from hoof_env.simd.math import clip
 

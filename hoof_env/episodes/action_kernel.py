@@ -5,8 +5,8 @@ from __future__ import annotations
 
 from typing import Any
 
-from hoof_env.envs.frames_kernel import put_action
-from hoof_env.envs.scene import Scene
+from hoof_env.episodes.frames_kernel import put_action
+from hoof_env.episodes.scene import Scene
 from hoof_env.simd import Cell, Truth, Whole, full, loop, read, write
 from hoof_env.simd.math import clip
 from hoof_env.simd.user_functions import foreign

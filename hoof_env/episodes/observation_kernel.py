@@ -5,8 +5,8 @@ from __future__ import annotations
 from typing import Any
 
 from hoof_env.dynamics.advance import LANES
-from hoof_env.envs.frames_kernel import publish
-from hoof_env.envs.scene import Scene, functions_of, is_from_outside
+from hoof_env.episodes.frames_kernel import publish
+from hoof_env.episodes.scene import Scene, functions_of, is_from_outside
 from hoof_env.simd import Lanes, Whole, apply_to_rows, full_like, loop, new_rows, rolled, when, where, write
 from hoof_env.simd.math import clip, tanh
 from hoof_env.simd.noise import uniform

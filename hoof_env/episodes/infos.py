@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from hoof_env._display import html_table
 from hoof_env.dynamics.layout import (
     LEG_REPORT,
     PLAIN,
@@ -24,7 +25,6 @@ from hoof_env.dynamics.layout import (
     stride_sums,
 )
 from hoof_env.dynamics.names import present_name
-from hoof_env.envs.shown import html_table
 from hoof_env.gait import parameter_names
 
 
@@ -51,6 +51,7 @@ class InfoLayout:
     """
 
     def __init__(self, features: Features, prefixes: tuple[str, ...]) -> None:
+        self._arguments = features, prefixes
         self.names = measured_names(features, prefixes)
         self.kind = _kind(self.names)
         form = engine_layout(features)
@@ -66,6 +67,10 @@ class InfoLayout:
         self._rows: Any = slice(rows[0], rows[-1] + 1) if is_slice else np.array(rows)
         sums = [f"{prefix}{name}" for prefix in prefixes for name in stride_sums(features)]
         self.last_step = np.array([k for k, name in enumerate(self.names) if name in sums])
+
+    def __reduce__(self) -> Any:
+        """Pickle the arguments: the class of `kind` is made at run time."""
+        return InfoLayout, self._arguments
 
     def read(self, memory: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return a copy of the measurements in columns of memory, shape (rows, ...)."""

@@ -17,7 +17,7 @@ from hoof_env.dynamics.layout import engine_layout
 from hoof_env.dynamics.memory import LIFT_OFF
 from hoof_env.dynamics.names import NamedColumns
 from hoof_env.dynamics.parts import broken
-from hoof_env.envs.batch import EpisodeBatch
+from hoof_env.episodes.batch import EpisodeBatch
 from hoof_env.record.columns import Columns, columns_of
 from hoof_env.record.surroundings import Surroundings
 
@@ -29,15 +29,15 @@ Record = dict[str, NDArray[np.float64]]
 
 def surroundings_of(batch: EpisodeBatch, env: int = 0) -> Surroundings:
     """Return the surroundings of an environment of a batch."""
-    weight = float(batch.episode_rows.weight[env])
+    weight = float(batch.rows.named.weight[env])
     return Surroundings(
-        batch.body.geometry,
-        batch.conditions.of(env).get("terrain", batch.engine.terrain),
-        batch.settings.trunk,
+        batch.plan.body.geometry,
+        batch.row_plans.of(env).terrain,
+        batch.plan.settings.trunk,
         weight,
-        LIFT_OFF * weight / batch.legs,
-        batch.body.hips,
-        batch.body.picture,
+        LIFT_OFF * weight / batch.plan.legs,
+        batch.plan.body.hips,
+        batch.plan.body.picture,
     )
 
 
@@ -46,10 +46,10 @@ def commands_of_step(
 ) -> list[tuple[NDArray[np.float64], int]]:
     """Return the commands of a control step, shape (legs, gait parameters), each with the number of substeps
     in which it acts, from the memory of the engine before and after the step."""
-    late = batch.action_delay.substeps
+    late = batch.plan.delays.action.substeps
     earlier, own = (batch.engine.command_in(column) for column in (before, after))
     # Until the step's action acts, the command before it stands.
-    return [(earlier, late), (own, batch.substeps - late)] if late else [(own, batch.substeps)]
+    return [(earlier, late), (own, batch.plan.substeps - late)] if late else [(own, batch.plan.substeps)]
 
 
 class Recording:
@@ -64,9 +64,9 @@ class Recording:
         self.batch = batch
         self.env = env
         # Memory at the end of control steps; the first one is a start, or precedes the oldest step.
-        self._ends: deque[Any] = deque(maxlen=round(KEPT_SECONDS / batch.dt) + 2)
+        self._ends: deque[Any] = deque(maxlen=round(KEPT_SECONDS / batch.plan.dt) + 2)
         self._engine: TrunkEngine | None = None
-        self._conditions = batch.conditions.of(env)
+        self._plan = batch.row_plans.of(env)
         self._find()
 
     def _find(self) -> None:
@@ -79,11 +79,11 @@ class Recording:
 
     def begin(self) -> None:
         """Begin anew after a reset or another state, to which earlier steps did not lead."""
-        conditions = self.batch.conditions.of(self.env)
+        plan = self.batch.row_plans.of(self.env)
         # With other settings the engine may have another ground.
-        if conditions is not self._conditions and (conditions or self._conditions):
+        if plan is not self._plan:
             self.close()
-            self._conditions = conditions
+            self._plan = plan
         self._ends.clear()
         self.add()
 

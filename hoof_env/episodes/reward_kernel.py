@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from hoof_env.dynamics.limits import has_moved
-from hoof_env.envs.scene import Scene, is_from_outside
+from hoof_env.episodes.scene import Scene, is_from_outside
 from hoof_env.simd import Lanes, Whole, where
 from hoof_env.simd.user_functions import foreign
 from hoof_env.tasks.reward import Outcome, Term

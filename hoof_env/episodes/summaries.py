@@ -1,4 +1,4 @@
-"""Reports on a batch of episodes: infos, summaries of episodes that ended, reasons of failures."""
+"""Infos of a batch of episodes, summaries of episodes that ended, and reasons of failures."""
 
 from __future__ import annotations
 
@@ -11,7 +11,8 @@ from numpy.typing import NDArray
 from hoof_env.dynamics.layout import stride_sums
 from hoof_env.dynamics.names import NamedColumns
 from hoof_env.dynamics.parts import Result, broken
-from hoof_env.envs.infos import name_columns
+from hoof_env.episodes.batch import EpisodeBatch
+from hoof_env.episodes.infos import name_columns
 from hoof_env.tasks.episode import FAILED, TRUNCATED
 
 Floats = NDArray[np.float64]
@@ -47,7 +48,7 @@ SUMMARY = {
 horse's mean force and sum of peaks are sums over its legs, its duty factor is the mean of its legs."""
 
 
-def infos_of(batch: Any, ended: bool = True) -> dict[str, NDArray[Any]]:
+def infos_of(batch: EpisodeBatch, ended: bool = True) -> dict[str, NDArray[Any]]:
     """Return the infos of all environments: start values, measurements, and terms of the last reward.
 
     Args:
@@ -59,7 +60,7 @@ def infos_of(batch: Any, ended: bool = True) -> dict[str, NDArray[Any]]:
         (num_envs, numbers).
     """
     n = batch.num_envs
-    values = batch.start_values.copy()
+    values = batch.rows.start_values.copy()
     memory = batch.engine.arrays[0]
     measured = batch.measurements.read(memory[:, :n])
     for env, before_push in batch.unpushed.items():
@@ -68,43 +69,44 @@ def infos_of(batch: Any, ended: bool = True) -> dict[str, NDArray[Any]]:
     if ended:
         failed = broken(batch.engine.results)
         measured[np.ix_(batch.measurements.last_step, failed)] = 0.0
-    first = batch.start_row_count
-    names = batch.body.start_names
+    body = batch.plan.body
+    first = len(batch.plan.start_names)
+    names = body.start_names
     infos: dict[str, NDArray[Any]] = dict(zip(names, values, strict=False))
-    infos["gait"] = name_columns(values[len(names) : first].T, batch.body.gait_names)
+    infos["gait"] = name_columns(values[len(names) : first].T, body.gait_names)
     if batch.drawn_names:
         infos["parameters"] = name_columns(values[first:].T, tuple(batch.drawn_names))
-    if batch.target_speed:
-        infos["target_speed"] = batch.episode_rows.target[:n].copy()
+    if batch.plan.commands.speeds:
+        infos["target_speed"] = batch.rows.named.target[:n].copy()
     infos["measured"] = measured.T.view(batch.measurements.kind)
-    infos.update(zip(batch.terms, batch.episode_rows.terms[:, :n].copy(), strict=True))
+    infos.update(zip(batch.terms, batch.rows.named.terms[:, :n].copy(), strict=True))
     return infos
 
 
-def summary_of(batch: Any, env: int) -> dict[str, float]:
+def summary_of(batch: EpisodeBatch, env: int) -> dict[str, float]:
     """Return the figures of one episode by name, see `summaries_of`."""
     return NamedColumns({name: float(values[0]) for name, values in summaries_of(batch, [env]).items()})
 
 
-def summaries_of(batch: Any, envs: Sequence[int] | NDArray[np.int64]) -> dict[str, Floats]:
+def summaries_of(batch: EpisodeBatch, envs: Sequence[int] | NDArray[np.int64]) -> dict[str, Floats]:
     """Return the figures `SUMMARY` of the episodes of some environments, by name, shape (len(envs),) each."""
-    seconds = batch.episode_rows.time[envs]
-    distance = batch.episode_rows.distance[envs]
+    seconds = batch.rows.named.time[envs]
+    distance = batch.rows.named.distance[envs]
     names = stride_sums(batch.engine.features)
-    total = dict(zip(names, batch.episode_rows.sums[:, envs], strict=True))
+    total = dict(zip(names, batch.rows.named.sums[:, envs], strict=True))
     work = total["positive_work"]
     stances = total["stances"]
-    weight = batch.episode_rows.weight[envs]
+    weight = batch.rows.named.weight[envs]
     # An episode of which no step was simulated has no duration.
     time = np.maximum(seconds, 1e-12)
     mean = total["normal_impulse"] / time
     each = np.maximum(stances, 1.0)
-    steps = np.rint(seconds / batch.dt)
+    steps = np.rint(seconds / batch.plan.dt)
     cost = np.full(len(work), np.inf)
     np.divide(work, weight * distance, out=cost, where=distance > 0)
     return {
         # Rounded, because the sum of the steps of ten seconds is 9.99...
-        "seconds": np.array([round(count * batch.dt, 12) for count in steps]),
+        "seconds": np.array([round(count * batch.plan.dt, 12) for count in steps]),
         "distance_m": distance,
         "speed_m_s": distance / time,
         "highest_grf_n": total["highest_grf"],
@@ -112,25 +114,25 @@ def summaries_of(batch: Any, envs: Sequence[int] | NDArray[np.int64]) -> dict[st
         "stance_peak_sum_n": total["peak_grf_increase"],
         "stances": stances,
         "loading_rate_n_s": total["loading_rate_increase"] / each,
-        "duty_factor": total["loaded_time"] / time / batch.legs,
+        "duty_factor": total["loaded_time"] / time / batch.plan.legs,
         "slip_m": total["slip"] / each,
         "positive_work_j": work,
         "cost_of_transport": cost,
         "weight_share": mean / weight,
         "support_share": 1 - mean / weight,
-        "failed": (batch.episode_rows.ended[envs] == FAILED).astype(np.float64),
+        "failed": (batch.rows.named.ended[envs] == FAILED).astype(np.float64),
         "success": is_success(batch, envs).astype(np.float64),
     }
 
 
-def is_success(batch: Any, envs: Sequence[int] | NDArray[np.int64]) -> NDArray[np.bool_]:
+def is_success(batch: EpisodeBatch, envs: Sequence[int] | NDArray[np.int64]) -> NDArray[np.bool_]:
     """Return a mask of the environments whose episodes ended at the time limit, at `SUCCESS_SPEED` of the
     commanded speed or more, in the mean; where a target is only the speed up to which progress is paid, it
     counts as commanded."""
-    lasted = batch.episode_rows.ended[envs] == TRUNCATED
-    commanded = batch.episode_rows.commanded[envs]
+    lasted = batch.rows.named.ended[envs] == TRUNCATED
+    commanded = batch.rows.named.commanded[envs]
     asked = SUCCESS_SPEED * np.where(np.isfinite(commanded), commanded, -np.inf)
-    successful: NDArray[np.bool_] = lasted & (batch.episode_rows.distance[envs] >= asked)
+    successful: NDArray[np.bool_] = lasted & (batch.rows.named.distance[envs] >= asked)
     return successful
 
 
@@ -138,12 +140,12 @@ TIME_LIMIT = "time limit"
 """Reason in `info["end"]` of an episode that did not fail."""
 
 
-def end_of(batch: Any, env: int) -> str:
+def end_of(batch: EpisodeBatch, env: int) -> str:
     """Return why an episode ended, in words."""
-    return failure_of(batch, env) if batch.episode_rows.ended[env] == FAILED else TIME_LIMIT
+    return failure_of(batch, env) if batch.rows.named.ended[env] == FAILED else TIME_LIMIT
 
 
-def ending_of(batch: Any, env: int) -> dict[str, Any]:
+def ending_of(batch: EpisodeBatch, env: int) -> dict[str, Any]:
     """Return the entries of the info of one environment whose episode ends.
 
     The reason is the name of a flag: where other steps lack an entry libraries pad a number with 0, but words
@@ -154,7 +156,7 @@ def ending_of(batch: Any, env: int) -> dict[str, Any]:
     return {"episode_summary": summary, "end": {end_of(batch, env): True}, "is_success": success}
 
 
-def failure_of(batch: Any, env: int) -> str:
+def failure_of(batch: EpisodeBatch, env: int) -> str:
     """Return the reason why an episode failed, in words."""
     if batch.paper and batch.paper.apart[env]:
         return "the linkage came apart; the state was put back to the last good one"
@@ -163,7 +165,7 @@ def failure_of(batch: Any, env: int) -> str:
     return result.message if result is not Result.OK else "the trunk left its range of heights"
 
 
-def endings_of(batch: Any, done: NDArray[np.bool_]) -> dict[str, Any]:
+def endings_of(batch: EpisodeBatch, done: NDArray[np.bool_]) -> dict[str, Any]:
     """Return the entries of infos for episodes that end, in the form of Gymnasium's `_add_info`, which adds
     one environment after the other.
 

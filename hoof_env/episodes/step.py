@@ -15,12 +15,12 @@ from typing import Any
 
 from hoof_env.dynamics.advance import LANES, ONE_BY_ONE, SIDE_BY_SIDE, Advance, Arrangement
 from hoof_env.dynamics.limits import PITCH, has_moved
-from hoof_env.envs.action_kernel import apply, are_numbers
-from hoof_env.envs.frames_kernel import remember
-from hoof_env.envs.observation_kernel import Observer, put_entries
-from hoof_env.envs.outcome import add_up, decide, find_outcome, put_together
-from hoof_env.envs.reward_kernel import compute_reward
-from hoof_env.envs.scene import Scene, TaskKind
+from hoof_env.episodes.action_kernel import apply, are_numbers
+from hoof_env.episodes.frames_kernel import remember
+from hoof_env.episodes.observation_kernel import Observer, put_entries
+from hoof_env.episodes.outcome import add_up, decide, find_outcome, put_together
+from hoof_env.episodes.reward_kernel import compute_reward
+from hoof_env.episodes.scene import Scene, TaskKind
 from hoof_env.simd import Cell, Truth, Whole, any_lane, block_at, loop, new_rows, when, where, write
 from hoof_env.simd.compile import Kernel
 from hoof_env.simd.memory import Arrays, Given

@@ -1,0 +1,1 @@
+"""Episodes of tasks, one or many at once: plans, rows, features, kernels."""

@@ -1,0 +1,672 @@
+"""Episodes of a task, one or many at once, for the single and the vector environment.
+
+`EpisodeBatch` works with arrays and generators and does not depend on Gymnasium. A row has the same bits for
+any number of neighbours: its starts are drawn from its own generator, and the kernels are those of `step`,
+compiled for one environment or for several side by side.
+
+What follows from settings is a `plan.Plan`, what changes from step to step are the arrays of `rows.Rows`, and
+`row_plans.RowPlans` says which row is under which plan.
+"""
+
+from __future__ import annotations
+
+import copy
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from hoof_env.dynamics.advance import LANES, EngineKind
+from hoof_env.dynamics.engine import TrunkEngine
+from hoof_env.dynamics.layout import engine_layout
+from hoof_env.dynamics.model import static_of
+from hoof_env.dynamics.parts import Mechanics, broken
+from hoof_env.episodes.infos import InfoLayout
+from hoof_env.episodes.outcome import MOVED
+from hoof_env.episodes.plan import Plan, make_plan
+from hoof_env.episodes.row_plans import RowPlans
+from hoof_env.episodes.rows import only
+from hoof_env.episodes.scene import ALL_ARRAYS, TaskKind, known_of
+from hoof_env.episodes.step import (
+    NOT_A_NUMBER,
+    SOME_ENDED,
+    SOME_PUSHED,
+    SOME_SWITCHED,
+    StepKernels,
+    step_kernels,
+)
+from hoof_env.errors import ParameterError
+from hoof_env.paper_solver.episodes import PaperSolver, solver_of
+from hoof_env.simd.compile import Kernel
+from hoof_env.simd.memory import Held
+from hoof_env.simd.threads import run_together
+from hoof_env.simd.user_functions import UserFunctionError, user_error
+from hoof_env.tasks.registry import Task
+from hoof_env.tasks.reward import BEARING, LONGEST_STRIDE
+from hoof_env.tasks.settings import ResolvedSettings, Settings
+
+Floats = NDArray[np.float64]
+Index = NDArray[np.int64]
+Generators = Sequence[np.random.Generator]
+
+
+@dataclass(frozen=True)
+class Calls:
+    """Kernels of a plan, with the arrays of a batch in this process.
+
+    Attributes:
+        kernels: all kernels of the task.
+        step: control step of all rows: a kernel, or a method that calls the paper's solver between kernels.
+        held: its argument.
+        blocks: its arguments for each thread.
+    """
+
+    kernels: StepKernels
+    step: Callable[..., Any]
+    held: Held
+    blocks: list[tuple[Held]]
+
+
+class EpisodeBatch:
+    """`num_envs` episodes of a task.
+
+    Attributes:
+        task: task of all episodes.
+        plan: plan under which the batch works at present.
+        row_plans: plans of all rows.
+        rows: arrays that change from step to step.
+        engine: engine of all episodes. Memory and arrays have `engine.columns` columns; the last may be idle.
+        paper: solver of the paper, None with the engine's kernels.
+        calls: kernels of the present plan with their arguments; `calls.step(calls.held)` is one control step
+            of all episodes, which `finish_step` follows.
+        drawn_names: names of the parameters that any row draws, in the order of `rows.start_values`.
+        measurements: places of the values in the engine's memory that infos contain.
+        is_push_unseen: True if a trunk was pushed since the last step, which no observation shows yet.
+        unpushed: what was measured at the end of the last step, by row, in rows that were due to be pushed.
+
+    Args:
+        task: task of all episodes.
+        settings: settings of the task, see `Task.settings`.
+        num_envs: number of episodes.
+        num_threads: number of threads that share the episodes in a step.
+        max_episode_steps: control steps after which episodes are truncated, if they are not shorter already.
+
+    Raises:
+        ParameterError: a setting is out of range or of the wrong type, or a function cannot be compiled.
+    """
+
+    def __init__(
+        self,
+        task: Task,
+        settings: Settings,
+        num_envs: int,
+        num_threads: int = 1,
+        max_episode_steps: int | None = None,
+    ) -> None:
+        self.task = task
+        self.num_envs = num_envs
+        self._max_episode_steps = max_episode_steps
+        self.plan, self.engine = make_plan(task, settings, num_envs, num_threads, max_episode_steps)
+        self.paper: PaperSolver | None = solver_of(self.plan.settings, self.engine, self.plan.substeps)
+        self.row_plans = RowPlans([self.plan], num_envs)
+        self.rows = self.plan.rows(num_envs, self.engine.columns)
+        self.rows.named.weight[:] = self.engine.weight
+        # Columns without an environment never switch, so that they cause no draw.
+        self.rows.named.switch[:] = np.inf
+        self.rows.named.push_at[:] = np.inf
+        self.drawn_names = [*self.plan.randomization.ranges]
+        self.measurements = InfoLayout(self.engine.features, tuple(self.plan.body.hips))
+        self.is_push_unseen = False
+        self.unpushed: dict[int, Floats] = {}
+        self._kernels: dict[TaskKind, StepKernels] = {}
+        self._calls: dict[Plan, Calls] = {}
+        self._open()
+        self._compile(self.calls.kernels)
+
+    # What follows from the present plan
+
+    @property
+    def settings(self) -> ResolvedSettings:
+        """Settings, with values in place of None."""
+        return self.plan.settings
+
+    @property
+    def terms(self) -> tuple[str, ...]:
+        """Keys of the reward's terms in infos."""
+        return tuple(term.key for term in self.task.terms)
+
+    @property
+    def ended_row(self) -> int:
+        """Row of `Episode.ended` in the memory of the episodes."""
+        row: int = self.rows.layout.rows("ended").start
+        return row
+
+    # Plans of rows
+
+    def change(self, asked: Sequence[Settings], groups: Sequence[Sequence[int]]) -> None:
+        """Start episodes from now on with other settings, some of those that `row_plans.CHANGEABLE` names.
+
+        Args:
+            asked: all settings, for each group of rows.
+            groups: these groups.
+
+        Raises:
+            ParameterError: a setting is out of range, or a function from outside cannot be part of kernels
+                for other ground; nothing has changed then.
+        """
+        plans = [self.plan_of(settings) for settings in asked]
+        for plan in plans:
+            self._compile(self._kernels_of(plan))
+        for plan, group in zip(plans, groups, strict=True):
+            self.row_plans.add(plan, np.array(group))
+
+    def plan_of(self, settings: Settings) -> Plan:
+        """Return the plan of some settings, one that rows have already if there is one."""
+        known = self.row_plans.find(settings)
+        return known or make_plan(self.task, settings, max_episode_steps=self._max_episode_steps)[0]
+
+    def enter(self, plan: Plan) -> None:
+        """Work under a plan."""
+        self.plan = plan
+        self.engine.mechanics = plan.mechanics
+        self.calls = self._calls_of(plan)
+
+    def put_under(self, row_plans: RowPlans) -> None:
+        """Work under plans of the rows."""
+        self.row_plans = row_plans
+        self._calls = {plan: calls for plan, calls in self._calls.items() if plan in row_plans.plans}
+        self.enter(row_plans.newest)
+        self._name_drawn()
+
+    def _adopt(self, which: Index) -> None:
+        """Put rows under their pending plans."""
+        plans = self.row_plans
+        # The engine's constants of these rows are those of their old settings.
+        self.rows.has_overrides[which[plans.present[which] != plans.pending[which]]] = True
+        plans.start(which)
+        self.put_under(plans)
+
+    def _name_drawn(self) -> None:
+        """Give `start_values` a row for each parameter that any row draws, NaN where one does not."""
+        old, old_values = self.drawn_names, self.rows.start_values
+        ranges = [plan.randomization.ranges for plan in self.row_plans.in_use()]
+        self.drawn_names = [*dict.fromkeys(name for each in ranges for name in each)]
+        if self.drawn_names == old:
+            return
+        first = len(self.plan.start_names)
+        values = np.full((first + len(self.drawn_names), self.num_envs), np.nan)
+        values[:first] = old_values[:first]
+        for k, name in enumerate(self.drawn_names):
+            if name in old:
+                values[first + k] = old_values[first + old.index(name)]
+        self.rows.start_values = values
+
+    def under_each(
+        self, which: Index, act: Callable[[Index], Any], *, for_kernels: bool = False
+    ) -> list[Any]:
+        """Call a function once under each plan that some rows are under; return its results.
+
+        Args:
+            which: rows that are to be changed.
+            act: function of the rows that are under the present plan; changes of other rows are undone.
+            for_kernels: True for a function that only runs kernels: once where they do not distinguish.
+        """
+        results = []
+        try:
+            for plan, group in self.row_plans.groups(which, for_kernels=for_kernels):
+                self.enter(plan)
+                with self.only(group):
+                    results.append(act(group))
+        finally:
+            self.enter(self.row_plans.newest)
+        return results
+
+    @contextmanager
+    def only(self, which: Index) -> Iterator[None]:
+        """Restore all rows but some after a block."""
+        data, *_, reactions = self.engine.arrays
+        arrays = [(data, -1), *([(reactions, -1)] if reactions.size else []), *self.rows.written()]
+        with only(which, self.num_envs, arrays):
+            yield
+
+    def restart_schedules(self, which: Sequence[int] | Index) -> None:
+        """Begin the schedules of rows anew with the next start, which counts the steps of the present
+        episode."""
+        self.rows.steps_before[which] = -self.rows.named.steps[which]
+
+    # Starts
+
+    def check_options(self, options: Any, which: Index | None = None) -> dict[str, Any]:
+        """Check reset options completely, so that a refused reset changes nothing; return them in the form
+        that `reset` takes.
+
+        Args:
+            options: the options.
+            which: rows that start, each under its pending plan; None for all.
+
+        Raises:
+            ParameterError: an unknown option, or one that some of the episodes cannot have.
+        """
+        plans = self.row_plans
+        which = np.arange(self.num_envs) if which is None else which
+        if not plans.are_due(which) and not plans.are_mixed:
+            return self._check_options(options)
+        checked: dict[str, Any] = {}
+        try:
+            for k in np.unique(plans.pending[which]).tolist():
+                self.enter(plans.plans[k])
+                checked = self._check_options(options)
+        finally:
+            self.enter(plans.newest)
+        return checked
+
+    def _check_options(self, options: Any) -> dict[str, Any]:
+        """Check reset options under the present plan."""
+        plan = self.plan
+        checked = plan.body.check_options(options, self.engine.trunk, plan.settings)
+        if self.paper and checked.get("parameters"):
+            raise ParameterError(
+                f"options['parameters']: expected none with solver=\"paper\", got {checked['parameters']!r}"
+            )
+        gaits = checked.get("gait")
+        if isinstance(gaits, np.ndarray) and gaits.ndim == 2 and len(gaits) != self.num_envs:
+            raise ParameterError(
+                f"options['gait']: expected one gait or {self.num_envs}, one for each environment, got"
+                f" {len(gaits)}"
+            )
+        if "pushes" in checked:
+            checked["pushes"] = plan.pushes.check_option(checked["pushes"])
+        plan.randomization.check(checked.get("parameters", {}), self.engine.substeps)
+        return checked
+
+    def reset(
+        self, envs: Sequence[int] | Index, generators: Generators, options: Mapping[str, Any]
+    ) -> dict[str, Floats]:
+        """Start episodes in `envs`, with a generator for each and options of `check_options`. Return the
+        "parameters" that were drawn or set, by name, shape (len(envs),)."""
+        which = np.asarray(envs, np.int64)
+        if self.row_plans.are_due(which):
+            self._adopt(which)
+        if self.row_plans.are_mixed:
+            each = dict(zip(which.tolist(), generators, strict=True))
+            drawn: dict[str, Floats] = {}
+
+            def begin(group: Index) -> None:
+                values = self._start(group, [each[row] for row in group.tolist()], options)
+                at = np.isin(which, group)
+                for name, of_rows in values.items():
+                    drawn.setdefault(name, np.full(len(which), np.nan))[at] = of_rows
+
+            self.under_each(which, begin)
+            return drawn
+        # A start evaluates its neighbours again, too, and with pushes that are unseen.
+        if self.is_push_unseen:
+            with self.only(which):
+                return self._start(which, generators, options)
+        return self._start(which, generators, options)
+
+    def _start(self, which: Index, generators: Generators, options: Mapping[str, Any]) -> dict[str, Floats]:
+        """Start episodes under the present plan, see `reset`. The order of the draws from a generator is part
+        of what a seed means."""
+        plan, rows, engine = self.plan, self.rows, self.engine
+        options = {**self.task.start, **options}
+        self.unpushed = {env: values for env, values in self.unpushed.items() if env not in which}
+        rows.steps_before[which] += rows.named.steps[which]
+        drawn = self._draw_parameters(which, generators, options.get("parameters", {}))
+        gaits: Any = options.get("gait")
+        # Gaits of all environments, of which only some start.
+        if np.ndim(gaits) == 2:
+            options = {**options, "gait": gaits[which]}
+        start = plan.body.draw(options, generators, engine)
+        self._clear(which)
+        for feature in plan.features:
+            feature.begin(rows, which, generators, options)
+        plan.body.complete_start(start, rows.named.target[which], options, engine)
+        engine.reset(start.commands, start.theta, envs=which, **start.trunk)
+        # Other rows may draw parameters that these do not.
+        missing = np.full(len(which), np.nan)
+        own = [drawn[name] if name in plan.randomization.ranges else missing for name in self.drawn_names]
+        values = [start.values[name] for name in plan.body.start_names]
+        rows.start_values[:, which] = [*values, *start.gaits.T, *own]
+        rows.named.x_before[which] = start.trunk["x"]
+        plan.body.begin_episodes(rows.named, which, start)
+        if self.paper:
+            places = (start.values[name] for name in ("crank_angle", "x"))
+            self.paper.start(which.tolist(), start.gaits, *places)
+        # Whole groups of lanes, from the first environment's to the last one's: kernels take no parts.
+        begin, end = (int(row) // LANES * LANES for row in (which.min(), which.max() + LANES))
+        groups = range(begin, min(engine.columns, end))
+        self.observe(groups)
+        if plan.delays.fill_past(rows, which):
+            # Again, with what the first one saw as all that was ever seen.
+            self.observe(groups)
+        return drawn
+
+    def _draw_parameters(
+        self, which: Index, generators: Generators, of_options: Mapping[str, Any]
+    ) -> dict[str, Floats]:
+        """Draw the physical parameters of some rows; return them by name."""
+        randomization = self.plan.randomization
+        names = {**randomization.ranges, **of_options}
+        drawn = {name: np.zeros(len(which)) for name in names}
+        # Also without parameters if the last episode had some: they were for that one only.
+        if names or self.rows.has_overrides[which].any():
+            for k, (env, generator) in enumerate(zip(which.tolist(), generators, strict=True)):
+                values = randomization.draw(self.rows, env, generator, of_options, self.engine)
+                for name, value in values.items():
+                    drawn[name][k] = value
+            self.rows.has_overrides[which] = bool(names)
+        return drawn
+
+    def _clear(self, which: Index) -> None:
+        """Set what rows count and keep to its value at the start of an episode."""
+        episode = self.rows.named
+        for row in (episode.steps, episode.time, episode.distance, episode.commanded, episode.ended):
+            row[which] = 0.0
+        self.rows.rewards[which] = 0.0
+        # The full allowance: a leg can bear its weight from the first step on.
+        episode.allowance[which] = BEARING * LONGEST_STRIDE
+        episode.terms[:, which] = 0.0
+        episode.sums[:, which] = 0.0
+        begins = [row.begin for term in self.task.terms for row in term.keeps]
+        if begins:
+            episode.own[:, which] = np.array(begins)[:, None]
+
+    # Steps
+
+    def step(self, generators: Generators, idle: NDArray[np.bool_] | None = None) -> bool:
+        """Take one control step under `rows.actions`; return True if any episode ended. Nothing is drawn for
+        `idle` environments, shape (num_envs,), which are between two episodes.
+
+        Raises:
+            ParameterError: an action is not finite; no environment was advanced then.
+        """
+        if self.row_plans.differ:
+            everywhere = np.arange(self.num_envs)
+            codes = self.under_each(everywhere, lambda group: self._step(), for_kernels=True)
+            happened = int(np.bitwise_or.reduce(codes))
+        else:
+            happened = self._step()
+        # A step between two episodes does not count.
+        if idle is not None:
+            self.rows.named.steps[: self.num_envs][idle] -= 1.0
+        return self.finish_step(happened, generators, idle)
+
+    def _step(self) -> int:
+        """Run the kernel on all rows, shared among threads; return its code, see `step.NOT_A_NUMBER`."""
+        # Every thread checks all actions: all return NOT_A_NUMBER, which is -1, or none does.
+        calls = self.calls
+        return int(np.bitwise_or.reduce(run_together(calls.step, calls.blocks, self.engine.num_threads)))
+
+    def finish_step(
+        self, happened: int, generators: Generators, idle: NDArray[np.bool_] | None = None
+    ) -> bool:
+        """Finish a `step` after its kernel, which returned the code `happened`."""
+        if happened == NOT_A_NUMBER:
+            raise ParameterError("action: expected finite numbers, got some that are not")
+        self._check_mapped()
+        # The engine put failed environments back to their last good state; the kernel observed what failed.
+        if happened & SOME_ENDED and not self.paper:
+            put_back = np.flatnonzero(broken(self.engine.results))
+            if put_back.size and self.row_plans.differ:
+                self.under_each(put_back, self._observe_broken, for_kernels=True)
+            elif put_back.size:
+                self._observe_broken(put_back)
+        self.is_push_unseen = False
+        self.unpushed = {}
+        named = self.rows.named
+        each = (
+            (SOME_SWITCHED, named.switch, self._switch_due),
+            (SOME_PUSHED, named.push_at, self._push_due),
+        )
+        for code, at, act in each:
+            if happened & code:
+                is_due = (named.steps >= at)[: self.num_envs]
+                due = np.flatnonzero(is_due if idle is None else is_due & ~idle)
+                act(due, {env: generators[env] for env in due.tolist()})
+        return bool(happened & SOME_ENDED)
+
+    def _switch_due(self, due: Index, generators: Mapping[int, np.random.Generator]) -> None:
+        """Draw the next commanded speeds of rows in which another one is commanded now."""
+        for plan, group in self.row_plans.groups(due):
+            plan.commands.draw_next(self.rows, group, [generators[env] for env in group.tolist()])
+
+    def _push_due(self, due: Index, generators: Mapping[int, np.random.Generator]) -> None:
+        """Push the trunks of some rows as planned, and plan their next pushes."""
+        episode = self.rows.named
+        measured = self.measurements.read(self.engine.arrays[0][:, due])
+        self.unpushed = dict(zip(due.tolist(), measured.T, strict=True))
+        forward, upward = episode.strength[due] * episode.next_push[:, due]
+        self.engine.push(forward, upward, due)
+        self.is_push_unseen = True
+        for plan, group in self.row_plans.groups(due):
+            plan.pushes.plan_next(self.rows, group, [generators[env] for env in group.tolist()])
+
+    def push(self, forward: ArrayLike, upward: ArrayLike, envs: ArrayLike | None) -> None:
+        """Push the trunks of some rows now, see `LegBase.push`.
+
+        Raises:
+            ParameterError: an impulse is not finite or of the wrong shape, or the trunk cannot be pushed.
+        """
+        self.plan.pushes.check_trunk("push", upward=bool(np.any(upward)))
+        self.engine.push(forward, upward, envs)
+        self.is_push_unseen = True
+
+    def _step_paper(self, held: Held) -> int:
+        """Take a control step with the paper's solver between the kernels; return the code of a step."""
+        assert self.paper
+        if not self.calls.kernels.apply(held):
+            return NOT_A_NUMBER
+        self.paper.advance()
+        happened: int = self.calls.kernels.finish(held)
+        return happened
+
+    def _observe_broken(self, envs: Index) -> None:
+        """Observe environments that could not be simulated again: their state is the last good one, but their
+        report is still of the point of failure."""
+        data = self.engine.arrays[0]
+        layout = engine_layout(self.engine.features)
+        # No step, but new reports of all environments; only those of `envs` stay.
+        before = data.copy()
+        leg = layout.leg_memory.rows("report")
+        self.engine.advance(None, 0)
+        reports = [layout.trunk_memory.rows("report")]
+        for k in range(self.plan.legs):
+            first = layout.trunk_rows + k * layout.leg_rows
+            reports.append(slice(first + leg.start, first + leg.stop))
+        for rows in reports:
+            before[rows, envs] = data[rows, envs]
+        data[:] = before
+        # NaN at the point of failure, with which a state would be refused
+        self.rows.named.x_before[envs] = self.engine.report["x"][envs]
+        self.observe()
+
+    # Observations
+
+    def observe(self, columns: range | None = None) -> None:
+        """Observe all rows, or those of some columns, without a step."""
+        self.calls.kernels.observe(self.calls.held if columns is None else self.calls.held.on(columns))
+
+    def observe_all(self) -> None:
+        """Observe the state of all rows, each under its plan; where plans differ with forces on the present
+        ground."""
+        if not self.row_plans.differ:
+            self.observe()
+            return
+
+        def look(group: Index) -> None:
+            self.engine.observe()
+            self.observe()
+
+        self.under_each(np.arange(self.num_envs), look, for_kernels=True)
+
+    def measured(self) -> dict[str, Floats]:
+        """Return what is observed, true and before scaling: entries by name, shape (num_envs,) each."""
+        names = [entry.name for entry in self.plan.observed.entries]
+        out = np.zeros((len(names), self.num_envs))
+        if self.row_plans.differ:
+            # The kernel measures all rows; only those under the present plan are right.
+            def measure(group: Index) -> None:
+                measured = np.zeros_like(out)
+                self._measure(measured)
+                out[:, group] = measured[:, group]
+
+            self.under_each(np.arange(self.num_envs), measure, for_kernels=True)
+        else:
+            self._measure(out)
+        return dict(zip(names, out, strict=True))
+
+    def _measure(self, out: Floats) -> None:
+        kernel = self.calls.kernels.measure
+        kernel(self._hold(kernel, self.plan, range(out.shape[1]), measured=out))
+
+    def check_observed(self) -> None:
+        """Check that entries from outside gave numbers; those of this package do.
+
+        Raises:
+            ParameterError: one gave NaN.
+        """
+        seen = self.rows.observations[: self.num_envs]
+        if not self.plan.observed.has_user_entries or not np.isnan(seen).any():
+            return
+        env, column = np.argwhere(np.isnan(seen))[0].tolist()
+        raise ParameterError(
+            f"entry {self.plan.observation_names[column]!r}: expected a number, got NaN in environment {env},"
+            f" after {self.rows.named.steps[env]:g} steps"
+        )
+
+    def _check_mapped(self) -> None:
+        """Check that a map of actions from outside gave numbers.
+
+        Raises:
+            ParameterError: it gave NaN.
+        """
+        mapped, action_map = self.rows.mapped, self.task.action_map
+        if mapped is None or not action_map or not np.isnan(mapped[: self.num_envs]).any():
+            return
+        env, k = np.argwhere(np.isnan(mapped[: self.num_envs]))[0].tolist()
+        raise ParameterError(
+            f"{action_map.title}: expected numbers, got NaN for action {k} of the body in environment {env}"
+        )
+
+    def alone(self, env: int) -> TrunkEngine:
+        """Make an engine of one environment, under the plan of the environment `env`."""
+        if not self.row_plans.are_mixed:
+            return self.engine.alone()
+        (engine,) = self.under_each(np.array([env]), lambda group: self.engine.alone())
+        made: TrunkEngine = engine
+        return made
+
+    # Kernels
+
+    def _open(self) -> None:
+        """Find kernels and the addresses of arrays in this process."""
+        self._calls = {}
+        self.calls = self._calls_of(self.plan)
+
+    def _calls_of(self, plan: Plan) -> Calls:
+        """Return the kernels of a plan with their arguments."""
+        if plan not in self._calls:
+            self._calls[plan] = self._new_calls(plan)
+        return self._calls[plan]
+
+    def _new_calls(self, plan: Plan) -> Calls:
+        kernels = self._kernels_of(plan)
+        # A block of columns for each thread; the paper's solver runs on one, with all of them.
+        blocks = [range(self.engine.columns)] if self.paper else self.engine.blocks
+        held = self._hold(kernels.observe, plan, range(self.engine.columns))
+        step = self._step_paper if self.paper else kernels.step
+        return Calls(kernels, step, held, [(held.on(block),) for block in blocks])
+
+    def _hold(self, kernel: Kernel, plan: Plan, columns: range, **more: NDArray[Any]) -> Held:
+        """Return the arrays as the argument of a kernel that works on some columns."""
+        rows = self.rows
+        acted = rows.actions if rows.acted is None else rows.acted
+        arrays = (
+            *self.engine.arrays_of(plan.mechanics),
+            rows.episode,
+            plan.record,
+            rows.actions,
+            rows.observations,
+            rows.rewards,
+            acted,
+            rows.past_actions,
+            rows.frames,
+            acted if rows.mapped is None else rows.mapped,
+        )
+        held: Held = kernel.parameters[0].hold(dict(zip(ALL_ARRAYS, arrays, strict=True)) | more, columns)
+        return held
+
+    def _kernels_of(self, plan: Plan) -> StepKernels:
+        """Return the kernels of a plan. Copies of the batch share them, too: kernels with a function from
+        outside are made anew, which takes time."""
+        # few environments, or the paper's solver, which works on the engine's memory between two kernels
+        is_scalar = bool(self.engine.runs_scalar or self.paper)
+        kind = TaskKind(
+            self.task.terms,
+            self.task.entries,
+            plan.body.kernels,
+            self.task.action_map,
+            _engine_kind(plan.mechanics, self.task),
+            known_of(plan.record),
+        )
+        if kind not in self._kernels:
+            self._kernels[kind] = step_kernels(kind, is_scalar)
+        return self._kernels[kind]
+
+    def _compile(self, kernels: StepKernels) -> None:
+        """Compile or load every kernel of a step, and of entries from outside the one that measures them:
+        made later, it might follow from constants that have changed since.
+
+        Raises:
+            ParameterError: a function from outside cannot be part of them.
+        """
+        try:
+            for kernel in (kernels.apply, kernels.finish) if self.paper else (kernels.step,):
+                kernel.compile()
+            kernels.observe.compile()
+            if self.plan.observed.has_user_entries:
+                kernels.measure.compile()
+            self.engine.compile()
+        except UserFunctionError as error:
+            raise user_error(self.task.id, error, MOVED) from None
+
+    def direct_step(self) -> Any:
+        """Return `calls.step` as machine code, without what a call of it costs in Python. It must be called
+        with `calls.held` only, as it checks no types."""
+        if self.paper:
+            return self.calls.step
+        kernel = self.calls.kernels.step
+        if kernel.call is None:  # in a process that unpickled the batch
+            kernel.compile()
+        return kernel.call
+
+    # Copies
+
+    def __getstate__(self) -> dict[str, Any]:
+        """Return the attributes for a pickle: without kernels and addresses, which belong to one process."""
+        return {**vars(self), "row_plans": self.row_plans.copy(), "_kernels": {}, "_calls": {}, "calls": None}
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        vars(self).update(state)
+        self._open()
+
+    def __deepcopy__(self, memo: dict[int, Any]) -> EpisodeBatch:
+        """Return a copy, which shares what never changes: planners copy at every node of their tree."""
+        made = object.__new__(type(self))
+        vars(made).update(vars(self))
+        made.engine = copy.deepcopy(self.engine, memo)
+        # The solver refers to the engine: to that of the copy.
+        made.paper = copy.deepcopy(self.paper, memo | {id(self.engine): made.engine})
+        made.rows = self.rows.copy()
+        made.row_plans = self.row_plans.copy()
+        made._open()
+        return made
+
+
+def _engine_kind(mechanics: Mechanics, task: Task) -> EngineKind:
+    """Return the kind of an engine with some mechanics."""
+    return EngineKind(mechanics.features, task.contact_law, static_of(mechanics.model[0]))

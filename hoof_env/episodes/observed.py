@@ -1,0 +1,140 @@
+"""Entries of an observation: which of a task's entries settings ask for, and the names of its columns."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, fields
+from functools import cached_property
+from typing import Any
+
+from hoof_env.episodes.scene import functions_of, is_from_outside
+from hoof_env.errors import ParameterError
+from hoof_env.tasks.observation import Entry, check_groups, groups_of, observed
+from hoof_env.tasks.registry import Task
+from hoof_env.tasks.settings import ResolvedSettings
+
+
+def _ago(steps: int) -> str:
+    return "1 step ago" if steps == 1 else f"{steps} steps ago"
+
+
+@dataclass(frozen=True)
+class Observed:
+    """Entries of an observation.
+
+    Attributes:
+        task: task that has them.
+        trunk, drive: kinds of trunk and drive, on which entries depend.
+        groups: groups that are observed.
+        privileged: groups of which the true numbers are observed, too.
+    """
+
+    task: Task
+    trunk: str
+    drive: str
+    groups: tuple[str, ...]
+    privileged: tuple[str, ...]
+
+    @classmethod
+    def of(cls, s: ResolvedSettings, task: Task, groups: Sequence[str]) -> Observed:
+        """Return the entries of settings.
+
+        Args:
+            s: settings.
+            task: task.
+            groups: groups that are observed.
+
+        Raises:
+            ParameterError: a group is unknown, constant without another setting, or has nothing on this
+                trunk.
+        """
+        privileged: Sequence[str] = ()
+        if not isinstance(s.privileged, (list, tuple)) or s.privileged:
+            privileged = check_groups(s.privileged, groups_of(task.entries), "privileged")
+        for group, needed in (("target", "target_speed"), ("ground", "terrain")):
+            value = getattr(s, needed)
+            for name, given in (("observation", groups), ("privileged", privileged)):
+                if group in given and value in (None, {}):
+                    raise ParameterError(
+                        f"{name}: {group!r} is constant without {needed}, got {needed}={value!r}"
+                    )
+        made = cls(task, s.trunk, s.drive, tuple(groups), tuple(privileged))
+        for name in ("noise", "bias"):
+            made._check_any(name, getattr(s, name) or ())
+        made._check_any("privileged", privileged)
+        if not made.entries:
+            raise ParameterError(f"observation: nothing of {list(groups)} is observed on a fixed trunk")
+        return made
+
+    def _check_any(self, name: str, groups: Any) -> None:
+        """Check that something of each group is observed.
+
+        Raises:
+            ParameterError: nothing of a group is.
+        """
+        for group in groups:
+            if not self._entries([group]):
+                raise ParameterError(f"{name}: nothing of {group!r} is observed on a {self.trunk} trunk")
+
+    def _entries(self, groups: Sequence[str]) -> tuple[Entry, ...]:
+        return tuple(observed(groups, self.trunk, self.drive, self.task.entries))
+
+    @cached_property
+    def entries(self) -> tuple[Entry, ...]:
+        """Entries that are observed, in the order of their columns."""
+        return self._entries(self.groups)
+
+    @cached_property
+    def true_entries(self) -> tuple[Entry, ...]:
+        """Entries of which the true numbers are observed."""
+        return self._entries(self.privileged)
+
+    @cached_property
+    def has_user_entries(self) -> bool:
+        """True if any of them is from outside the package."""
+        parts = [part for entry in (*self.entries, *self.true_entries) for part in functions_of(entry)]
+        return any(map(is_from_outside, parts))
+
+    def names(self, history: int, last_actions: int, actions: Sequence[str]) -> tuple[str, ...]:
+        """Return the names of the observation's columns.
+
+        Args:
+            history: number of frames that are observed.
+            last_actions: number of actions that are observed.
+            actions: names of the actions.
+        """
+        frame = [entry.name for entry in self.entries]
+        return (
+            *frame,
+            *(f"{name}, {_ago(k)}" for k in range(1, history) for name in frame),
+            *(f"action {_ago(k)}: {name}" for k in range(1, last_actions + 1) for name in actions),
+            *(f"true {entry.name}" for entry in self.true_entries),
+        )
+
+    def fill(self, record: Any, slots: Sequence[int], size: int) -> dict[int, str]:
+        """Fill in its part of the task's record; return the group of the entry in each slot that is observed.
+
+        Args:
+            record: record of the task.
+            slots: slot of each of the task's entries, see `scene.Slots`.
+            size: number of columns of the observation.
+        """
+        # One kernel serves all choices of groups: it skips entries without a column.
+        record["observation_size"] = size
+        record["observation_columns"] = -1
+        record["privileged_columns"] = -1
+        frame = [entry.name for entry in self.entries]
+        true = [entry.name for entry in self.true_entries]
+        groups = {}
+        for entry, slot in zip(self.task.entries, slots, strict=True):
+            if entry.name in frame:
+                record["observation_columns"][slot] = frame.index(entry.name)
+                groups[slot] = entry.group
+            if entry.name in true:
+                record["privileged_columns"][slot] = size - len(true) + true.index(entry.name)
+        record["has_privileged"] = bool(true)
+        return groups
+
+    def __getstate__(self) -> dict[str, Any]:
+        """Return the fields for a pickle: entries may have lambdas, and follow from the task."""
+        return {item.name: getattr(self, item.name) for item in fields(self)}

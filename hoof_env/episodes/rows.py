@@ -1,0 +1,159 @@
+"""Rows of a batch: all arrays that change from step to step, with one row for each environment.
+
+A field of `Rows` declares on which axis the environments are, whether kernels write it, and whether a state
+contains it. Copies, states, and the restoration of rows that a kernel should not have changed follow from
+these declarations alone.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, field, fields
+from typing import Annotated, Any, NamedTuple, get_type_hints
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hoof_env.simd.layout import views
+
+Floats = NDArray[np.float64]
+Index = NDArray[np.int64]
+
+
+class Declared(NamedTuple):
+    """Declaration of an array.
+
+    Attributes:
+        axis: axis of the environments, 0 or -1.
+        is_written: True if kernels write it, in all rows.
+        is_saved: True if a state contains it, wherever it is not empty.
+    """
+
+    axis: int
+    is_written: bool = False
+    is_saved: bool = False
+
+
+@dataclass
+class Rows:
+    """Arrays of `num_envs` episodes. Arrays that kernels read have as many rows as the engine has columns, of
+    which the last may be idle.
+
+    Attributes:
+        layout: layout of `episode`.
+        num_envs: number of environments.
+        episode: memory of the episodes, rows of `episode.Episode`, shape (numbers, columns).
+        actions, observations, rewards: input and output of a step, shapes (columns, actions), (columns,
+            numbers) and (columns,).
+        acted: actions that act now, shape (columns, actions); None where nothing delays `actions`.
+        mapped: actions of the body, shape (columns, its actions); None without a map of one's own.
+        past_actions: last actions, the newest first, shape (columns, number, actions); empty where they are
+            not needed, like `frames`.
+        frames: observations of one instant each, the newest first, shape (columns, number, entries).
+        start_values: the body's `start_names`, the gait, and the values drawn by `randomize`, shape (numbers,
+            num_envs); NaN where a state does not contain them.
+        steps_before: control steps in earlier episodes, from which schedules follow, shape (num_envs,).
+        has_overrides: True where the engine has other parameters than those of the settings, shape
+            (num_envs,).
+        pushes: tuple of the pushes that were given for the present episode, in the order of their times, as
+            objects, shape (num_envs,).
+        named: views of `episode` by name.
+    """
+
+    layout: Any
+    num_envs: int
+    episode: Annotated[Floats, Declared(-1, is_written=True, is_saved=True)]
+    actions: Annotated[NDArray[np.float32], Declared(0)]
+    observations: Annotated[NDArray[np.float32], Declared(0, is_written=True)]
+    rewards: Annotated[Floats, Declared(0, is_written=True)]
+    acted: Annotated[NDArray[np.float32] | None, Declared(0, is_written=True)]
+    mapped: Annotated[NDArray[np.float32] | None, Declared(0, is_written=True)]
+    past_actions: Annotated[NDArray[np.float32], Declared(0, is_written=True, is_saved=True)]
+    frames: Annotated[NDArray[np.float32], Declared(0, is_written=True, is_saved=True)]
+    start_values: Annotated[Floats, Declared(-1, is_saved=True)]
+    steps_before: Annotated[Floats, Declared(0, is_saved=True)]
+    has_overrides: Annotated[NDArray[np.bool_], Declared(0)]
+    pushes: Annotated[NDArray[Any], Declared(0)]
+    named: Any = field(init=False, repr=False)
+
+    def __post_init__(self) -> None:
+        self.open()
+
+    def open(self) -> None:
+        """Find the views of the episodes' memory, after the array was replaced."""
+        self.named = views(self.layout, self.episode)
+
+    # Operations by declaration
+
+    def written(self) -> Iterator[tuple[NDArray[Any], int]]:
+        """Yield the arrays that kernels write, each with the axis of the environments."""
+        for name, declared in ARRAYS.items():
+            array = getattr(self, name)
+            if declared.is_written and array is not None and array.size:
+                yield array, declared.axis
+
+    def saved(self) -> list[str]:
+        """Return the names of the arrays that a state contains."""
+        return [name for name, declared in ARRAYS.items() if declared.is_saved and getattr(self, name).size]
+
+    def get(self, name: str) -> NDArray[Any]:
+        """Return a copy of an array, without idle columns."""
+        return np.array(self._used(name))
+
+    def put(self, name: str, values: Any) -> None:
+        """Write all rows of an array, but for idle columns."""
+        self._used(name)[...] = values
+
+    def _used(self, name: str) -> NDArray[Any]:
+        array: NDArray[Any] = getattr(self, name)
+        return array[: self.num_envs] if ARRAYS[name].axis == 0 else array[..., : self.num_envs]
+
+    def copy(self) -> Rows:
+        """Return a copy with arrays of its own."""
+        given = {item.name: getattr(self, item.name) for item in fields(self) if item.init}
+        arrays = {name: given[name] for name in ARRAYS if given[name] is not None}
+        return Rows(**{**given, **{name: array.copy() for name, array in arrays.items()}})
+
+    def __getstate__(self) -> dict[str, Any]:
+        """Return the fields for a pickle: without the views, which belong to one process."""
+        return {name: value for name, value in vars(self).items() if name != "named"}
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        vars(self).update(state)
+        self.open()
+
+
+ARRAYS: dict[str, Declared] = {
+    name: declared
+    for name, hint in get_type_hints(Rows, include_extras=True).items()
+    for declared in getattr(hint, "__metadata__", ())
+}
+"""Declarations of the arrays of `Rows` by name."""
+
+
+def repeated(name: str, values: Any, n: int) -> NDArray[Any]:
+    """Return the values of one row of an array of `Rows`, as a state holds them, n times."""
+    return np.repeat(np.asarray(values), n, ARRAYS[name].axis)
+
+
+@contextmanager
+def only(rows: Index, num_envs: int, arrays: Iterable[tuple[NDArray[Any], int]]) -> Iterator[None]:
+    """Restore all rows but some after a block.
+
+    Args:
+        rows: rows that the block may change.
+        num_envs: number of rows in use.
+        arrays: arrays that the block writes, each with the axis of the rows, 0 or -1.
+    """
+    rest = np.setdiff1d(np.arange(num_envs), rows)
+    before = [(array, axis, np.take(array, rest, axis)) for array, axis in arrays]
+    # Also if Ctrl-C ends the block, so that no row has results of another row's plan.
+    try:
+        yield
+    finally:
+        for array, axis, values in before:
+            if axis == 0:
+                array[rest] = values
+            else:
+                array[..., rest] = values

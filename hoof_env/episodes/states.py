@@ -1,0 +1,249 @@
+"""States of a batch of episodes: reading, checks, and restoring, also into a batch of another size."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hoof_env.episodes.batch import EpisodeBatch
+from hoof_env.episodes.row_plans import RowPlans
+from hoof_env.episodes.rows import ARRAYS, repeated
+from hoof_env.errors import ParameterError
+from hoof_env.tasks.disturbances import MOST_PUSH, Push
+from hoof_env.tasks.settings import Settings
+
+Floats = NDArray[np.float64]
+
+
+def state_of(batch: EpisodeBatch) -> dict[str, Any]:
+    """Return everything that changes, except for the generators."""
+    rows = batch.rows
+    state: dict[str, Any] = {"engine": batch.engine.get_state()}
+    state |= {name: rows.get(name) for name in rows.saved()}
+    if batch.is_push_unseen or rows.frames.size:
+        # As they were seen: a push shows in the state of the engine alone, and frames are of the past
+        state["observations"] = rows.get("observations")
+    if any(rows.pushes):
+        state["pushes"] = rows.pushes.tolist()
+    if batch.row_plans.are_mixed or batch.row_plans.are_due(np.arange(batch.num_envs)):
+        state["rows"] = batch.row_plans.to_plain()
+    return state | ({"paper": batch.paper.get_state()} if batch.paper else {})
+
+
+def check_single(state: Any) -> None:
+    """Check that a state is not one of a vector environment.
+
+    Raises:
+        ParameterError: it is.
+    """
+    if isinstance(state, Mapping) and "ended" in state:
+        many = np.size(state["ended"])
+        raise ParameterError(f"state: expected one of a single environment, got one of {many} environments")
+
+
+def spread_state(batch: EpisodeBatch, state: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the state of a single environment as one of a vector environment with this state in every row.
+
+    Raises:
+        ParameterError: `state` is not one of a single environment.
+    """
+    n = batch.num_envs
+    try:
+        engine = state["engine"]
+        layout = state["engine"]["layout"]
+        if layout["num_envs"] != 1 or np.shape(state["episode"])[-1] != 1:
+            raise ValueError
+        parts = {
+            name: np.repeat(np.asarray(values, np.float64), n, -1)
+            for name, values in engine.items()
+            if name != "layout"
+        }
+        spread = {**state, "engine": {**parts, "layout": {**layout, "num_envs": n}}}
+        of_rows = [name for name in ARRAYS if name in state]
+        spread |= {name: repeated(name, state[name], n) for name in of_rows if name != "pushes"}
+        if "pushes" in state:
+            spread["pushes"] = [*state["pushes"]] * n
+        if "rows" in state:
+            each = {name: np.repeat(state["rows"][name], n) for name in ("which", "coming")}
+            spread["rows"] = {**state["rows"], **each}
+        if "paper" in state:
+            paper = state["paper"]
+            spread["paper"] = {"legs": [*paper["legs"]] * n} | {
+                name: np.repeat(paper[name], n) for name in ("accounts", "last")
+            }
+    except (KeyError, TypeError, ValueError, IndexError):
+        raise ParameterError(
+            "state: expected what get_state gives of one environment, or of this vector environment"
+        ) from None
+    ended = spread["episode"][batch.ended_row] != 0.0
+    return {**spread, "ended": ended, "generator": [state["generator"]] * n}
+
+
+def set_state(batch: EpisodeBatch, state: Mapping[str, Any]) -> None:
+    """Restore a state of `state_of`, and observe it. Everything is checked before anything changes.
+
+    Raises:
+        ParameterError: a part is missing or broken, or has a shape of another batch.
+    """
+    before = batch.row_plans, batch.plan, batch.drawn_names, batch.rows.start_values
+    row_plans = _read_row_plans(batch, state.get("rows"))
+    batch.put_under(row_plans)
+    try:
+        _set_state(batch, state)
+    except BaseException:
+        batch.row_plans, plan, batch.drawn_names, batch.rows.start_values = before
+        batch.enter(plan)
+        raise
+
+
+def _set_state(batch: EpisodeBatch, state: Mapping[str, Any]) -> None:
+    """Restore a state whose plans the batch is under."""
+    rows = batch.rows
+    episode = _read_episode(batch, state["episode"])
+    if "begun" in state:
+        raise ParameterError("state: 'begun' is called 'start_values' now")
+    # States of older versions have no start values: infos then contain NaN.
+    start_values = np.asarray(state.get("start_values", np.nan))
+    if start_values.dtype.kind != "f" or start_values.shape not in ((), rows.start_values.shape):
+        raise ParameterError(
+            f"state['start_values']: expected numbers, shape {rows.start_values.shape}, got"
+            f" {state['start_values']!r:.60}"
+        )
+    pushes = _read_pushes(batch, state.get("pushes"))
+    seen = [name for name in rows.saved() if name in ("frames", "past_actions")]
+    if state.get("observations") is not None:
+        seen.append("observations")
+    observed = {name: _read_seen(batch, name, state.get(name)) for name in seen}
+    of_paper = batch.paper.read_state(state.get("paper")) if batch.paper else None
+    steps_before = _read_steps(batch, state.get("steps_before"))
+    batch.engine.set_state(state["engine"])
+    if batch.paper and of_paper:
+        batch.paper.set_state(*of_paper)
+    rows.put("episode", episode)
+    rows.put("start_values", start_values)
+    rows.put("steps_before", steps_before)
+    rows.pushes[:] = pushes
+    # The state's engine may have drawn parameters, which the next reset must replace.
+    rows.put("has_overrides", True)
+    batch.is_push_unseen = "observations" in state
+    batch.unpushed = {}
+    batch.observe_all()
+    for name, values in observed.items():
+        rows.put(name, values)
+
+
+def _read_episode(batch: EpisodeBatch, given: Any) -> Floats:
+    """Return the memory of the episodes in a state.
+
+    Raises:
+        ParameterError: not numbers, impossible ones, or another shape.
+    """
+    expected = (len(batch.rows.episode), batch.num_envs)
+    try:
+        episode = np.asarray(given, np.float64)
+    except (TypeError, ValueError):
+        episode = np.array(np.nan)
+    if np.isnan(episode).any() or (episode.shape == expected and not _is_possible(batch, episode)):
+        raise ParameterError(f"state['episode']: expected numbers, got {given!r:.60}")
+    if episode.shape != expected:
+        raise ParameterError(
+            f"state['episode']: expected shape {expected} for {batch.num_envs} environments, "
+            f"got {episode.shape}"
+        )
+    return episode
+
+
+def _is_possible(batch: EpisodeBatch, episode: Floats) -> bool:
+    """True if all rows of the episodes' memory have positive weights, and finite gaits of horses."""
+    layout = batch.rows.layout
+    weight = episode[layout.rows("weight")]
+    rows = [episode[layout.rows(name)] for name in batch.plan.body.finite_fields]
+    return bool((weight > 0).all() and all(np.isfinite(values).all() for values in rows))
+
+
+def _read_steps(batch: EpisodeBatch, given: Any) -> Floats:
+    """Return the control steps of earlier episodes in a state, by which schedules go on.
+
+    Raises:
+        ParameterError: not a whole number for each environment.
+    """
+    steps = np.zeros(batch.num_envs) if given is None else np.asarray(given)
+    if (
+        steps.dtype.kind not in "iuf"
+        or steps.shape != (batch.num_envs,)
+        or not np.isfinite(steps).all()
+        or not (steps == np.rint(steps)).all()
+    ):
+        raise ParameterError(
+            f"state['steps_before']: expected a whole number for each environment, got {given!r:.60}"
+        )
+    return steps.astype(np.float64)
+
+
+def _read_row_plans(batch: EpisodeBatch, given: Any) -> RowPlans:
+    """Return the plans of the rows in a state; in a state without any all rows are under the newest one.
+
+    Raises:
+        ParameterError: not such plans.
+    """
+    n = batch.num_envs
+    if given is None:
+        row_plans = batch.row_plans.copy()
+        row_plans.place(np.full(n, row_plans.present.max()), row_plans.pending)
+        return row_plans
+    try:
+        plans = [batch.plan_of(Settings(**settings)) for settings in given["settings"]]
+        present, pending = (np.asarray(given[name], np.int64) for name in ("which", "coming"))
+        is_whole = present.shape == pending.shape == (n,) and bool(plans)
+    except (KeyError, TypeError, ValueError):
+        is_whole = False
+    if (
+        not is_whole
+        or not ((np.minimum(present, pending) >= 0) & (np.maximum(present, pending) < len(plans))).all()
+    ):
+        raise ParameterError(f"state['rows']: expected settings of each environment, got {given!r:.60}")
+    row_plans = RowPlans(plans, n)
+    row_plans.place(present, pending)
+    return row_plans
+
+
+def _read_pushes(batch: EpisodeBatch, given: Any) -> NDArray[Any]:
+    """Return the pushes that are given in a state for each row, tuples as objects, shape (num_envs,).
+
+    Raises:
+        ParameterError: not such pushes.
+    """
+    pushes: list[tuple[Push, ...]] = [()] * batch.num_envs
+    if given is not None:
+        try:
+            pushes = [tuple((int(at), float(x), float(y)) for at, x, y in row) for row in given]
+        except (TypeError, ValueError, OverflowError):
+            pushes = []
+    impulses = np.abs([push[1:] for row in pushes for push in row])
+    if len(pushes) != batch.num_envs or not (impulses <= MOST_PUSH).all():
+        raise ParameterError(
+            f"state['pushes']: expected the pushes of each environment, up to {MOST_PUSH:g} N s, got"
+            f" {given!r:.60}"
+        )
+    found = np.empty(batch.num_envs, object)
+    found[:] = pushes
+    return found
+
+
+def _read_seen(batch: EpisodeBatch, name: str, given: Any) -> NDArray[np.float32]:
+    """Return what was observed or asked for in a state.
+
+    Raises:
+        ParameterError: numbers out of range, or another shape.
+    """
+    expected = batch.rows.get(name).shape
+    try:
+        values = np.asarray(given, np.float32)
+    except (TypeError, ValueError):
+        values = np.array(np.nan, np.float32)
+    if values.shape != expected or not (np.abs(values) <= 1.0).all():
+        raise ParameterError(f"state[{name!r}]: expected numbers in [-1, 1], shape {expected}")
+    return values
