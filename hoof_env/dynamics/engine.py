@@ -10,9 +10,10 @@ a batch of any size.
 from __future__ import annotations
 
 import copy
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import replace
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -338,6 +339,65 @@ class TrunkEngine:
             limits=self.motion_limits,
             contact_law=self.contact_law,
         )
+
+    # What a batch of episodes asks of its engine. `paper_solver.engine.PaperEngine` has other answers.
+
+    in_kernels: ClassVar[bool] = True
+    """True if kernels of control steps contain the engine; else its `take_step` runs between two kernels."""
+
+    def take_step(self, steps: int) -> None:
+        """Take a control step of `steps` times `sim_dt` under the commands in memory."""
+        self.advance(None, steps)
+
+    @contextmanager
+    def only(self, envs: NDArray[np.int64]) -> Iterator[None]:
+        """Restore all environments but some after a block."""
+        m = self._memory
+        arrays = [(m.data, -1), *([(m.reactions, -1)] if m.reactions.size else [])]
+        with memory.only(envs, self.num_envs, arrays):
+            yield
+
+    def observe_again(self, envs: NDArray[np.int64]) -> None:
+        """Report the present state of environments whose report is still of the point at which their step
+        failed."""
+        data = self._memory.data
+        form = engine_layout(self.features)
+        # No step, but new reports of all environments; only those of `envs` stay.
+        before = data.copy()
+        leg = form.leg_memory.rows("report")
+        self._go(0)
+        reports = [form.trunk_memory.rows("report")]
+        for k in range(len(self.limbs)):
+            first = form.trunk_rows + k * form.leg_rows
+            reports.append(slice(first + leg.start, first + leg.stop))
+        for rows in reports:
+            before[rows, envs] = data[rows, envs]
+        data[:] = before
+
+    def end_reader(self, env: int) -> Callable[[], Any]:
+        """Return a function that returns the end of a control step of an environment: the memory from which
+        its substeps can be run again."""
+        copy_of: Callable[[], Any] = self._memory.data[:, self._env(env)].copy
+        return copy_of
+
+    def failure(self, env: int) -> str:
+        """Return why the last step of an environment failed, "" if it did not."""
+        result = Result(int(self._memory.result[env]))
+        return "" if result is Result.OK else result.message
+
+    @staticmethod
+    def repeated(state: Mapping[str, Any], n: int) -> dict[str, Any]:
+        """Return the state of an engine of one environment as one of n environments.
+
+        Raises:
+            KeyError, TypeError, ValueError, IndexError: it is not such a state.
+        """
+        layout_of_one = state["layout"]
+        if layout_of_one["num_envs"] != 1:
+            raise ValueError
+        arrays = {name: values for name, values in state.items() if name != "layout"}
+        many = {name: np.repeat(np.asarray(values, np.float64), n, -1) for name, values in arrays.items()}
+        return {**many, "layout": {**layout_of_one, "num_envs": n}}
 
     # Starts and motion
 

@@ -241,7 +241,7 @@ class StrideSums(Layout):
     """Quantities of one call of the engine, which a control step is: the table of all that is measured of it.
 
     A new quantity takes a row here, the line that computes it in `observables.count_stride`, and one in
-    `PaperSolver._sum`. It is then in `step.sums` of the reward's terms, in `episode.sums`, in infos and in
+    `PaperEngine._sum`. It is then in `step.sums` of the reward's terms, in `episode.sums`, in infos and in
     the manual. Each field has one row or, in engines without it, none, and is NaN; a sum or a peak begins at
     0.
     """

@@ -3,7 +3,8 @@ states."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -352,6 +353,30 @@ def _limb_settings(
 def _numbered(name: str, values: Sequence[float | None]) -> dict[str, Any]:
     """Return the rows of a block by name."""
     return {f"{name}_{k}": value for k, value in enumerate(values)}
+
+
+@contextmanager
+def only(
+    envs: NDArray[np.int64], num_envs: int, arrays: Iterable[tuple[NDArray[Any], int]]
+) -> Iterator[None]:
+    """Restore all environments but some after a block.
+
+    Args:
+        envs: environments that the block may change.
+        num_envs: number of environments.
+        arrays: arrays that the block writes, each with the axis of the environments, 0 or -1.
+    """
+    rest = np.setdiff1d(np.arange(num_envs), envs)
+    before = [(array, axis, np.take(array, rest, axis)) for array, axis in arrays]
+    # Also if Ctrl-C ends the block, so that no environment has a result that is not its own.
+    try:
+        yield
+    finally:
+        for array, axis, values in before:
+            if axis == 0:
+                array[rest] = values
+            else:
+                array[..., rest] = values
 
 
 def which(envs: ArrayLike | None, num_envs: int) -> NDArray[np.int64]:

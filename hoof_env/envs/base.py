@@ -249,8 +249,7 @@ class LegBase:
         """
         plan = self.batch.plan
         plan.body.check_options({"parameters": dict(parameters)}, self.engine.trunk, plan.settings)
-        needed = plan.randomization.substeps_under(parameters, None)
-        if needed > self.engine.substeps or self.batch.paper:
+        if not plan.randomization.fits(parameters, self.engine):
             return False
         plan.randomization.put(self.batch.rows, 0, parameters, self.engine)
         self.batch.rows.has_overrides[0] = True

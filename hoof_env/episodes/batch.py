@@ -21,14 +21,13 @@ from numpy.typing import ArrayLike, NDArray
 
 from hoof_env.dynamics.advance import LANES, EngineKind
 from hoof_env.dynamics.engine import TrunkEngine
-from hoof_env.dynamics.layout import engine_layout
+from hoof_env.dynamics.memory import only
 from hoof_env.dynamics.model import static_of
 from hoof_env.dynamics.parts import Mechanics, broken
 from hoof_env.episodes.infos import InfoLayout
 from hoof_env.episodes.outcome import MOVED
 from hoof_env.episodes.plan import Plan, make_plan
 from hoof_env.episodes.row_plans import RowPlans
-from hoof_env.episodes.rows import only
 from hoof_env.episodes.scene import ALL_ARRAYS, TaskKind, known_of
 from hoof_env.episodes.step import (
     NOT_A_NUMBER,
@@ -39,7 +38,6 @@ from hoof_env.episodes.step import (
     step_kernels,
 )
 from hoof_env.errors import ParameterError
-from hoof_env.paper_solver.episodes import PaperSolver, solver_of
 from hoof_env.simd.compile import Kernel
 from hoof_env.simd.memory import Held
 from hoof_env.simd.threads import run_together
@@ -59,7 +57,7 @@ class Calls:
 
     Attributes:
         kernels: all kernels of the task.
-        step: control step of all rows: a kernel, or a method that calls the paper's solver between kernels.
+        step: control step of all rows: a kernel, or a method that calls an engine between kernels.
         held: its argument.
         blocks: its arguments for each thread.
     """
@@ -79,7 +77,6 @@ class EpisodeBatch:
         row_plans: plans of all rows.
         rows: arrays that change from step to step.
         engine: engine of all episodes. Memory and arrays have `engine.columns` columns; the last may be idle.
-        paper: solver of the paper, None with the engine's kernels.
         calls: kernels of the present plan with their arguments; `calls.step(calls.held)` is one control step
             of all episodes, which `finish_step` follows.
         drawn_names: names of the parameters that any row draws, in the order of `rows.start_values`.
@@ -110,7 +107,6 @@ class EpisodeBatch:
         self.num_envs = num_envs
         self._max_episode_steps = max_episode_steps
         self.plan, self.engine = make_plan(task, settings, num_envs, num_threads, max_episode_steps)
-        self.paper: PaperSolver | None = solver_of(self.plan.settings, self.engine, self.plan.substeps)
         self.row_plans = RowPlans([self.plan], num_envs)
         self.rows = self.plan.rows(num_envs, self.engine.columns)
         self.rows.named.weight[:] = self.engine.weight
@@ -227,9 +223,7 @@ class EpisodeBatch:
     @contextmanager
     def only(self, which: Index) -> Iterator[None]:
         """Restore all rows but some after a block."""
-        data, *_, reactions = self.engine.arrays
-        arrays = [(data, -1), *([(reactions, -1)] if reactions.size else []), *self.rows.written()]
-        with only(which, self.num_envs, arrays):
+        with self.engine.only(which), only(which, self.num_envs, self.rows.written()):
             yield
 
     def restart_schedules(self, which: Sequence[int] | Index) -> None:
@@ -267,10 +261,6 @@ class EpisodeBatch:
         """Check reset options under the present plan."""
         plan = self.plan
         checked = plan.body.check_options(options, self.engine.trunk, plan.settings)
-        if self.paper and checked.get("parameters"):
-            raise ParameterError(
-                f"options['parameters']: expected none with solver=\"paper\", got {checked['parameters']!r}"
-            )
         gaits = checked.get("gait")
         if isinstance(gaits, np.ndarray) and gaits.ndim == 2 and len(gaits) != self.num_envs:
             raise ParameterError(
@@ -333,9 +323,6 @@ class EpisodeBatch:
         rows.start_values[:, which] = [*values, *start.gaits.T, *own]
         rows.named.x_before[which] = start.trunk["x"]
         plan.body.begin_episodes(rows.named, which, start)
-        if self.paper:
-            places = (start.values[name] for name in ("crank_angle", "x"))
-            self.paper.start(which.tolist(), start.gaits, *places)
         # Whole groups of lanes, from the first environment's to the last one's: kernels take no parts.
         begin, end = (int(row) // LANES * LANES for row in (which.min(), which.max() + LANES))
         groups = range(begin, min(engine.columns, end))
@@ -409,7 +396,7 @@ class EpisodeBatch:
             raise ParameterError("action: expected finite numbers, got some that are not")
         self._check_mapped()
         # The engine put failed environments back to their last good state; the kernel observed what failed.
-        if happened & SOME_ENDED and not self.paper:
+        if happened & SOME_ENDED:
             put_back = np.flatnonzero(broken(self.engine.results))
             if put_back.size and self.row_plans.differ:
                 self.under_each(put_back, self._observe_broken, for_kernels=True)
@@ -455,31 +442,18 @@ class EpisodeBatch:
         self.engine.push(forward, upward, envs)
         self.is_push_unseen = True
 
-    def _step_paper(self, held: Held) -> int:
-        """Take a control step with the paper's solver between the kernels; return the code of a step."""
-        assert self.paper
+    def _step_between(self, held: Held) -> int:
+        """Take a control step with an engine between the kernels; return the code of a step."""
         if not self.calls.kernels.apply(held):
             return NOT_A_NUMBER
-        self.paper.advance()
+        self.engine.take_step(self.plan.substeps)
         happened: int = self.calls.kernels.finish(held)
         return happened
 
     def _observe_broken(self, envs: Index) -> None:
         """Observe environments that could not be simulated again: their state is the last good one, but their
         report is still of the point of failure."""
-        data = self.engine.arrays[0]
-        layout = engine_layout(self.engine.features)
-        # No step, but new reports of all environments; only those of `envs` stay.
-        before = data.copy()
-        leg = layout.leg_memory.rows("report")
-        self.engine.advance(None, 0)
-        reports = [layout.trunk_memory.rows("report")]
-        for k in range(self.plan.legs):
-            first = layout.trunk_rows + k * layout.leg_rows
-            reports.append(slice(first + leg.start, first + leg.stop))
-        for rows in reports:
-            before[rows, envs] = data[rows, envs]
-        data[:] = before
+        self.engine.observe_again(envs)
         # NaN at the point of failure, with which a state would be refused
         self.rows.named.x_before[envs] = self.engine.report["x"][envs]
         self.observe()
@@ -575,11 +549,9 @@ class EpisodeBatch:
 
     def _new_calls(self, plan: Plan) -> Calls:
         kernels = self._kernels_of(plan)
-        # A block of columns for each thread; the paper's solver runs on one, with all of them.
-        blocks = [range(self.engine.columns)] if self.paper else self.engine.blocks
         held = self._hold(kernels.observe, plan, range(self.engine.columns))
-        step = self._step_paper if self.paper else kernels.step
-        return Calls(kernels, step, held, [(held.on(block),) for block in blocks])
+        step = kernels.step if self.engine.in_kernels else self._step_between
+        return Calls(kernels, step, held, [(held.on(block),) for block in self.engine.blocks])
 
     def _hold(self, kernel: Kernel, plan: Plan, columns: range, **more: NDArray[Any]) -> Held:
         """Return the arrays as the argument of a kernel that works on some columns."""
@@ -603,8 +575,6 @@ class EpisodeBatch:
     def _kernels_of(self, plan: Plan) -> StepKernels:
         """Return the kernels of a plan. Copies of the batch share them, too: kernels with a function from
         outside are made anew, which takes time."""
-        # few environments, or the paper's solver, which works on the engine's memory between two kernels
-        is_scalar = bool(self.engine.runs_scalar or self.paper)
         kind = TaskKind(
             self.task.terms,
             self.task.entries,
@@ -614,7 +584,7 @@ class EpisodeBatch:
             known_of(plan.record),
         )
         if kind not in self._kernels:
-            self._kernels[kind] = step_kernels(kind, is_scalar)
+            self._kernels[kind] = step_kernels(kind, self.engine.runs_scalar)
         return self._kernels[kind]
 
     def _compile(self, kernels: StepKernels) -> None:
@@ -625,7 +595,8 @@ class EpisodeBatch:
             ParameterError: a function from outside cannot be part of them.
         """
         try:
-            for kernel in (kernels.apply, kernels.finish) if self.paper else (kernels.step,):
+            around = kernels.apply, kernels.finish
+            for kernel in (kernels.step,) if self.engine.in_kernels else around:
                 kernel.compile()
             kernels.observe.compile()
             if self.plan.observed.has_user_entries:
@@ -637,7 +608,7 @@ class EpisodeBatch:
     def direct_step(self) -> Any:
         """Return `calls.step` as machine code, without what a call of it costs in Python. It must be called
         with `calls.held` only, as it checks no types."""
-        if self.paper:
+        if not self.engine.in_kernels:
             return self.calls.step
         kernel = self.calls.kernels.step
         if kernel.call is None:  # in a process that unpickled the batch
@@ -659,8 +630,6 @@ class EpisodeBatch:
         made = object.__new__(type(self))
         vars(made).update(vars(self))
         made.engine = copy.deepcopy(self.engine, memo)
-        # The solver refers to the engine: to that of the copy.
-        made.paper = copy.deepcopy(self.paper, memo | {id(self.engine): made.engine})
         made.rows = self.rows.copy()
         made.row_plans = self.row_plans.copy()
         made._open()

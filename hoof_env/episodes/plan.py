@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, partial
 from typing import Any, Protocol
 
 import numpy as np
@@ -23,7 +24,7 @@ from hoof_env.episodes.scene import Slots
 from hoof_env.episodes.strength import Strength
 from hoof_env.errors import check_choice, check_number
 from hoof_env.ground.terrain import Terrain
-from hoof_env.paper_solver.episodes import check_settings
+from hoof_env.paper_solver.episodes import PaperEngine, Scheme, check_settings
 from hoof_env.paper_solver.integrators import INTEGRATORS
 from hoof_env.tasks.body import Body
 from hoof_env.tasks.episode import ACTIONS, episode_layout, task_type
@@ -261,15 +262,20 @@ def _make_engine(
 ) -> TrunkEngine:
     """Make the engine of settings, with as many substeps as all drawn parameters need."""
     trunk, ground, limbs = body.parts(s)
-    return TrunkEngine(
+    make: Callable[..., TrunkEngine] = TrunkEngine
+    integrator = s.integrator
+    if s.solver == "paper":
+        scheme = Scheme(s.sim_dt, s.baumgarte_alpha, s.baumgarte_beta, s.integrator)
+        make = partial(PaperEngine, scheme)
+        integrator = "midpoint"  # of `TrunkEngine`, which takes no step then
+    return make(
         limbs,
         trunk,
         ground,
         terrain,
         substeps=substeps,
         sim_dt=s.sim_dt,
-        # The paper's solver has schemes of its own; the engine then holds memory and takes no step.
-        integrator="midpoint" if s.solver == "paper" else s.integrator,
+        integrator=integrator,
         num_envs=num_envs,
         num_threads=num_threads,
         strides=True,

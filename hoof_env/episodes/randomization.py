@@ -98,6 +98,10 @@ class Randomization:
         Raises:
             ParameterError: a parameter, or a combination of them, is out of range.
         """
+        if of_options and self._settings.solver == "paper":
+            raise ParameterError(
+                f"options['parameters']: expected none with solver=\"paper\", got {of_options!r}"
+            )
         parameters = {**self.ranges, **of_options}
         # The last ones are remembered: learners pass the same options at every reset.
         if parameters and self._last_checked != (words := repr(parameters)):
@@ -105,6 +109,14 @@ class Randomization:
                 for corner in extremes(parameters):
                     self.substeps_under(corner, substeps)
             self._last_checked = words
+
+    def fits(self, parameters: Mapping[str, float], engine: TrunkEngine) -> bool:
+        """True if an engine can run with other parameters without shorter substeps.
+
+        Raises:
+            ParameterError: a parameter is out of range.
+        """
+        return engine.in_kernels and self.substeps_under(parameters, None) <= engine.substeps
 
     @contextmanager
     def _naming(self, parameters: Parameters) -> Iterator[None]:

@@ -70,12 +70,9 @@ class Recording:
         self._find()
 
     def _find(self) -> None:
-        """Set the function that copies the end of a control step: the engine's memory of this environment, or
-        the record of the paper's solver, which cannot run substeps again."""
-        paper = self.batch.paper
-        env = self.env
-        column = self.batch.engine.arrays[0][:, env]
-        self._end = (lambda: paper.record(env)) if paper else column.copy
+        """Set the function that returns the end of a control step: the engine's memory of this environment,
+        or a record of the step by an engine that cannot run substeps again."""
+        self._end = self.batch.engine.end_reader(self.env)
 
     def begin(self) -> None:
         """Begin anew after a reset or another state, to which earlier steps did not lead."""
@@ -106,9 +103,8 @@ class Recording:
         if not self._ends:
             self.begin()
         end = self._ends[k]
-        if self.batch.paper:
-            of_solver: Record = end
-            return of_solver
+        if isinstance(end, dict):
+            return end
         if not self._has_substeps(k):
             return self._run(end, None, 0)
         (command, steps), *rest = commands_of_step(self.batch, self._ends[k - 1], end)
@@ -131,7 +127,7 @@ class Recording:
         engine = self.batch.engine
         if not self._ends:
             self.begin()
-        if self.batch.paper:
+        if isinstance(self._ends[k], dict):
             return engine.command_in(engine.column(self.env))[None]
         if not self._has_substeps(k):
             return engine.command_in(self._ends[k])[None]

@@ -7,8 +7,7 @@ these declarations alone.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
-from contextlib import contextmanager
+from collections.abc import Iterator
 from dataclasses import dataclass, field, fields
 from typing import Annotated, Any, NamedTuple, get_type_hints
 
@@ -135,25 +134,3 @@ ARRAYS: dict[str, Declared] = {
 def repeated(name: str, values: Any, n: int) -> NDArray[Any]:
     """Return the values of one row of an array of `Rows`, as a state holds them, n times."""
     return np.repeat(np.asarray(values), n, ARRAYS[name].axis)
-
-
-@contextmanager
-def only(rows: Index, num_envs: int, arrays: Iterable[tuple[NDArray[Any], int]]) -> Iterator[None]:
-    """Restore all rows but some after a block.
-
-    Args:
-        rows: rows that the block may change.
-        num_envs: number of rows in use.
-        arrays: arrays that the block writes, each with the axis of the rows, 0 or -1.
-    """
-    rest = np.setdiff1d(np.arange(num_envs), rows)
-    before = [(array, axis, np.take(array, rest, axis)) for array, axis in arrays]
-    # Also if Ctrl-C ends the block, so that no row has results of another row's plan.
-    try:
-        yield
-    finally:
-        for array, axis, values in before:
-            if axis == 0:
-                array[rest] = values
-            else:
-                array[..., rest] = values

@@ -30,7 +30,7 @@ def state_of(batch: EpisodeBatch) -> dict[str, Any]:
         state["pushes"] = rows.pushes.tolist()
     if batch.row_plans.are_mixed or batch.row_plans.are_due(np.arange(batch.num_envs)):
         state["rows"] = batch.row_plans.to_plain()
-    return state | ({"paper": batch.paper.get_state()} if batch.paper else {})
+    return state
 
 
 def check_single(state: Any) -> None:
@@ -52,16 +52,9 @@ def spread_state(batch: EpisodeBatch, state: Mapping[str, Any]) -> dict[str, Any
     """
     n = batch.num_envs
     try:
-        engine = state["engine"]
-        layout = state["engine"]["layout"]
-        if layout["num_envs"] != 1 or np.shape(state["episode"])[-1] != 1:
+        if np.shape(state["episode"])[-1] != 1:
             raise ValueError
-        parts = {
-            name: np.repeat(np.asarray(values, np.float64), n, -1)
-            for name, values in engine.items()
-            if name != "layout"
-        }
-        spread = {**state, "engine": {**parts, "layout": {**layout, "num_envs": n}}}
+        spread = {**state, "engine": batch.engine.repeated(state["engine"], n)}
         of_rows = [name for name in ARRAYS if name in state]
         spread |= {name: repeated(name, state[name], n) for name in of_rows if name != "pushes"}
         if "pushes" in state:
@@ -69,11 +62,6 @@ def spread_state(batch: EpisodeBatch, state: Mapping[str, Any]) -> dict[str, Any
         if "rows" in state:
             each = {name: np.repeat(state["rows"][name], n) for name in ("which", "coming")}
             spread["rows"] = {**state["rows"], **each}
-        if "paper" in state:
-            paper = state["paper"]
-            spread["paper"] = {"legs": [*paper["legs"]] * n} | {
-                name: np.repeat(paper[name], n) for name in ("accounts", "last")
-            }
     except (KeyError, TypeError, ValueError, IndexError):
         raise ParameterError(
             "state: expected what get_state gives of one environment, or of this vector environment"
@@ -117,11 +105,8 @@ def _set_state(batch: EpisodeBatch, state: Mapping[str, Any]) -> None:
     if state.get("observations") is not None:
         seen.append("observations")
     observed = {name: _read_seen(batch, name, state.get(name)) for name in seen}
-    of_paper = batch.paper.read_state(state.get("paper")) if batch.paper else None
     steps_before = _read_steps(batch, state.get("steps_before"))
     batch.engine.set_state(state["engine"])
-    if batch.paper and of_paper:
-        batch.paper.set_state(*of_paper)
     rows.put("episode", episode)
     rows.put("start_values", start_values)
     rows.put("steps_before", steps_before)

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from hoof_env.dynamics.layout import stride_sums
 from hoof_env.dynamics.names import NamedColumns
-from hoof_env.dynamics.parts import Result, broken
+from hoof_env.dynamics.parts import broken
 from hoof_env.episodes.batch import EpisodeBatch
 from hoof_env.episodes.infos import name_columns
 from hoof_env.tasks.episode import FAILED, TRUNCATED
@@ -158,11 +158,8 @@ def ending_of(batch: EpisodeBatch, env: int) -> dict[str, Any]:
 
 def failure_of(batch: EpisodeBatch, env: int) -> str:
     """Return the reason why an episode failed, in words."""
-    if batch.paper and batch.paper.apart[env]:
-        return "the linkage came apart; the state was put back to the last good one"
     # The engine of one leg has no limits: the kernel of a step checks the height of its trunk.
-    result = Result(int(batch.engine.results[env]))
-    return result.message if result is not Result.OK else "the trunk left its range of heights"
+    return batch.engine.failure(env) or "the trunk left its range of heights"
 
 
 def endings_of(batch: EpisodeBatch, done: NDArray[np.bool_]) -> dict[str, Any]:

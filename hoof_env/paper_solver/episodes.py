@@ -1,22 +1,23 @@
-"""The paper's solver (Eq. 8, `paper_solver.solver`) in place of the engine's kernels.
+"""Engine that solves as the paper does (Eq. 8, `paper_solver.solver`), with the interface of `TrunkEngine`.
 
-It reads commands from the engine's memory and writes there the values that reward and observation read, so
-that these are the same for both. It solves one environment after the other and is some ten thousand times
-slower.
+It has the same memory, so that kernels which read commands, rewards and observations there are the same. It
+solves one environment after the other and is some ten thousand times slower.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import copy
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import astuple
-from typing import Any, NamedTuple
+from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from hoof_env.dynamics.engine import TrunkEngine
 from hoof_env.dynamics.layout import LEG_REPORT, LEG_STATE, TRUNK_REPORT, TRUNK_STATE, stride_sums
-from hoof_env.dynamics.memory import LIFT_OFF, Memory, memory_of
+from hoof_env.dynamics.memory import LIFT_OFF, which
 from hoof_env.dynamics.names import NamedColumns
 from hoof_env.dynamics.observables import StanceCounter
 from hoof_env.dynamics.parts import Result
@@ -42,6 +43,9 @@ ACCOUNT = np.dtype(
 )
 """Record type of a stance, fields of `dynamics.observables.StanceCounter`, and of the impulse of the normal
 force [N s] and the time under load [s] over the episode."""
+
+OWN_STATE = ("legs", "accounts", "last")
+"""Parts of a state that are the solver's own."""
 
 APART = 1.0
 """Largest violation of the constraints [m, rad]: beyond it the solution has diverged, even if its numbers are
@@ -78,8 +82,8 @@ def check_settings(settings: Any) -> None:
             raise ParameterError(f'{name}: expected {expected!r} with solver="paper", got {value!r}')
 
 
-class PaperSolver:
-    """Legs solved as in the paper, one for each environment of an engine.
+class PaperEngine(TrunkEngine):
+    """Legs on a fixed trunk, solved as in the paper.
 
     Attributes:
         legs: solvers, one for each environment.
@@ -89,66 +93,113 @@ class PaperSolver:
 
     Args:
         scheme: how they are integrated.
-        engine: engine with the memory that the solver reads and writes.
-        substeps: substeps of a control step.
+        arguments, named: arguments of `TrunkEngine`.
     """
 
-    def __init__(self, scheme: Scheme, engine: TrunkEngine, substeps: int) -> None:
-        self.engine = engine
-        self.substeps = substeps
-        self.legs = [
-            ConstrainedLeg(
-                engine.limbs[0].geometry,
-                engine.ground,
-                scheme.sim_dt,
-                engine.filters,
-                scheme.alpha,
-                scheme.beta,
-                scheme.integrator,
-                engine.trunk.height,
-            )
-            for _ in range(engine.num_envs)
-        ]
+    in_kernels: ClassVar[bool] = False
+
+    def __init__(self, scheme: Scheme, *arguments: Any, **named: Any) -> None:
+        super().__init__(*arguments, **named)
+        self.scheme = scheme
+        # Kernels beside the solver run one environment after the other, too, in one thread.
+        self.runs_scalar = True
+        self.blocks = [range(self.columns)]
+        self.legs = [self._new_leg() for _ in range(self.num_envs)]
         self.traces = [new_trace(1) for _ in self.legs]
         self.apart = np.zeros(len(self.legs), bool)
         self._accounts: Records = np.zeros(len(self.legs), ACCOUNT)
-        self._threshold = LIFT_OFF * engine.weight
 
-    def start(self, envs: Sequence[int], gaits: Floats, crank_angle: Floats, x: Floats) -> None:
-        """Start some environments.
+    def _new_leg(self) -> ConstrainedLeg:
+        """Make a solver for the present leg and ground."""
+        scheme = self.scheme
+        return ConstrainedLeg(
+            self.limbs[0].geometry,
+            self.ground,
+            scheme.sim_dt,
+            self.filters,
+            scheme.alpha,
+            scheme.beta,
+            scheme.integrator,
+            self.trunk.height,
+        )
 
-        Args:
-            envs: environments that start.
-            gaits: gait parameters, shape (len(envs), 4).
-            crank_angle: crank angles [rad], shape (len(envs),).
-            x: places of O [m], shape (len(envs),).
-        """
-        for k, env in enumerate(envs):
-            gait = GaitParameters.from_array(gaits[k])
-            self.traces[env] = self.legs[env].reset(gait, float(crank_angle[k]), x=float(x[k]))
+    def reset(
+        self,
+        gaits: Any,
+        crank_angle: ArrayLike = 0.0,
+        *,
+        x: ArrayLike = 0.0,
+        envs: ArrayLike | None = None,
+        **trunk: Any,
+    ) -> None:
+        """Start environments, see `TrunkEngine.reset`."""
+        super().reset(gaits, crank_angle, x=x, envs=envs, **trunk)
+        where = which(envs, self.num_envs)
+        memory = self._memory
+        angles = np.broadcast_to(crank_angle, (1, where.size))[0].tolist()
+        places = np.broadcast_to(x, where.shape).tolist()
+        for env, angle, place in zip(where.tolist(), angles, places, strict=True):
+            gait = GaitParameters.from_array(memory.command[0, :, env])
+            # Anew, because other settings may have another ground.
+            self.legs[env] = self._new_leg()
+            self.traces[env] = self.legs[env].reset(gait, angle, x=place)
             self._accounts[env] = np.zeros((), ACCOUNT)
-            self._put(env, self._memory())
+            self._write(env)
 
-    def advance(self) -> None:
-        """Take one control step of all legs, under the commands in the engine's memory."""
-        memory = self._memory()
+    def take_step(self, steps: int) -> None:
+        """Take a control step of `steps` time steps of all legs, under the commands in memory."""
+        memory = self._memory
         for env, leg in enumerate(self.legs):
-            trace = new_trace(self.substeps)
-            kept = leg.state.copy()
+            trace = new_trace(steps)
+            before = leg.state.copy()
             # Only the last row, which stays if the step fails.
             self.traces[env] = self.traces[env][-1:]
             result = leg.advance(memory.command[0, :, env], trace)
             self.apart[env] = result is Result.OK and np.abs(leg.closure().error).max() > APART
             if self.apart[env]:
                 result = Result.NOT_FINITE
-                leg.state = kept
+                leg.state = before
             memory.result[env] = result
             memory.stride_sums[:, :, env] = 0.0
             if result is Result.OK:
                 self.traces[env] = trace
                 sums = self._sum(env, trace)
                 memory.stride_sums[0, :, env] = [sums[name] for name in stride_sums()]
-                self._put(env, memory)
+                self._write(env)
+
+    @contextmanager
+    def only(self, envs: NDArray[np.int64]) -> Iterator[None]:
+        """Restore all environments but some after a block."""
+        rest = np.setdiff1d(np.arange(self.num_envs), envs).tolist()
+        states = {env: self.legs[env].state.copy() for env in rest}
+        traces = {env: self.traces[env] for env in rest}
+        accounts, apart = self._accounts.copy(), self.apart.copy()
+        try:
+            with super().only(envs):
+                yield
+        finally:
+            for env in rest:
+                self.legs[env].state = states[env]
+                self.traces[env] = traces[env]
+            self._accounts[rest] = accounts[rest]
+            self.apart[rest] = apart[rest]
+
+    def observe_again(self, envs: NDArray[np.int64]) -> None:
+        """Leave the report as it is: a step that failed has not changed it."""
+
+    def observe(self) -> None:
+        """Leave the report as it is: it is always of the present state."""
+
+    def end_reader(self, env: int) -> Callable[[], Any]:
+        """Return a function that returns the record of the last control step: the solver cannot run substeps
+        again."""
+        return lambda: self.record(env)
+
+    def failure(self, env: int) -> str:
+        """Return why the last step of an environment failed, "" if it did not."""
+        if self.apart[env]:
+            return "the linkage came apart; the state was put back to the last good one"
+        return super().failure(env)
 
     def record(self, env: int) -> dict[str, Floats]:
         """Return the rows of the last control step by name, in the shapes of `TrunkEngine.run`; see
@@ -159,18 +210,32 @@ class PaperSolver:
         return NamedColumns({name: trace[name].reshape(shape).copy() for name, shape in shapes.items()})
 
     def get_state(self) -> dict[str, Any]:
-        """Return everything that changes outside the engine's memory."""
-        return {
+        """Return copies of everything that changes."""
+        return super().get_state() | {
             "legs": [leg.state.to_arrays() for leg in self.legs],
             "accounts": self._accounts.copy(),
             "last": np.array([trace[-1] for trace in self.traces]),
         }
 
-    def read_state(self, state: Any) -> tuple[list[ConstrainedState], Records, Records]:
-        """Check a state of `get_state` and convert it to the arguments of `set_state`.
+    def set_state(self, state: Mapping[str, Any]) -> None:
+        """Restore what `get_state` returned.
 
         Raises:
-            ParameterError: `state` is not one of as many legs.
+            ParameterError: see `TrunkEngine.set_state`; nothing has changed then.
+        """
+        legs, accounts, last = self._read(state)
+        super().set_state({name: values for name, values in state.items() if name not in OWN_STATE})
+        self._accounts = accounts
+        for env, (leg, leg_state) in enumerate(zip(self.legs, legs, strict=True)):
+            leg.state = leg_state
+            self.traces[env] = last[env : env + 1]
+            self._write(env)
+
+    def _read(self, state: Any) -> tuple[list[ConstrainedState], Records, Records]:
+        """Check the solver's part of a state and convert it.
+
+        Raises:
+            ParameterError: it is not one of as many legs.
         """
         try:
             pairs = zip(self.legs, state["legs"], strict=True)
@@ -183,26 +248,27 @@ class PaperSolver:
                 raise ValueError
         except (KeyError, TypeError, ValueError, AttributeError, IndexError):
             raise ParameterError(
-                f"state['paper']: expected what get_state gives of {len(self.legs)} legs, got {state!r:.60}"
+                f"state: expected what get_state gives of {len(self.legs)} legs of the paper's solver, got"
+                f" {state!r:.60}"
             ) from None
         return legs, accounts, last
 
-    def set_state(self, legs: Sequence[ConstrainedState], accounts: Records, last: Records) -> None:
-        """Restore the results of `read_state`, after the engine's memory."""
-        self._accounts = accounts
-        memory = self._memory()
-        for env, (leg, leg_state) in enumerate(zip(self.legs, legs, strict=True)):
-            leg.state = leg_state
-            self.traces[env] = last[env : env + 1]
-            self._put(env, memory)
+    @staticmethod
+    def repeated(state: Mapping[str, Any], n: int) -> dict[str, Any]:
+        """Return the state of an engine of one environment as one of n environments."""
+        arrays = {name: values for name, values in state.items() if name not in OWN_STATE}
+        own: dict[str, Any] = {"legs": [*state["legs"]] * n}
+        own |= {name: np.repeat(state[name], n) for name in ("accounts", "last")}
+        return TrunkEngine.repeated(arrays, n) | own
 
-    def _memory(self) -> Memory:
-        """Return views of the engine's memory by name."""
-        data, _, _, _, constants, reactions = self.engine.arrays
-        return memory_of(data, self.engine.num_envs, constants, reactions, self.engine.features)
+    def __getstate__(self) -> dict[str, Any]:
+        """Return the attributes of a copy, which has solvers of its own."""
+        own = {"legs": self.legs, "traces": self.traces, "apart": self.apart, "_accounts": self._accounts}
+        return super().__getstate__() | copy.deepcopy(own)
 
-    def _put(self, env: int, memory: Memory) -> None:
+    def _write(self, env: int) -> None:
         """Write the present state and report of a leg into the engine's memory."""
+        memory = self._memory
         last = self.traces[env][-1]
         memory.trunk[:, env] = [last[name] for name in TRUNK_STATE]
         memory.trunk_report[:, env] = [last[name] for name in TRUNK_REPORT]
@@ -216,7 +282,8 @@ class PaperSolver:
         The engine's kernels have the same sums in `dynamics.observables.count_stride`."""
         h = self.legs[env].sim_dt
         *stance, impulse_before, loaded_before = self._accounts[env].item()
-        since = StanceCounter(self._threshold, *stance)
+        threshold = LIFT_OFF * self.weight
+        since = StanceCounter(threshold, *stance)
         impulse = impulse_before
         loaded = loaded_before
         stances = since.count
@@ -242,7 +309,7 @@ class PaperSolver:
                 loaded += h
                 travel -= h * slid / n
             # Sliding counts in stance only, not under the small forces of landing and lift-off.
-            if n > self._threshold:
+            if n > threshold:
                 slip += h * rubbed / n
         self._accounts[env] = *astuple(since)[1:], impulse, loaded
         return {
@@ -257,18 +324,3 @@ class PaperSolver:
             "travel": travel,
             "slip": slip,
         }
-
-
-def solver_of(settings: Any, engine: TrunkEngine, substeps: int) -> PaperSolver | None:
-    """Return the solver of the settings of an environment, None where the engine's kernels solve.
-
-    Args:
-        settings: settings, `tasks.settings.ResolvedSettings`.
-        engine: engine with the memory that the solver reads and writes.
-        substeps: substeps of a control step.
-    """
-    if settings.solver != "paper":
-        return None
-    s = settings
-    scheme = Scheme(s.sim_dt, s.baumgarte_alpha, s.baumgarte_beta, s.integrator)
-    return PaperSolver(scheme, engine, substeps)

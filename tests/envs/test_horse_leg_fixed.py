@@ -140,7 +140,7 @@ def test_a_linkage_that_diverges_ends_the_episode_and_pays_nothing(settings):
     env.record()
     done = False
     while not done:
-        before, time = summary_of(env.batch, 0), env.batch.paper.legs[0].state.body.time
+        before, time = summary_of(env.batch, 0), env.engine.legs[0].state.body.time
         observation, reward, done, truncated, info = env.step(np.zeros(4, np.float32))
         assert not truncated
         assert np.isfinite(observation).all()
@@ -158,11 +158,35 @@ def test_a_bad_state_of_the_papers_solver_is_refused_and_changes_nothing():
     then = env.get_state()
     env.step(env.action_space.sample())
     here = pickle.dumps(env.get_state())
-    infinite = copy.deepcopy(then["paper"])
+    engine = then["engine"]
+    infinite = copy.deepcopy(engine)
     infinite["legs"][0]["q"][3] = np.inf
-    short = {**then["paper"], "legs": [{**then["paper"]["legs"][0], "qd": np.zeros(41)}]}
-    message = r"state\['paper'\]: expected what get_state gives of 1 legs"
-    for bad in (None, 5, {}, {**then["paper"], "legs": []}, infinite, short):
-        with pytest.raises(ParameterError, match=message):
-            env.set_state({**then, "paper": bad})
+    short = {**engine, "legs": [{**engine["legs"][0], "qd": np.zeros(41)}]}
+    without = {name: values for name, values in engine.items() if name != "accounts"}
+    for bad in (None, 5, {}, without, {**engine, "legs": []}, infinite, short):
+        with pytest.raises(ParameterError, match="state: expected what get_state gives of 1 legs"):
+            env.set_state({**then, "engine": bad})
         assert pickle.dumps(env.get_state()) == here
+
+
+def test_rows_of_the_papers_solver_have_their_own_settings():
+    """Where kernels differ between rows each leg is advanced once a step, on its own ground."""
+    settings = {"solver": "paper", "gait": "run", "episode_seconds": 1.0}
+    envs = gym.make_vec(FIXED, 2, **settings).unwrapped
+    envs.reset(seed=0)
+    changes = {"restitution": 0.2, "reward_weights": {"peak": 3.0}}
+    envs.change_settings(envs=[1], **changes)
+    observations, _ = envs.reset(seed=0)
+    alone = [gym.make(FIXED, **settings, **given).unwrapped for given in ({}, changes)]
+    for seed, env in enumerate(alone):
+        assert (observations[seed] == env.reset(seed=seed)[0]).all()
+    actions = np.full((2, 4), 0.5, np.float32)
+    highest = np.zeros(2)
+    for _ in range(40):
+        observations, rewards, *_ = envs.step(actions)
+        for row, env in enumerate(alone):
+            observation, reward, *_ = env.step(actions[row])
+            assert (observations[row] == observation).all()
+            assert rewards[row] == reward
+            highest[row] = max(highest[row], env.record()["toe_normal"].max())
+    assert 0.0 < highest[0] != highest[1] > 0.0

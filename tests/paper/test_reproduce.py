@@ -96,7 +96,7 @@ def test_three_rows_are_counted_apart_with_every_solver(reproduction):
 def test_the_papers_solvers_differ_in_beta_alone():
     """Alpha and step are the environment's own."""
     by_name = betas(load_published())
-    made = {s: gymnasium.make(ENVIRONMENT, **settings_of(s)).unwrapped.batch.paper.legs[0] for s in EULER}
+    made = {s: gymnasium.make(ENVIRONMENT, **settings_of(s)).unwrapped.engine.legs[0] for s in EULER}
     for solver, name in EULER.items():
         assert made[solver].beta == pytest.approx(by_name[name])
         assert (made[solver].alpha, made[solver].sim_dt) == (15.0, 1e-3)
