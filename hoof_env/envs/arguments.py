@@ -1,6 +1,6 @@
 """Keyword arguments of the environments, for type checkers and editors.
 
-The fields of `Settings` are keyword arguments of every environment; the classes here add the others. A
+The fields of `Settings` are keyword arguments of every environment; the classes here add the rest. A
 decorator gives the constructor of an environment the parameters of such a class.
 """
 

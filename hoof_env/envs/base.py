@@ -140,7 +140,7 @@ class LegBase:
 
     @property
     def settings(self) -> Settings:
-        """Settings of the episode; of a vector environment those of every episode that starts from now on."""
+        """Settings of the episode; in a vector environment, of every episode that starts from now on."""
         return self.batch.plan.asked
 
     def episode_summary(self) -> dict[str, Any]:
@@ -447,7 +447,7 @@ class LegBase:
     def action_form(self) -> str:
         """Meaning of actions: "rates" of the gait parameters of one leg, offsets from a horse's
         gait and their spans, as in "offsets of 0.4 and 0.04 rad", or the form of a map of one's own.
-        States and files of policies contain it, so that those of another form are refused."""
+        States and files of policies contain it, so that a file of another form is refused."""
         return self.batch.plan.action_form
 
     # Changes of settings
@@ -460,7 +460,7 @@ class LegBase:
         Args:
             envs: environments that take them, as indices or as a mask; None for all.
             changes: some of the settings of `row_plans.CHANGEABLE`, as for `gymnasium.make`. Afterwards the
-                environment is as if it had been made with them.
+                environment is as if they had been arguments of `gymnasium.make`.
 
         Raises:
             ParameterError: a value is out of range, or the settings do not fit together; nothing has changed

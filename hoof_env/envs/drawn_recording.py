@@ -36,8 +36,8 @@ class DrawnRecording(Recording):
         self._undrawn += 1
 
     def frame(self, mode: str, fps: float) -> Any:
-        """Draw the substeps since the last picture, at most those that are kept. Return an array of shape
-        (H, W, 3), None if the picture is drawn into a window.
+        """Draw the substeps since the last picture, at most `recording.KEPT_SECONDS` of them. Return an array
+        of shape (H, W, 3), None if the picture is drawn into a window.
 
         Args:
             mode: render mode, "rgb_array" or "human".
@@ -47,7 +47,7 @@ class DrawnRecording(Recording):
             self.renderer = Renderer(surroundings_of(self.batch, self.env), mode, fps, self.size)
         if not self._ends:
             self.begin()
-        # After the start of an episode, or more steps than are kept, the lines of the picture begin anew.
+        # After the start of an episode, or more steps than it holds, the lines of the picture begin anew.
         if self._undrawn >= len(self._ends):
             self.renderer.reset()
         undrawn = min(self._undrawn, len(self._ends))

@@ -58,7 +58,7 @@ class Generators:
         return tuple(self._each)
 
     def assign(self, given: Any) -> None:
-        """Take a generator for each row; one generator seeds those of all rows.
+        """Take a generator for each row; one generator seeds all rows.
 
         Raises:
             ParameterError: neither a generator nor one for each row.
@@ -100,9 +100,9 @@ class Generators:
 
     def _new(self, seeds: Sequence[int | None]) -> None:
         """Make a generator for each row, from entropy for a seed of None."""
-        made = [seeding.np_random(seed) for seed in seeds]
-        self._each = [generator for generator, _ in made]
-        self.seeds = [seed for _, seed in made]
+        pairs = [seeding.np_random(seed) for seed in seeds]
+        self._each = [generator for generator, _ in pairs]
+        self.seeds = [seed for _, seed in pairs]
 
     def states(self) -> list[Any]:
         """Return the states of all generators."""

@@ -70,7 +70,7 @@ class HorseLegEnv(LegBase, gym.Env[NDArray[np.float32], NDArray[np.float32]]):
         """Collect what a step reads, writes or calls: looking it up costs as much as a substep."""
         batch, rows = self.batch, self.batch.rows
         weighted = [(k, term) for k, term in enumerate(self.task.terms) if batch.plan.weights[term.name]]
-        # Terms that can differ from 0 before the end of an episode; infos start with 0 for the others.
+        # Terms that can differ from 0 before the end of an episode; infos start with 0 for the rest.
         paid = [(term.key, k) for k, term in weighted if term.compute is not failure]
         self._views: tuple[Any, ...] = (
             rows.actions[0].data,
@@ -197,7 +197,7 @@ class HorseLegEnv(LegBase, gym.Env[NDArray[np.float32], NDArray[np.float32]]):
         return ended
 
     def _begin(self) -> None:
-        """Make the info that steps of this episode copy: values of its start, keys for those of a step."""
+        """Make the info that steps of this episode copy: values of its start, and keys for a step's values."""
         row = self.batch.rows.start_values[:, 0].copy()
         body = self.body
         first = len(self.batch.plan.start_names)

@@ -129,7 +129,7 @@ class Sb3VecEnv(VecEnv):
             figures = infos["final_info"]["episode_summary"]
             names = [name for name in figures if not name.startswith("_")]
             reasons = [reason for reason in final["end"] if not reason.startswith("_")]
-            # With SAME_STEP `infos` are already those of the next episode.
+            # With SAME_STEP `infos` are already of the next episode.
             for name in self.terms:
                 self.terms[name] = np.where(dones, final[name], infos[name])
             started = {key: values for key, values in infos.items() if key in self.reset_infos[0]}
@@ -176,7 +176,7 @@ class Sb3VecEnv(VecEnv):
         return [False for _ in self._get_indices(indices)]
 
     def _whole(self, name: str, indices: Any) -> None:
-        """Check that indices are those of all environments.
+        """Check that indices name all environments.
 
         Raises:
             ParameterError: they are not.

@@ -1,8 +1,8 @@
 """Native vector environment: all episodes in one call, with its own time limit and autoreset.
 
 Row i has the bits of a single environment with the same seed: with `reset(seed=s)` row i draws from the
-generator that `gym.make(id).reset(seed=s + i)` would have. `call`, `get_attr` and `set_attr` accept what
-those of `SyncVectorEnv` do.
+generator that `gym.make(id).reset(seed=s + i)` would have. `call`, `get_attr` and `set_attr` accept the
+arguments that they have in `SyncVectorEnv`.
 """
 
 from __future__ import annotations
@@ -49,7 +49,7 @@ PER_ENV = (
     "action_for",
     "commanded_speed",
 )
-"""Attributes and methods with a value for each environment; the others have one value for all."""
+"""Attributes and methods with a value for each environment; the rest have one value for all."""
 
 SINGLE_SPACES = {"action_space": "single_action_space", "observation_space": "single_observation_space"}
 """Names of the vector environment for attributes of a single one."""
@@ -154,14 +154,14 @@ class HorseLegVectorEnv(LegBase, VectorEnv[NDArray[np.float32], NDArray[np.float
         max_episode_steps: largest number of control steps of an episode, like that of Gymnasium's TimeLimit;
             None for `episode_seconds` alone.
         render_mode: "rgb_array"; `render` returns a picture of each environment.
-        rendered: number of environments that are drawn, the first ones; pictures of the others are black.
+        rendered: number of environments that are drawn, the first ones; pictures of the rest are black.
             None draws all, if they are at most `MOST_DRAWN`.
         width, height: size of each picture [pixels].
 
     Attributes:
         drawn: number of environments that are drawn.
 
-    Rewards are float64, shape (num_envs,). Infos are those of the single environment as arrays. When an
+    Rewards are float64, shape (num_envs,). Infos are the single environment's, as arrays. When an
     episode ends they also contain its figures as "episode_summary", one array for each figure, with masks
     under "_episode_summary", and the reasons as "end": by reason, an array that is True where it holds.
 
@@ -212,7 +212,7 @@ class HorseLegVectorEnv(LegBase, VectorEnv[NDArray[np.float32], NDArray[np.float
     def reset(
         self, *, seed: int | Sequence[int | None] | None = None, options: dict[str, Any] | None = None
     ) -> tuple[NDArray[np.float32], dict[str, Any]]:
-        """Start episodes: in all environments, or in those of `options["reset_mask"]`.
+        """Start episodes: in all environments, or where `options["reset_mask"]` is True.
 
         Args:
             seed: seed of the first environment; the i-th has `seed + i`. Or a seed for each, None to continue

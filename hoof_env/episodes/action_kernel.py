@@ -1,5 +1,4 @@
-"""Parts of the kernels of a step that turn actions into commands: those of the body, or of a map of one's
-own."""
+"""Parts of the kernels of a step that turn actions into commands, as the body does or a user's map."""
 
 from __future__ import annotations
 
@@ -15,8 +14,8 @@ from hoof_env.tasks.own_parts import ActionMap
 
 
 def are_numbers(scene: Scene) -> Truth:
-    """Return True if all actions are finite, including those of other threads' blocks: either all threads
-    take the step, or none does."""
+    """Return True if all actions are finite, in the blocks of other threads, too: either all threads take the
+    step, or no thread does."""
     total = Cell(0.0)  # stays 0 unless an action is infinite or not a number
     for k in loop(scene.columns * scene.kind.action_size):
         total.value = total.value + (scene.actions[k] - scene.actions[k])

@@ -180,7 +180,7 @@ class EpisodeBatch:
     def _adopt(self, which: Index) -> None:
         """Put rows under their pending plans."""
         plans = self.row_plans
-        # The engine's constants of these rows are those of their old settings.
+        # The engine's constants of these rows follow from their old settings.
         self.rows.has_overrides[which[plans.present[which] != plans.pending[which]]] = True
         plans.start(which)
         self.put_under(plans)
@@ -461,7 +461,7 @@ class EpisodeBatch:
     # Observations
 
     def observe(self, columns: range | None = None) -> None:
-        """Observe all rows, or those of some columns, without a step."""
+        """Observe all rows, or the rows of some columns, without a step."""
         self.calls.kernels.observe(self.calls.held if columns is None else self.calls.held.on(columns))
 
     def observe_all(self) -> None:
@@ -498,7 +498,7 @@ class EpisodeBatch:
         kernel(self._hold(kernel, self.plan, range(out.shape[1]), measured=out))
 
     def check_observed(self) -> None:
-        """Check that entries from outside gave numbers; those of this package do.
+        """Check that entries from outside gave numbers; the package's own entries do.
 
         Raises:
             ParameterError: one gave NaN.
@@ -531,8 +531,8 @@ class EpisodeBatch:
         if not self.row_plans.are_mixed:
             return self.engine.alone()
         (engine,) = self.under_each(np.array([env]), lambda group: self.engine.alone())
-        made: TrunkEngine = engine
-        return made
+        alone: TrunkEngine = engine
+        return alone
 
     # Kernels
 
@@ -574,7 +574,7 @@ class EpisodeBatch:
 
     def _kernels_of(self, plan: Plan) -> StepKernels:
         """Return the kernels of a plan. Copies of the batch share them, too: kernels with a function from
-        outside are made anew, which takes time."""
+        outside are traced again, which takes time."""
         kind = TaskKind(
             self.task.terms,
             self.task.entries,
@@ -589,7 +589,7 @@ class EpisodeBatch:
 
     def _compile(self, kernels: StepKernels) -> None:
         """Compile or load every kernel of a step, and of entries from outside the one that measures them:
-        made later, it might follow from constants that have changed since.
+        compiled later, it might follow from constants that have changed since.
 
         Raises:
             ParameterError: a function from outside cannot be part of them.
@@ -627,13 +627,13 @@ class EpisodeBatch:
 
     def __deepcopy__(self, memo: dict[int, Any]) -> EpisodeBatch:
         """Return a copy, which shares what never changes: planners copy at every node of their tree."""
-        made = object.__new__(type(self))
-        vars(made).update(vars(self))
-        made.engine = copy.deepcopy(self.engine, memo)
-        made.rows = self.rows.copy()
-        made.row_plans = self.row_plans.copy()
-        made._open()
-        return made
+        twin = object.__new__(type(self))
+        vars(twin).update(vars(self))
+        twin.engine = copy.deepcopy(self.engine, memo)
+        twin.rows = self.rows.copy()
+        twin.row_plans = self.row_plans.copy()
+        twin._open()
+        return twin
 
 
 def _engine_kind(mechanics: Mechanics, task: Task) -> EngineKind:

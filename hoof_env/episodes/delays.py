@@ -1,5 +1,5 @@
 """Delays of observations and actions, and histories of both: what rows keep of earlier steps, and into which
-parts a delay divides a control step. `frames_kernel` moves what is kept."""
+parts a delay divides a control step. `frames_kernel` moves frames and actions."""
 
 from __future__ import annotations
 

@@ -12,10 +12,10 @@ from hoof_env.simd import Pointer, Whole, whole
 from hoof_env.simd.math import clip
 
 
-def move_on(kept: Pointer, first: int, last: int, size: int) -> None:
+def move_on(past: Pointer, first: int, last: int, size: int) -> None:
     """Move blocks of `size` numbers from `first` on one place on; the block at `last` is lost."""
     for k in range(last * size - 1, first * size - 1, -1):
-        kept[k + size] = kept[k]
+        past[k + size] = past[k]
 
 
 def copy(to: Pointer, start: Pointer, size: int) -> None:
@@ -35,10 +35,10 @@ def remember(scene: Scene, n: Whole) -> None:
         row_size = task.kept_actions * task.action_size
         for lane in range(scene.lanes):
             row = n + lane
-            kept = scene.past_actions + row * row_size
-            move_on(kept, 0, task.kept_actions - 1, task.action_size)
+            past = scene.past_actions + row * row_size
+            move_on(past, 0, task.kept_actions - 1, task.action_size)
             for k in range(task.action_size):
-                kept[k] = clip(scene.actions[row * task.action_size + k], 1.0)
+                past[k] = clip(scene.actions[row * task.action_size + k], 1.0)
 
 
 def put_action(scene: Scene, n: Whole) -> None:
@@ -53,7 +53,7 @@ def put_action(scene: Scene, n: Whole) -> None:
 
 
 def publish(scene: Scene, n: Whole) -> None:
-    """Observe kept frames and actions, in row n and its neighbours."""
+    """Observe earlier frames and actions, in row n and its neighbours."""
     task = scene.task
     if task.frames > 0:
         size = task.frame_size

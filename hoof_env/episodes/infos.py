@@ -1,6 +1,6 @@
 """Measurements in infos: state, forces and sums of the legs, as rows of numbers that have names.
 
-Infos of the single environment hold NumPy's scalars and rows, those of the vector environment hold arrays of
+Infos of the single environment hold NumPy's scalars and rows, infos of the vector environment hold arrays of
 them, under the same keys at a reset and at a step: libraries that stack infos need that.
 """
 
@@ -47,7 +47,7 @@ class InfoLayout:
     Attributes:
         names: names of the measurements.
         kind: class of `NamedArray` with these names, for views of arrays.
-        last_step: positions of the measurements of the whole last control step; the others are of its end.
+        last_step: positions of the measurements of the whole last control step; the rest are of its end.
     """
 
     def __init__(self, features: Features, prefixes: tuple[str, ...]) -> None:

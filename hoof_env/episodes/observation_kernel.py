@@ -91,7 +91,7 @@ class Observer:
         self.spare = new_rows(None, scene.lanes, room) if scene.task.has_privileged else None
 
     def __call__(self, n: Whole, within: bool = False) -> None:
-        """Observe at the end of a control step or, if `within`, in it: then only a frame is kept."""
+        """Observe at the end of a control step or, if `within`, in it, for a frame alone."""
         scene, numbers = self.scene, self.numbers
         task = scene.task
         slots = scene.kind.slots.count

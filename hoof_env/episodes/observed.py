@@ -58,13 +58,13 @@ class Observed:
                     raise ParameterError(
                         f"{name}: {group!r} is constant without {needed}, got {needed}={value!r}"
                     )
-        made = cls(task, s.trunk, s.drive, tuple(groups), tuple(privileged))
+        found = cls(task, s.trunk, s.drive, tuple(groups), tuple(privileged))
         for name in ("noise", "bias"):
-            made._check_any(name, getattr(s, name) or ())
-        made._check_any("privileged", privileged)
-        if not made.entries:
+            found._check_any(name, getattr(s, name) or ())
+        found._check_any("privileged", privileged)
+        if not found.entries:
             raise ParameterError(f"observation: nothing of {list(groups)} is observed on a fixed trunk")
-        return made
+        return found
 
     def _check_any(self, name: str, groups: Any) -> None:
         """Check that something of each group is observed.

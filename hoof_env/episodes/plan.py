@@ -173,7 +173,7 @@ def make_plan(
     num_threads: int = 1,
     max_episode_steps: int | None = None,
 ) -> tuple[Plan, TrunkEngine]:
-    """Check settings; return the plan that follows from them, and the engine that it was made with.
+    """Check settings; return the plan that follows from them, and its engine.
 
     Args:
         task: task of the episodes.

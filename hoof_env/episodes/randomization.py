@@ -1,5 +1,5 @@
-"""Physical parameters that episodes draw: those of `randomize`, those that a schedule moves, and those of a
-reset's options; with the check that the engine's substeps suit all of them."""
+"""Physical parameters that episodes draw: parameters of `randomize`, of a schedule, and of a reset's options;
+with the check that the engine's substeps suit all of them."""
 
 from __future__ import annotations
 
@@ -28,8 +28,8 @@ class Randomization:
     """Physical parameters of episodes.
 
     Attributes:
-        ranges: numbers, or ranges to draw from, by name: those of `randomize`, and of a schedule all values
-            that it ever takes.
+        ranges: numbers, or ranges to draw from, by name, of `randomize` and of a schedule, there with all
+            values that it ever takes.
         courses: courses of scheduled parameters by name.
 
     Args:
@@ -160,7 +160,7 @@ class Randomization:
         return values
 
     def put(self, rows: Rows, env: int, values: Mapping[str, float], engine: TrunkEngine) -> None:
-        """Give one row physical parameters by name; the rest are those of the settings."""
+        """Give one row physical parameters by name, and the settings' values of the rest."""
         trunk, ground, limbs = self._body.parts(self._with(values))
         engine.vary(env, trunk, ground, limbs=limbs)
         mass = trunk.mass + sum(limb.geometry.mass for limb in limbs)

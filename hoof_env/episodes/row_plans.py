@@ -36,8 +36,8 @@ CHANGEABLE = (
     "constants",
     *PER_EPISODE,
 )
-"""Settings that may change: none of them changes the observation's entries, the meaning of actions, or the
-length of an episode."""
+"""Settings that may change. They leave the observation's entries, the meaning of actions and the length of an
+episode as they are."""
 
 
 def _act_alike(one: Plan, other: Plan) -> bool:
@@ -159,6 +159,6 @@ class RowPlans:
 
     def copy(self) -> RowPlans:
         """Return a copy, which shares the plans."""
-        made = object.__new__(RowPlans)
-        vars(made).update(vars(self), present=self.present.copy(), pending=self.pending.copy())
-        return made
+        twin = object.__new__(RowPlans)
+        vars(twin).update(vars(self), present=self.present.copy(), pending=self.pending.copy())
+        return twin

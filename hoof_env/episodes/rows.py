@@ -53,8 +53,7 @@ class Rows:
         start_values: the body's `start_names`, the gait, and the values drawn by `randomize`, shape (numbers,
             num_envs); NaN where a state does not contain them.
         steps_before: control steps in earlier episodes, from which schedules follow, shape (num_envs,).
-        has_overrides: True where the engine has other parameters than those of the settings, shape
-            (num_envs,).
+        has_overrides: True where the engine's parameters may differ from the settings, shape (num_envs,).
         pushes: tuple of the pushes that were given for the present episode, in the order of their times, as
             objects, shape (num_envs,).
         named: views of `episode` by name.

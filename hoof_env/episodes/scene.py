@@ -1,5 +1,4 @@
-"""Scene of the kernels of a control step: what a task's kernels are made of, and the memory on which they
-work."""
+"""Scene of the kernels of a control step: parts of a task's kernels, and the memory on which they work."""
 
 from __future__ import annotations
 
@@ -29,15 +28,15 @@ STEP_ARRAYS = {
     "mapped": "f4",
 }
 """Types of the arrays of a step, besides those of the engine. `acted` are the actions that act now, the same
-array as `actions` where nothing delays them; `mapped` are those of the body, the same array as `acted`
-without a map of one's own."""
+array as `actions` where nothing delays them; `mapped` are actions of the body, the same array as `acted`
+without a user's map."""
 
 CHANGING = ("episode_steps", "substeps", "part_substeps", "is_noisy")
 """Whole numbers and truths of a task's record that kernels read when they run: settings may change them."""
 
 
 def known_of(record: Any) -> tuple[tuple[str, Any], ...]:
-    """Return the fields of a task's record that kernels are made for: truths and whole numbers."""
+    """Return the fields of a task's record that are constants of its kernels: truths and whole numbers."""
     kinds = record.dtype.fields
     names = [name for name in kinds if kinds[name][0].base.kind in "ib" and name not in CHANGING]
     values = [record[0][name] for name in names]
@@ -55,9 +54,9 @@ class TaskKind:
         terms: terms of the reward.
         entries: entries that can be observed.
         body: the body's own parts.
-        action_map: map from actions to those of the body; None for none.
+        action_map: map from actions to actions of the body; None without one.
         engine: kind of the engine.
-        known: fields of the task's record that kernels are made for, with their values, see `known_of`.
+        known: fields of the task's record that are constants of kernels, with values, see `known_of`.
     """
 
     terms: tuple[Term, ...]
@@ -131,12 +130,12 @@ class Slots:
     def of(cls, entries: tuple[Entry, ...]) -> Slots:
         """Return the places of some entries."""
         saturating = [k for k, entry in enumerate(entries) if entry.scale.saturates]
-        others = [k for k, entry in enumerate(entries) if not entry.scale.saturates]
+        linear = [k for k, entry in enumerate(entries) if not entry.scale.saturates]
         vectors = -(-len(saturating) // LANES)
         slots = {k: slot for slot, k in enumerate(saturating)}
-        slots |= {k: vectors * LANES + slot for slot, k in enumerate(others)}
+        slots |= {k: vectors * LANES + slot for slot, k in enumerate(linear)}
         places = tuple(slots[k] for k in range(len(entries)))
-        return cls(places, vectors, vectors * LANES + len(others))
+        return cls(places, vectors, vectors * LANES + len(linear))
 
 
 def functions_of(entry: Entry) -> list[Callable[..., Any]]:

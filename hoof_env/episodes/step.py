@@ -2,8 +2,8 @@
 episode ends, compute the reward, observe.
 
 The source is the same for one environment and for `LANES` side by side, so that a row of a batch has the bits
-of the environment alone. Terms of the reward and entries of the observation are those of a task
-(`reward_kernel`, `observation_kernel`), the meaning of actions is that of a body (`tasks.body`).
+of the environment alone. A task has the terms of the reward and the entries of the observation
+(`reward_kernel`, `observation_kernel`), a body has the meaning of actions (`tasks.body`).
 """
 
 from __future__ import annotations
@@ -60,7 +60,7 @@ class StepKernels:
 
 def step_kernels(kind: TaskKind, is_scalar: bool) -> StepKernels:
     """Return the kernels of tasks of one kind, which share them; with a function from outside, whose
-    helpers and constants may have changed since, as in a notebook, they are made anew.
+    helpers and constants may have changed since, as in a notebook, they are traced again.
 
     Args:
         kind: kind of the task.
@@ -114,20 +114,20 @@ def take_step(kind: TaskKind, given: Given, lanes: int, engine: Arrangement) -> 
         happened.value = 0
         advance = Advance(given, kind.engine, engine)
         observe = Observer(scene)
-        kept = new_rows(None, lanes, scene.layouts.legs * scene.layouts.sums + 1)
+        so_far = new_rows(None, lanes, scene.layouts.legs * scene.layouts.sums + 1)
         # one group of lanes after the other: its memory stays in the cache from action to observation
         for n in loop(given.begin, given.end, lanes):
-            happened.value = happened.value | step_rows(scene, n, advance, observe, kept)
+            happened.value = happened.value | step_rows(scene, n, advance, observe, so_far)
 
     found: Whole = happened.value
     return found
 
 
 def step_rows(
-    scene: Scene, n: Whole, advance: Callable[..., None], observe: Callable[..., None], kept: Any
+    scene: Scene, n: Whole, advance: Callable[..., None], observe: Callable[..., None], so_far: Any
 ) -> Whole:
-    """Take the control step of row n and, with lanes, of its neighbours; `kept` is memory for the parts of a
-    step that delays by fractions of a step make of it."""
+    """Take the control step of row n and, with lanes, of its neighbours; `so_far` is memory for the sums of
+    the parts into which delays by fractions of a step divide it."""
     task = scene.task
     scratch = new_rows(None, scene.lanes, scene.kind.body.scratch_size)
     remember(scene, n)
@@ -136,7 +136,7 @@ def step_rows(
             apply(scene, n, scratch)
         advance(n, task.h, task.part_substeps[part], False)
         if task.parts > 1:
-            keep_sums(scene, n, kept, part == 0)
+            join_sums(scene, n, so_far, part == 0)
         if part == task.seeing_part and part < task.parts - 1:
             observe(n, within=True)
     happened = finish_row(scene, n)
@@ -168,8 +168,8 @@ def as_whole(condition: Any) -> Any:
     return found
 
 
-def keep_sums(scene: Scene, n: Whole, kept: Any, is_first: bool) -> None:
-    """Put together the sums and results of the parts of a step."""
+def join_sums(scene: Scene, n: Whole, so_far: Any, is_first: bool) -> None:
+    """Join the sums and the result of a part of a step with the parts before it, `so_far`."""
     layouts = scene.layouts
     size, legs = layouts.sums, layouts.legs
     trunk, first_leg = scene.trunk(n), scene.leg(n)
@@ -177,8 +177,8 @@ def keep_sums(scene: Scene, n: Whole, kept: Any, is_first: bool) -> None:
         for i in range(legs):
             leg = block_at(first_leg, i)
             for k in range(size):
-                leg.sums[k] = put_together(layouts, k, kept[i * size + k], leg.sums[k])
-        before = kept[legs * size]
+                leg.sums[k] = put_together(layouts, k, so_far[i * size + k], leg.sums[k])
+        before = so_far[legs * size]
         now = trunk.result
         # a failure stays, and so does a limit unless a failure follows
         has_failed = (before > 0.0) & (before < PITCH)
@@ -186,8 +186,8 @@ def keep_sums(scene: Scene, n: Whole, kept: Any, is_first: bool) -> None:
     for i in range(legs):
         leg = block_at(first_leg, i)
         for k in range(size):
-            kept[i * size + k] = leg.sums[k]
-    kept[legs * size] = trunk.result
+            so_far[i * size + k] = leg.sums[k]
+    so_far[legs * size] = trunk.result
 
 
 # Parts of a step as kernels of their own
