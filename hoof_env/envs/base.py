@@ -3,7 +3,6 @@ wrong time and for assignments without effect."""
 
 from __future__ import annotations
 
-import copy
 from collections.abc import Mapping
 from typing import Any
 
@@ -46,12 +45,70 @@ def fixed_setting(name: str) -> FixedSettingError:
     return FixedSettingError(f"{name}: expected no assignment, which would change nothing; set it by {how}")
 
 
-def array_of(value: Any) -> NDArray[Any]:
-    """Convert to an array; return an empty object array if NumPy cannot."""
+def array_of(name: str, value: Any) -> NDArray[Any]:
+    """Convert a value to an array.
+
+    Args:
+        name: name of the value in messages.
+        value: array, nested list, tensor, ...
+
+    Raises:
+        ParameterError: NumPy cannot convert it, such as a tensor with a gradient or of half precision.
+    """
     try:
         return np.asarray(value)
-    except (ValueError, TypeError, RuntimeError):  # RuntimeError is that of a tensor with a gradient
-        return np.empty(0, object)
+    except (ValueError, TypeError, RuntimeError) as error:
+        of_numbers = f" of {value.dtype}" if hasattr(value, "dtype") else ""
+        raise ParameterError(
+            f"{name}: expected numbers that NumPy can convert, got a {type(value).__name__}{of_numbers}"
+            f" ({error}); of a PyTorch tensor give .detach().float().cpu().numpy()"
+        ) from None
+
+
+def longer_limit(given: int, steps: int, dt: float) -> str:
+    """Return what is wrong with a limit beyond the environment's own, and the remedy.
+
+    Args:
+        given: `max_episode_steps`.
+        steps: control steps of an episode.
+        dt: control step [s].
+    """
+    return (
+        f"max_episode_steps: expected at most {steps}, which is episode_seconds={steps * dt:g}, got {given};"
+        f" for longer episodes give episode_seconds={given * dt:g}"
+    )
+
+
+class LimitedSpec(EnvSpec):
+    """Specification of which `max_episode_steps` is at most the environment's own limit.
+
+    Gymnasium's TimeLimit does not tell an environment its limit. It writes it into a copy of the
+    specification, where a longer one would be wrong: episodes end earlier, and wrappers that divide by the
+    limit never see 1.
+    """
+
+    # Slots are no fields, which JSON would hold.
+    __slots__ = ("dt", "own_limit")
+    own_limit: int
+    dt: float
+
+    @classmethod
+    def of(cls, spec: EnvSpec, own_limit: int, dt: float) -> LimitedSpec:
+        """Return a copy of a specification, for episodes of at most `own_limit` control steps of `dt` [s]."""
+        made = cls.__new__(cls)
+        made.own_limit = own_limit
+        made.dt = dt
+        for name, value in vars(spec).items():
+            setattr(made, name, value)
+        return made
+
+    def __setattr__(self, name: str, value: Any) -> None:
+        """Set a field; a longer limit becomes the environment's own, with a warning."""
+        limit = getattr(self, "own_limit", None)
+        if name == "max_episode_steps" and limit is not None and value is not None and value > limit:
+            gym.logger.warn(longer_limit(value, limit, self.dt))
+            value = limit
+        super().__setattr__(name, value)
 
 
 class LegBase:
@@ -132,7 +189,7 @@ class LegBase:
     def spec(self, spec: EnvSpec | None) -> None:
         if spec is not None:
             # A copy, because it may be the registered one; plain values, for its `to_json`.
-            spec = copy.copy(spec)
+            spec = LimitedSpec.of(spec, self.steps_per_episode, self.dt)
             spec.kwargs = {name: as_plain(name, value) for name, value in spec.kwargs.items()}
             if spec.max_episode_steps is None:
                 spec.max_episode_steps = self.steps_per_episode

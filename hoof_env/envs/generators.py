@@ -18,17 +18,47 @@ ANY_SEED = np.random.SeedSequence(0)
 """Seed of generators that get a state at once."""
 
 
+BIT_GENERATORS: dict[str, Any] = {
+    kind.__name__: kind
+    for kind in (
+        np.random.PCG64,
+        np.random.PCG64DXSM,
+        np.random.Philox,
+        np.random.SFC64,
+        np.random.MT19937,
+    )
+}
+"""NumPy's bit generators by name, of which states can be restored. Gymnasium makes a PCG64."""
+
+
+def state_of(generator: np.random.Generator) -> Any:
+    """Return the state of a generator.
+
+    Raises:
+        ParameterError: its bit generator is none of NumPy's, so that `generator_of` could not restore it.
+    """
+    state = generator.bit_generator.state
+    if type(generator.bit_generator).__name__ not in BIT_GENERATORS:
+        raise ParameterError(
+            f"np_random: expected a generator with one of {', '.join(BIT_GENERATORS)}, whose states can be"
+            f" restored, got {type(generator.bit_generator).__name__}"
+        )
+    return state
+
+
 def generator_of(state: Any) -> np.random.Generator:
-    """Make a generator from the state of a `PCG64`.
+    """Make a generator from a state of `state_of`.
 
     Raises:
         ParameterError: `state` is not such a state.
     """
-    generator = np.random.Generator(np.random.PCG64(ANY_SEED))
     try:
+        generator = np.random.Generator(BIT_GENERATORS[state["bit_generator"]](ANY_SEED))
         generator.bit_generator.state = state
-    except (TypeError, ValueError, KeyError):
-        raise ParameterError(f"state['generator']: expected the state of a PCG64, got {state!r}") from None
+    except (TypeError, ValueError, KeyError, AttributeError):
+        raise ParameterError(
+            f"state['generator']: expected the state of a {' or '.join(BIT_GENERATORS)}, got {state!r:.80}"
+        ) from None
     return generator
 
 
@@ -106,4 +136,4 @@ class Generators:
 
     def states(self) -> list[Any]:
         """Return the states of all generators."""
-        return [generator.bit_generator.state for generator in self._each]
+        return [state_of(generator) for generator in self._each]

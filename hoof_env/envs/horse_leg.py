@@ -17,7 +17,7 @@ from hoof_env.dynamics.parts import broken
 from hoof_env.envs.arguments import EnvArguments, takes
 from hoof_env.envs.base import LegBase, array_of
 from hoof_env.envs.drawn_recording import DrawnRecording
-from hoof_env.envs.generators import generator_of
+from hoof_env.envs.generators import generator_of, state_of
 from hoof_env.episodes.infos import name_columns
 from hoof_env.episodes.states import check_single, set_state
 from hoof_env.episodes.step import SOME_SWITCHED
@@ -197,7 +197,7 @@ class HorseLegEnv(LegBase, gym.Env[NDArray[np.float32], NDArray[np.float32]]):
         return ended
 
     def _begin(self) -> None:
-        """Make the info that steps of this episode copy: values of its start, and keys for a step's values."""
+        """Make the info that steps of this episode copy: values of its start, keys for values of a step."""
         row = self.batch.rows.start_values[:, 0].copy()
         body = self.body
         first = len(self.batch.plan.start_names)
@@ -217,7 +217,7 @@ class HorseLegEnv(LegBase, gym.Env[NDArray[np.float32], NDArray[np.float32]]):
 
     def _read_action(self, action: Any) -> None:
         """Convert and store an action; raise `ParameterError` for a wrong shape or type."""
-        array = array_of(action)
+        array = array_of("action", action)
         count = len(self.action_names)
         if array.shape != (count,) or array.dtype.kind not in "fiu":
             raise ParameterError(f"action: expected {count} finite numbers in [-1, 1], got {action!r}")
@@ -246,7 +246,7 @@ class HorseLegEnv(LegBase, gym.Env[NDArray[np.float32], NDArray[np.float32]]):
         Raises:
             ResetNeeded: there is no episode yet.
         """
-        return {**self._state_of_batch(), "generator": self.np_random.bit_generator.state}
+        return {**self._state_of_batch(), "generator": state_of(self.np_random)}
 
     def set_state(self, state: Mapping[str, Any]) -> NDArray[np.float32]:
         """Restore a state of `get_state`; return the observation.

@@ -19,7 +19,7 @@ from gymnasium.vector.utils import batch_space
 from numpy.typing import NDArray
 
 from hoof_env.envs.arguments import VectorArguments, takes
-from hoof_env.envs.base import LegBase, array_of, fixed_setting
+from hoof_env.envs.base import LegBase, array_of, fixed_setting, longer_limit
 from hoof_env.envs.drawn_recording import DrawnRecording
 from hoof_env.envs.generators import Generators, generator_of
 from hoof_env.episodes.infos import name_columns
@@ -106,7 +106,7 @@ def check_actions(actions: Any, shape: tuple[int, int]) -> NDArray[np.float32]:
     Raises:
         ParameterError: another shape or type, or numbers that are not finite.
     """
-    array = array_of(actions)
+    array = array_of("actions", actions)
     if array.dtype.kind not in "fiu" or array.shape != shape:
         raise ParameterError(
             f"actions: expected finite numbers in [-1, 1], shape {shape}, "
@@ -151,8 +151,8 @@ class HorseLegVectorEnv(LegBase, VectorEnv[NDArray[np.float32], NDArray[np.float
         num_threads: threads that share the environments in a step; their number changes no bit.
         task, settings: arguments of `HorseLegEnv`.
         autoreset_mode: an `AutoresetMode`, its name or its value: NEXT_STEP, SAME_STEP or DISABLED.
-        max_episode_steps: largest number of control steps of an episode, like that of Gymnasium's TimeLimit;
-            None for `episode_seconds` alone.
+        max_episode_steps: largest number of control steps of an episode, as of Gymnasium's TimeLimit; at most
+            `episode_seconds` over `dt`. None for `episode_seconds` alone.
         render_mode: "rgb_array"; `render` returns a picture of each environment.
         rendered: number of environments that are drawn, the first ones; pictures of the rest are black.
             None draws all, if they are at most `MOST_DRAWN`.
@@ -195,6 +195,8 @@ class HorseLegVectorEnv(LegBase, VectorEnv[NDArray[np.float32], NDArray[np.float
         steps = None if max_episode_steps is None else count("max_episode_steps", max_episode_steps)
         size = width, height
         spaces = self._make(task, settings, self.num_envs, render_mode, size, num_threads, steps)
+        if steps is not None and steps > self.steps_per_episode:
+            raise ParameterError(longer_limit(steps, self.steps_per_episode, self.dt))
         self.single_observation_space, self.single_action_space = spaces
         self.observation_space = batch_space(self.single_observation_space, self.num_envs)
         self.action_space = batch_space(self.single_action_space, self.num_envs)
@@ -514,7 +516,7 @@ class HorseLegVectorEnv(LegBase, VectorEnv[NDArray[np.float32], NDArray[np.float
         self._check_state(state, "ended")
         n = self.num_envs
         states = state["generator"]
-        ended = array_of(state["ended"]).copy()
+        ended = array_of("state['ended']", state["ended"]).copy()
         if ended.dtype != bool or ended.ndim != 1:
             raise ParameterError(
                 f"state['ended']: expected a bool array of shape ({n},), got {state['ended']!r}"

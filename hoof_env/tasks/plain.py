@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict
 from enum import Enum
 from pathlib import PurePath
@@ -20,8 +20,8 @@ def to_json(settings: Settings) -> dict[str, Any]:
 
 
 def as_plain(name: str, value: Any) -> Any:
-    """Convert a value to plain Python: numbers of NumPy and pandas to numbers, arrays to lists, paths to
-    text, enumerations to their value. Other objects are returned as they are.
+    """Convert a value to plain Python: numbers of NumPy and pandas to numbers, arrays and other sequences to
+    lists, paths to text, enumerations to their value. Other objects are returned as they are.
 
     Args:
         name: name of the value in messages.
@@ -41,7 +41,8 @@ def as_plain(name: str, value: Any) -> Any:
         return str(value)
     if isinstance(value, Mapping):
         return {str(key): as_plain(f"{name}[{key!r}]", inner) for key, inner in value.items()}
-    if isinstance(value, (list, tuple)):
+    # Any sequence, such as the lists of a configuration library.
+    if isinstance(value, Sequence) and not isinstance(value, (str, bytes)):
         plain = (as_plain(f"{name}[{k}]", inner) for k, inner in enumerate(value))
         return tuple(plain) if isinstance(value, tuple) else list(plain)
     # Subclasses of other libraries, which JSON and pickles of this package should not depend on.

@@ -3,6 +3,7 @@ other calls (`CALLS`), by the words of each error. A new option or method adds i
 
 from __future__ import annotations
 
+import collections.abc
 import copy
 
 import gymnasium as gym
@@ -481,3 +482,46 @@ def test_gaits_go_by_name_or_number():
     env.reset(seed=0, options={"gait": "walk"})
     for gait in ("run", run.to_array(), run.to_array().tolist()):
         same(leg.action_for(gait), leg.action_for(run))
+
+
+@pytest.mark.parametrize("kind", [np.random.PCG64, np.random.Philox, np.random.SFC64, np.random.MT19937])
+def test_a_state_holds_any_generator_of_numpy(kind):
+    env = gym.make("hoof_env/HorseLeg-v0").unwrapped
+    env.np_random = np.random.Generator(kind(3))
+    env.reset()
+    state = env.get_state()
+    following = env.reset()[0]
+    env.set_state(state)
+    assert (env.reset()[0] == following).all()
+
+
+@pytest.mark.parametrize("num_envs", [1, 2])
+def test_an_action_that_numpy_cannot_convert_is_named_with_the_remedy(num_envs):
+    torch = pytest.importorskip("torch")
+    env = gym.make_vec(LEG, num_envs=2) if num_envs == 2 else gym.make(LEG)
+    env.reset(seed=0)
+    shape = env.action_space.shape
+    for action in (torch.zeros(shape, dtype=torch.bfloat16), torch.zeros(shape, requires_grad=True)):
+        with pytest.raises(ParameterError, match=rf"got a Tensor of {action.dtype} .*detach\(\)\.float\(\)"):
+            env.step(action)
+
+
+class Sequence(collections.abc.Sequence):
+    """Sequence of a configuration library."""
+
+    def __init__(self, *values):
+        self.values = values
+
+    def __getitem__(self, key):
+        return self.values[key]
+
+    def __len__(self):
+        return len(self.values)
+
+
+def test_any_sequence_is_as_good_as_a_list():
+    given = {"observation": Sequence("crank", "gait"), "randomize": {"friction": Sequence(0.2, 0.6)}}
+    listed = {"observation": ["crank", "gait"], "randomize": {"friction": [0.2, 0.6]}}
+    made, same_with_lists = (gym.make("hoof_env/HorseLeg-v0", **each).unwrapped for each in (given, listed))
+    assert made.settings == same_with_lists.settings
+    assert made.observation_names == same_with_lists.observation_names

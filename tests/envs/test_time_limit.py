@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import pickle
 import warnings
 
 import gymnasium as gym
@@ -10,6 +11,8 @@ import pytest
 from family import FALLS, IDS, same
 from gymnasium.envs.registration import EnvSpec
 from gymnasium.wrappers import TimeAwareObservation
+
+from hoof_env.errors import ParameterError
 
 LEG, MO = "hoof_env/HorseLeg-v0", "hoof_env/HorseLegMO-v0"
 STILL = np.zeros(4, np.float32)
@@ -133,3 +136,19 @@ def test_seconds_are_said_as_they_were_asked_for(seconds):
             info = env.step(np.zeros(env.action_space.shape, np.float32))[4]
         found.append(np.ravel(info["episode_summary"]["seconds"]).item())
     assert found == [seconds, seconds]
+
+
+def test_a_longer_limit_is_not_silently_shorter():
+    """Gymnasium's wrapper does not tell the environment; the spec says what holds, with the remedy."""
+    with pytest.warns(UserWarning, match=r"expected at most 500, .* give episode_seconds=20"):
+        env = TimeAwareObservation(gym.make(LEG, max_episode_steps=1000), normalize_time=True)
+    assert env.spec.max_episode_steps == 500
+    env.reset(seed=0)
+    for _ in range(500):
+        observation, *_, truncated, _ = env.step(STILL)
+    assert (observation[-1], truncated) == (1.0, True)
+    with pytest.raises(ParameterError, match=r"expected at most 500, .* give episode_seconds=20"):
+        gym.make_vec(LEG, num_envs=2, max_episode_steps=1000)
+    longer = gym.make(LEG, max_episode_steps=1000, episode_seconds=20.0)
+    assert EnvSpec.from_json(longer.spec.to_json()).max_episode_steps == 1000
+    assert pickle.loads(pickle.dumps(longer.spec)) == longer.spec
