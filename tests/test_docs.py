@@ -70,7 +70,7 @@ def test_links_lead_somewhere(page):
 @pytest.mark.parametrize("page", LIVE, ids=name)
 def test_commands_and_files_exist(page):
     text = page.read_text(encoding="utf-8")
-    modules = set(re.findall(r"python -m ((?:agents|benchmarks|hoof_env|tests)[\w.]*\w)", text))
+    modules = set(re.findall(r"python -m ((?:agents|benchmarks|docs|hoof_env|tests)[\w.]*\w)", text))
     assert not {one for one in modules if not is_command(ROOT / one.replace(".", "/"))}
     commands = set(re.findall(r"(?:`|bin/)hoof-env ([a-z]+)\b(?![^.:]{0,60}\sof commit)", text))
     assert not commands - set(COMMANDS)

@@ -208,7 +208,7 @@ _UNITS = ("rad/s", "rad", "rad", "rad")
 IN_RANGE = tuple(map(_in_range, range(4)))
 IN_RATE = tuple(map(_in_rate, range(4)))
 """Scales of the gait parameters and their rates. They use the limits and bounds of the leg; their texts show
-those of the published one, see `envs.manual_bodies.LegPage.scaling`."""
+those of the published one, see `envs.manual_bodies.LegTables.scaling`."""
 
 ENTRIES = (
     Entry("sin(crank angle)", "crank", "-", _sine, PLAIN),

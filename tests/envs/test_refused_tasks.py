@@ -11,7 +11,7 @@ import pytest
 
 import hoof_env
 from hoof_env import Entry, Scale, Term, register
-from hoof_env.envs.manual import page_of
+from hoof_env.envs.manual import tables_of
 from hoof_env.errors import ParameterError
 from hoof_env.tasks import registry as tasks
 
@@ -122,7 +122,7 @@ CALLS = [
     (pickled, "pickled with other terms, entries or law"),
     (registered_no_more, "task: expected one of .*, got 'own/Everything-v0'"),
     (lambda own: hoof_env.HorseLegEnv(task="nobody:own/Nothing-v0"), "No module named 'nobody'"),
-    (lambda own: page_of("own/Nothing-v0"), "expected one of .*, got 'own/Nothing-v0'"),
+    (lambda own: tables_of("own/Nothing-v0"), "expected one of .*, got 'own/Nothing-v0'"),
 ]
 """Calls with the module of a user, and words."""
 
