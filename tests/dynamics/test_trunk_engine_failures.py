@@ -5,13 +5,13 @@ import pytest
 
 from hoof_env.dynamics.engine import TrunkEngine
 from hoof_env.dynamics.parts import Limb, Motor, Prescribed, Result, Trunk
-from hoof_env.dynamics.tally import tally_of
 from hoof_env.errors import ParameterError
 from hoof_env.gait import GaitParameters
 from hoof_env.ground.contact import Ground
 from hoof_env.ground.terrain import Terrain
 from hoof_env.leg.profile import functions
 from tests.dynamics.scenes import LEG, RUN, WALK, drives_less_losses, energy, same
+from tests.dynamics.tally import tally_of
 
 ROCKER = LEG.replace(lengths={"CF": 0.8 * LEG.lengths["CF"]}, full_turn=False)
 END = np.radians(144.5)  # where the engine knows no more: the crank's dead point is some 1 deg on
