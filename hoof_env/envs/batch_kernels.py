@@ -14,7 +14,6 @@ from hoof_env.dynamics.model import static_of
 from hoof_env.envs.batch_build import find_entries
 from hoof_env.envs.conditions import Conditions, under_each
 from hoof_env.envs.infos import InfoLayout
-from hoof_env.envs.outcome import MOVED
 from hoof_env.envs.scene import ALL_ARRAYS, TaskKind, functions_of, is_from_outside, known_of
 from hoof_env.envs.step import NOT_A_NUMBER, StepKernels, step_kernels
 from hoof_env.errors import ParameterError
@@ -186,7 +185,7 @@ class BatchKernels:
                 kernels.measure.compile()
             self.engine.compile()
         except UserFunctionError as error:
-            raise user_error(self.task.id, error, MOVED) from None
+            raise user_error(self.task.id, error) from None
 
     def _measure(self, out: Floats) -> None:
         self.kernels.measure(self._hold(range(out.shape[1]), self.kernels.measure, measured=out))

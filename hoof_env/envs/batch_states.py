@@ -123,9 +123,6 @@ def _set_state(batch: Any, state: Mapping[str, Any]) -> None:
             f"state['episode']: expected shape {expected} for {batch.num_envs} environments, "
             f"got {episode.shape}"
         )
-    if "begun" in state:
-        raise ParameterError("state: 'begun' is called 'start_values' now")
-    # States of older versions have no start values: infos then contain NaN.
     start_values = np.asarray(state.get("start_values", np.nan))
     if start_values.dtype.kind != "f" or start_values.shape not in ((), batch.start_values.shape):
         raise ParameterError(

@@ -15,7 +15,7 @@ from hoof_env.ground.terrain import surface
 from hoof_env.simd import Lanes, Number, where
 from hoof_env.simd.math import cos_sin
 from hoof_env.simd.user_functions import check_function, inputs
-from hoof_env.tasks.own_parts import Constant, check_arguments, check_parts, without_scalar
+from hoof_env.tasks.own_parts import Constant, check_arguments, check_parts
 
 if TYPE_CHECKING:
     from hoof_env.dynamics.layout import ContactMemory, LegMemory, TrunkMemory
@@ -71,7 +71,6 @@ class Scale:
             check_function(f"scale {self.text!r}: apply", self.apply, 2)
 
 
-@without_scalar
 @dataclass(frozen=True)
 class Entry:
     """Entry of the observation.

@@ -67,13 +67,6 @@ def cut(part):
     return write
 
 
-def without_form(folder):
-    """A record of before actions were rates."""
-    kept = json.loads((folder / "run.json").read_text())
-    del kept["actions"]
-    (folder / "run.json").write_text(json.dumps(kept))
-
-
 def not_finite(folder):
     weights = load_file(folder / WEIGHTS)
     weights["log_std"][0] = torch.nan
@@ -105,7 +98,6 @@ RUNS = [
     ),
     (record(env_id=RAIL), "HorseLegRail-v0, expected"),
     (record(actions="offsets"), "actions offsets, expected rates"),
-    (without_form, r"actions of an older form .*, expected rates"),
     (
         record(observation_space="Box(3)", action_space="Box(1)"),
         r"Box\(3\), expected .*; action_space Box\(1\)",
@@ -202,7 +194,6 @@ def half(path):
 
 NO_ONNX = r"x\.onnx: expected an ONNX file of agents\.export"
 EXPORTS = [
-    (tagged(None), ENV_ID, KWARGS, "actions of an older form .*, expected rates"),
     (tagged("offsets"), ENV_ID, KWARGS, "actions offsets, expected rates"),
     (None, RAIL, {}, "env_id hoof_env/HorseLeg-v0, expected hoof_env/HorseLegRail-v0"),
     (None, ENV_ID, {"trunk": "rail"}, "observation_space"),

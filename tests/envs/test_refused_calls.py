@@ -206,7 +206,7 @@ STATES = {
     "nothing": (lambda state: None, "state: expected what get_state gives, but id, settings.* is missing"),
     "a part": (lambda state: without(state, "episode"), "but episode is missing"),
     "no form": (
-        lambda state: without(state, "actions"), r"actions are rates, got one of an older form \(positions",
+        lambda state: without(state, "actions"), "actions are rates, got None",
     ),
     "a form": (lambda state: {**state, "actions": "offsets"}, "whose actions are rates, got 'offsets'"),
     "an id": (lambda state: {**state, "id": IDS[1]}, f"expected one of {LEG}, got one of {IDS[1]}"),
@@ -339,11 +339,6 @@ def state_with(**entries):
     return set_state
 
 
-def of_before(env):
-    """A state with an old name."""
-    return {"begun" if key == "start_values" else key: part for key, part in env.get_state().items()}
-
-
 NO_GAIT = r"gait: expected one of carrying_walk, run, walk.*got"
 NO_GAITS = (
     "trot", None, 3, [1.0, 2.0], [1.0, 2.0, 3.0, NAN], HarmonicGait(5.0, 0.4, 0.1, -0.2), HARMONIC,
@@ -429,7 +424,6 @@ CALLS = [
         ParameterError,
         "state: expected one of a single environment, got one of 3 environments",
     ),
-    ("single", lambda env: env.set_state(of_before(env)), ParameterError, "'begun' is called 'start_v"),
     ("single", state_with(id="own/Everything-v0"), ParameterError, f"one of {LEG}, got one of own"),
     # attributes, methods, records and generators of rows
     *(
