@@ -182,7 +182,7 @@ def test_a_run_that_fails_ends_its_record():
     assert record["result"].tolist() == [Result.DEAD_POINT, Result.OK]
     assert 2 < len(record["time"]) < 20
     assert np.isfinite(record["crank_angle"]).all()
-    with pytest.raises(ParameterError, match="every: expected a whole number, 1 or more, got 0"):
+    with pytest.raises(ParameterError, match=r"every: expected .*1 .*got 0"):
         e.run(steps=10, every=0)
 
 

@@ -99,7 +99,7 @@ def test_pictures_refuse_legs_that_they_cannot_show():
     ):
         with pytest.raises(ParameterError, match=words):
             Renderer(surroundings_of_legs(count, picture))
-    with pytest.raises(ParameterError, match=r"expected a single one .* got HorseLegVectorEnv"):
+    with pytest.raises(ParameterError, match=r"expected a single one .*got HorseLegVectorEnv"):
         records.surroundings(gym.make_vec("hoof_env/HorseLeg-v0", 2))
 
 
