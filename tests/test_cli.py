@@ -88,8 +88,10 @@ def test_a_file_is_replaced_on_demand_only_and_its_folder_is_told(command, name,
     assert said.endswith(f"B; made the folder {out.parent}\n")
     first = out.read_bytes()
     assert cli.main([*command, change, "1"]) == 2
-    refusal = f"hoof-env: error: {str(out)!r} exists already; name another file, or add --overwrite\n"
-    assert capsys.readouterr().err == refusal
+    refusal = capsys.readouterr().err
+    assert refusal.startswith(f"hoof-env: error: {str(out)!r} ")
+    assert "--overwrite" in refusal
+    assert refusal.count("\n") == 1
     assert out.read_bytes() == first
     assert cli.main([*command, change, "1", "--overwrite"]) == 0
     assert out.read_bytes() != first
@@ -128,7 +130,9 @@ def test_a_full_disk_is_one_line():
             [*HOOF_ENV, "manual"], stdout=full, stderr=subprocess.PIPE, text=True, timeout=120
         )
     assert done.returncode == 2
-    assert done.stderr == "hoof-env: error: cannot write the output: No space left on device\n"
+    assert done.stderr.startswith("hoof-env: error: ")
+    assert done.stderr.endswith("No space left on device\n")
+    assert done.stderr.count("\n") == 1
 
 
 def test_an_id_of_a_module_in_the_current_folder(tmp_path):
