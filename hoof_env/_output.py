@@ -181,7 +181,7 @@ def markdown_table(head: Iterable[str], rows: Iterable[Iterable[str]]) -> str:
     return "\n".join([first, "|" + "---|" * len(titles), *rest])
 
 
-def text_table(head: Iterable[str], rows: Iterable[Iterable[str]], width: int) -> str:
+def terminal_table(head: Iterable[str], rows: Iterable[Iterable[str]], width: int) -> str:
     """Return a table for a terminal: columns side by side, of which the widest are wrapped to fit.
 
     Args:

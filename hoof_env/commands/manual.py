@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 import shutil
 
-from hoof_env._output import text_table
+from hoof_env._output import terminal_table
 from hoof_env.commands.said import say
 
 
@@ -25,7 +25,7 @@ def manual(id: str = "hoof_env/HorseLeg-v0") -> None:
     say(f"{id.rpartition(':')[2]}{module}: {summaries().get(id, task.summary)}")
     for title, table in tables.items():
         say(f"\n{title}\n")
-        say(text_table(table.head, [[without_links(cell) for cell in row] for row in table.rows], width))
+        say(terminal_table(table.head, [[without_links(cell) for cell in row] for row in table.rows], width))
 
 
 def without_links(text: str) -> str:
