@@ -49,11 +49,11 @@ setup setup-demo:
 demo: setup-demo
 	@$(PY) -m agents.demo
 
-# A file's tests stay in one process: the others would make its fixtures again; `LONGEST` of tests/conftest.py begin, and xdist keeps that order. A
-# process that is lost stays lost: a new one would begin with the test that killed the last.
+# A file's tests stay in one process: the others would make its fixtures again. A process that is lost stays lost: a new one would begin with the
+# test that killed the last.
 test: setup
 	@$(MAKE) --no-print-directory lint
-	@echo 'pytest' && $(PY) -m pytest -q -n auto --dist loadfile --no-loadscope-reorder --max-worker-restart=0
+	@echo 'pytest' && $(PY) -m pytest -q -n auto --dist loadfile --max-worker-restart=0
 
 test-slow: setup
 	@echo 'pytest -m slow' && $(PY) -m pytest -q $(LONG) -m slow

@@ -159,10 +159,9 @@ def check_actions(dataset: Any, env: Any) -> None:
     expected = describe_actions(env)
     stored = dataset.storage.metadata.get(ACTIONS)
     if stored != expected.get(ACTIONS):
-        form = "actions of an older form (positions in a box)" if stored is None else f"actions {stored}"
         raise DataFileError(
-            f"dataset {dataset.spec.dataset_id}: expected actions {expected.get(ACTIONS)}, got {form}; make "
-            "it again by agents.dataset"
+            f"dataset {dataset.spec.dataset_id}: expected actions {expected.get(ACTIONS)}, got {stored}; "
+            "make it again by agents.dataset"
         )
 
 

@@ -1,4 +1,4 @@
-"""Stills and returns that the manual's pages show of each id, besides the scores of its policy.
+"""Stills and returns that the pages of docs/environments show of each id, besides the scores of its policy.
 
     python -m agents.gallery
 
@@ -24,7 +24,7 @@ from agents.command import run
 from agents.stock import OUT as CURVES
 from agents.stock_page import at
 from agents.stock_plan import TUNED, read_curves
-from hoof_env.envs.manual import RETURNS, STILL
+from docs._manual.results import RETURNS, STILL
 from hoof_env.envs.policies import STANDS_FOR
 from hoof_env.envs.shipped import shipped_returns
 from hoof_env.evaluation.episodes import FINAL_SEEDS, score_vector
@@ -135,7 +135,7 @@ def main(argv: list[str] | None = None) -> None:
         returns[env_id] = returns_of(env_id, random_return(env_id))
         print(env_id, returns[env_id], flush=True)
     runs.write_text(path, json.dumps(returns, indent=1) + "\n")
-    print("next: hoof-env manual --out docs/environments --films agents/policies")
+    print("next: python -m docs._manual")
 
 
 if __name__ == "__main__":

@@ -30,7 +30,6 @@ from torch import nn
 
 from agents.perceptrons import ADVANTAGE, CHUNK, Floats, Loss, Part, Weights
 from hoof_env.errors import ParameterError
-from hoof_env.policies.delayed_adam import DelayedAdam
 from hoof_env.simd.threads import check_threads, limit_threads, run_together
 
 # Decay rates of the moments, and the term that keeps Adam from dividing by 0
@@ -86,13 +85,6 @@ class Scale:
         return np.float32(np.sqrt(self.square + 1e-8))
 
 
-class FlatPolicy(ActorCriticPolicy):
-    """Stable-Baselines3's policy, whose optimiser is never used."""
-
-    def __init__(self, *args: Any, **kwargs: Any) -> None:
-        super().__init__(*args, **{**kwargs, "optimizer_class": DelayedAdam})
-
-
 class FlatPPO(OnPolicyAlgorithm):
     """PPO with the arguments of Stable-Baselines3's, as which its policies are loaded.
 
@@ -106,7 +98,7 @@ class FlatPPO(OnPolicyAlgorithm):
             step, or rewards that would be normalised twice.
     """
 
-    policy_aliases: ClassVar[dict[str, Any]] = {"MlpPolicy": FlatPolicy}
+    policy_aliases: ClassVar[dict[str, Any]] = {"MlpPolicy": ActorCriticPolicy}
     plays_as = "ppo"
 
     def __init__(

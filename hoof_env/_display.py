@@ -21,12 +21,3 @@ def html_table(head: Iterable[str], rows: Iterable[Iterable[Any]], caption: str 
 def line_of(name: str, /, **parts: Any) -> str:
     """Return one line in angle brackets: a name and parts by name."""
     return f"<{' '.join([name, *(f'{key}={value}' for key, value in parts.items())])}>"
-
-
-class Markdown(str):
-    """Text in Markdown, which notebooks render."""
-
-    __slots__ = ()
-
-    def _repr_markdown_(self) -> str:
-        return str(self)

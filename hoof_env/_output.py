@@ -1,12 +1,14 @@
-"""Output that a failure or an interrupt never leaves half written; tables in Markdown."""
+"""Output that a failure or an interrupt never leaves half written; tables in Markdown and for terminals."""
 
 from __future__ import annotations
 
 import io
+import itertools
 import os
 import shutil
 import sys
 import tempfile
+import textwrap
 from collections.abc import Collection, Iterable, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
@@ -177,3 +179,30 @@ def markdown_table(head: Iterable[str], rows: Iterable[Iterable[str]]) -> str:
     lines = [[*row, *[""] * (len(titles) - len(row))] for row in map(list, rows)]
     first, *rest = (f"| {' | '.join(line)} |" for line in (titles, *lines))
     return "\n".join([first, "|" + "---|" * len(titles), *rest])
+
+
+def terminal_table(head: Iterable[str], rows: Iterable[Iterable[str]], width: int) -> str:
+    """Return a table for a terminal: columns side by side, of which the widest are wrapped to fit.
+
+    Args:
+        head: titles of the columns.
+        rows: cells of each row, as many as there are titles.
+        width: width of the terminal [characters]; columns become no narrower than their longest words.
+    """
+    lines = [list(head), *map(list, rows)]
+    columns = list(zip(*lines, strict=True))
+    widths = [max(map(len, column)) for column in columns]
+    shortest = [max(len(word) for cell in column for word in cell.split() or [""]) for column in columns]
+    while sum(widths) + 2 * (len(widths) - 1) > width and widths != shortest:
+        widest = max((k for k in range(len(widths)) if widths[k] > shortest[k]), key=widths.__getitem__)
+        widths[widest] -= 1
+    printed = []
+    for line in [lines[0], ["-" * each for each in widths], *lines[1:]]:
+        wrapped = [
+            textwrap.wrap(cell, each, break_long_words=False, break_on_hyphens=False)
+            for cell, each in zip(line, widths, strict=True)
+        ]
+        for parts in itertools.zip_longest(*wrapped, fillvalue=""):
+            padded = (part.ljust(each) for part, each in zip(parts, widths, strict=True))
+            printed.append("  ".join(padded).rstrip())
+    return "\n".join(printed)

@@ -17,6 +17,7 @@ from pathlib import Path
 from hoof_env._output import bear_any_output, flush_or_drop
 from hoof_env._version import __version__
 from hoof_env.commands.lab import average, compare
+from hoof_env.commands.manual import manual
 from hoof_env.commands.played import USUAL, Played
 from hoof_env.commands.policies import demo, evaluate, list_ids
 from hoof_env.commands.said import say as _say
@@ -150,23 +151,6 @@ def export(
         )
     others = "".join(f", with {file.name}" for file in files_of(out)[1:])
     _say(f"{out}: {rows} rows, 1 BW = {weight:.1f} N, {_size(out)}{others}{made}")
-
-
-def manual(id: str = "hoof_env/HorseLeg-v0", out: Path | None = None, films: Path | None = None) -> None:
-    """Print the manual page of an environment, or write the pages of all environments.
-
-    Args:
-        id: id of the environment.
-        out: folder for a page of each id, and their index; made if it is missing.
-        films: folder of trained policies, as agents/policies, whose films the pages show; with `out`.
-    """
-    from hoof_env.envs.manual import page_of, write_pages
-
-    if out is None:
-        _say(page_of(id))
-        return
-    written = len(write_pages(out, films))
-    _say(f"{written} files written; read {out / 'README.md'} first")
 
 
 def mjcf(

@@ -26,44 +26,6 @@ for library in ("OMP", "OPENBLAS", "MKL"):
 if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
     signal.signal(signal.SIGINT, signal.default_int_handler)
 
-LONGEST = (
-    "simd/test_oracle.py",
-    "envs/test_bits.py",
-    "test_packaging.py",
-    "envs/test_own_task.py",
-    "benchmarks/test_speed.py",
-    "dynamics/test_mechanisms.py",
-    "view/test_server.py",
-    "envs/test_own_parts.py",
-    "agents/test_resume.py",
-    "test_setup.py",
-    "test_site.py",
-    "envs/test_refused_tasks.py",
-    "agents/test_soft_landing.py",
-    "agents/test_demo.py",
-    "view/test_tab.py",
-    "paper/test_figures.py",
-    "simd/test_compile.py",
-    "envs/test_refused_functions.py",
-    "simd/test_objects.py",
-    "dynamics/test_animal.py",
-    "test_typing.py",
-    "ecosystem/test_gymnasium.py",
-    "agents/test_stock.py",
-    "test_cli.py",
-    "envs/test_rewards_of_tasks.py",
-    "paper/test_legs_that_fit.py",
-    "dynamics/test_strokes.py",
-    "agents/test_horse_gaits.py",
-    "agents/test_examples.py",
-    "test_make_test.py",
-    "ecosystem/test_wrappers.py",
-    "test_docs.py",
-    "ecosystem/test_suite.py",
-)
-"""Files that take longest, the longest first. They begin: one that began last would keep one processor busy
-while the others have nothing left to do."""
-
 HAS_TORCH = find_spec("torch") is not None
 NEED_TORCH = ("torch", "stable_baselines3", "sb3_contrib")
 LEFT_OUT = ("agents", "ecosystem")  # folders of tests whose commands import it in processes of their own
@@ -143,13 +105,6 @@ def pytest_ignore_collect(collection_path):
     if not HAS_TORCH and collection_path in [here / name for name in LEFT_OUT]:
         return True
     return None
-
-
-def pytest_collection_modifyitems(items):
-    """Put the longest files first; the tests of each stay in their order."""
-    here = Path(__file__).parent
-    places = {here / name: place for place, name in enumerate(LONGEST)}
-    items.sort(key=lambda item: places.get(item.path, len(places)))
 
 
 @pytest.hookimpl(wrapper=True)

@@ -118,7 +118,7 @@ def test_a_build_and_markers_are_told_apart(checkout, monkeypatch):
 
 def test_two_numpys_are_refused_by_their_versions(checkout, made):
     base, now = checkout(pins=["numpy==2.3.1"]), checkout("now", pins=["numpy==2.4.6"])
-    with pytest.raises(NoEnvironment, match=r"one version of NumPy .* got 2\.3\.1 in .* and 2\.4\.6 in "):
+    with pytest.raises(NoEnvironment, match=r"one version of NumPy .*got 2\.3\.1 in .*and 2\.4\.6 in "):
         environments.environments(base, now)
     with pytest.raises(NoEnvironment, match="got none in"):
         environments.environments(checkout("old", pins=[]), checkout("older", pins=[]))
@@ -129,7 +129,7 @@ def test_two_numpys_are_refused_by_their_versions(checkout, made):
 def test_a_checkout_that_does_not_say_what_it_needs_is_refused(checkout, made, name):
     base, now = checkout(), checkout("now")
     (base / name).unlink()
-    with pytest.raises(NoEnvironment, match=f"expected {name} in the checkout"):
+    with pytest.raises(NoEnvironment, match=f"expected {name} .*checkout"):
         environments.environments(base, now)
 
 

@@ -81,17 +81,6 @@ def test_without_pytorch_what_needs_it_is_left_out_and_a_line_says_so(tmp_path):
     assert "1 passed, 2 skipped" in ended.stdout
 
 
-def test_the_longest_files_are_there_and_begin(request):
-    """In the order of `LONGEST`, whatever else is asked for."""
-    longest = request.config.pluginmanager.get_plugin(str(ROOT / "tests" / "conftest.py")).LONGEST
-    assert not [name for name in longest if not (ROOT / "tests" / name).is_file()]
-    command = [sys.executable, "-m", "pytest", "-q", "--collect-only", "-p", "no:cacheprovider"]
-    files = ["tests/test_rooms.py", f"tests/{longest[1]}", "tests/test_make_test.py", f"tests/{longest[0]}"]
-    said = subprocess.run([*command, *files], cwd=ROOT, capture_output=True, text=True, timeout=300).stdout
-    order = list(dict.fromkeys(line.partition("::")[0] for line in said.splitlines() if "::" in line))
-    assert order == [files[3], files[1], files[2], files[0]]
-
-
 def test_a_test_has_a_limit_of_time(pytestconfig):
     assert float(pytestconfig.getini("faulthandler_timeout")) > 0
     assert pytestconfig.getini("faulthandler_exit_on_timeout")

@@ -15,22 +15,25 @@ from importlib import import_module
 from pathlib import Path
 from typing import Any
 
+import gymnasium as gym
 import pytest
 
 from agents.results import read_row
 from hoof_env.envs.horse_leg import HorseLegEnv
 from hoof_env.evaluation.statistics import iqm
+from hoof_env.gait import WIDEST, FilterSettings
 from hoof_env.ground.laws import FACTORS, restitution_of_factor
 from hoof_env.paper.rows import EXACT, OURS, PRINTED, PROBABLE, UNDETERMINED
 from hoof_env.tasks.horse import MASS
 from hoof_env.tasks.horse_terms import HORSE_TERMS
-from hoof_env.tasks.reward import check_weights
+from hoof_env.tasks.reward import BEARING, LONGEST_STRIDE, check_weights
 
 ROOT = Path(__file__).parents[1]
 PAGES = (
     "README.md",
     *(f"docs/{name}.md" for name in ("index", "agents", "engine", "help", "horse", "own_task", "paper")),
     *(f"docs/{name}.md" for name in ("project", "start", "task", "view", "elasticity", "parameters")),
+    *(f"docs/environments/{path.name}" for path in sorted((ROOT / "docs/environments").glob("*.md"))),
 )
 """Pages whose results are marked."""
 
@@ -126,8 +129,33 @@ def constant(module: str, name: str, *keys: str) -> float:
     """The size of a constant of a module, or of an item of it; "percent" makes it a hundred times that."""
     value: Any = vars(import_module(module))[name]
     for key in keys:
-        value = 100 * value if key == "percent" else value[key]
+        value = 100 * value if key == "percent" else value[int(key) if isinstance(value, tuple) else key]
     return abs(value)
+
+
+def limit(name: str, end: str) -> float:
+    """The lowest (0) or highest (1) command of a gait parameter that any gait takes."""
+    return WIDEST[name][int(end)]
+
+
+def filter_bound(name: str) -> float:
+    """A bound of the filters of one leg's commands."""
+    return getattr(FilterSettings(), name)
+
+
+def setting(name: str, key: str) -> float:
+    """The default of a setting of an id."""
+    return getattr(gym.make(f"hoof_env/{name}-v0").unwrapped.settings, key)
+
+
+def allowance() -> float:
+    """The largest bearing allowance [s]."""
+    return BEARING * LONGEST_STRIDE
+
+
+def measured_count(name: str) -> float:
+    """How many numbers infos measure in an id."""
+    return len(gym.make(f"hoof_env/{name}-v0").reset(seed=0)[1]["measured"])
 
 
 @cache
@@ -273,6 +301,11 @@ SOURCES: dict[str, Callable[..., float]] = {
     "leg": leg,
     "horse": horse,
     "constant": constant,
+    "limit": limit,
+    "filter": filter_bound,
+    "setting": setting,
+    "allowance": allowance,
+    "measured": measured_count,
     "suspension": suspension,
     "fastest_gait": fastest_gait,
     "gain": gain,

@@ -20,7 +20,7 @@ HEAVY = {"llvmlite", "torch", "pygame", "matplotlib", "tyro", "stable_baselines3
 HEAVY |= {"importlib.metadata"}
 
 
-SHIPPED = {".py", ".json", ".typed", ".toml", ".in", ".md", ".html", ".css", ".js", ".j2", ".safetensors"}
+SHIPPED = {".py", ".json", ".typed", ".in", ".md", ".html", ".css", ".js", ".j2", ".safetensors"}
 
 
 @pytest.fixture(scope="module")

@@ -34,6 +34,7 @@ FLOORS = (
     ("hoof_env/commands",),
     ("hoof_env/cli.py",),
     ("hoof_env/__main__.py",),
+    ("docs/_manual",),
     ("agents", "examples"),
     ("benchmarks",),
 )
@@ -133,7 +134,7 @@ def test_modules_of_a_room_import_each_other_in_no_circle(room):
 
 
 def test_every_file_has_its_room():
-    tops = ("hoof_env", "agents", "benchmarks", "examples")
+    tops = ("hoof_env", "docs/_manual", "agents", "benchmarks", "examples")
     files = {path for top in tops for path in (ROOT / top).rglob("*.py")}
     assert files == {path for room in FLOOR for path in files_of(room)} | {ROOT / PUBLIC}
 

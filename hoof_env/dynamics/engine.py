@@ -26,7 +26,6 @@ from hoof_env.dynamics.engine_calls import EngineCalls
 from hoof_env.dynamics.layout import engine_layout
 from hoof_env.dynamics.limits import CHECK_EVERY
 from hoof_env.dynamics.model import static_of
-from hoof_env.dynamics.names import NamedColumns
 from hoof_env.dynamics.parts import (
     MOST_IMPULSE,
     Drive,
@@ -557,7 +556,7 @@ class TrunkEngine:
             name: values.transpose(time_first[values.ndim])
             for name, values in memory.named_rows(kept).items()
         }
-        return NamedColumns(named | {"result": self.results})
+        return named | {"result": self.results}
 
     def _go_on(self, steps: int, account: bool) -> None:
         """Advance as `_go`, a long call in parts, so that Ctrl-C takes effect."""
@@ -708,7 +707,7 @@ class TrunkEngine:
 
     def _named(self, names: Sequence[str]) -> dict[str, Floats]:
         named = memory.named_rows(self._memory)
-        return NamedColumns({name: named[name].copy() for name in names})
+        return {name: named[name].copy() for name in names}
 
     @property
     def account(self) -> dict[str, Floats]:

@@ -281,16 +281,6 @@ class Reactions(NamedTuple):
     hip: Any
 
 
-class Tally(NamedTuple):
-    """Sums over all bodies of an engine, shape (num_envs,) each."""
-
-    centre: Any  # common centre of mass, complex [m]
-    momentum: Any  # complex [kg m/s]
-    spin: Floats  # angular momentum about the centre [kg m^2/s]
-    kinetic: Floats  # rotors included [J]
-    potential: Floats  # of weight and, on a suspended trunk, of spring and support [J]
-
-
 class Result(IntEnum):
     """Outcome of an advance. Values from PITCH on are violated `Limits`: the motion continues, its state is
     kept."""

@@ -364,8 +364,7 @@ class LegBase:
         if state["id"] != self.task.id:
             raise ParameterError(f"state: expected one of {self.task.id}, got one of {state['id']}")
         if (form := state.get("actions")) != self.action_form:
-            got = repr(form) if "actions" in state else "one of an older form (positions in a box)"
-            raise ParameterError(f"state: expected one whose actions are {self.action_form}, got {got}")
+            raise ParameterError(f"state: expected one whose actions are {self.action_form}, got {form!r}")
         there = state["settings"] if isinstance(state["settings"], Mapping) else {}
         here = self._settings_as_json()
         if here == there:

@@ -164,7 +164,7 @@ def open_loop_record(path: Path) -> dict[str, Any]:
     environment as `open_loop` takes them, and their "form".
 
     Raises:
-        DataFileError: not such a file, or its numbers are actions of an older form.
+        DataFileError: not such a file, or one of another form.
     """
     try:
         record: dict[str, Any] = parse_json(path.read_text(encoding="utf-8"))
@@ -188,8 +188,7 @@ def open_loop_record(path: Path) -> dict[str, Any]:
     if not isinstance(record.get("form"), str) or not record["form"].startswith((GAIT, "offsets")):
         raise DataFileError(
             f"open-loop gait {path}: expected form {GAIT!r}, parameters of gaits, or the form of a horse's"
-            f" actions, got {record.get('form')!r}; files of before hold actions that were positions,"
-            " make them again by agents.open_loop"
+            f" actions, got {record.get('form')!r}; make one by agents.open_loop"
         )
     return record
 

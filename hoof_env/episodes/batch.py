@@ -25,7 +25,6 @@ from hoof_env.dynamics.memory import only
 from hoof_env.dynamics.model import static_of
 from hoof_env.dynamics.parts import Mechanics, broken
 from hoof_env.episodes.infos import InfoLayout
-from hoof_env.episodes.outcome import MOVED
 from hoof_env.episodes.plan import Plan, make_plan
 from hoof_env.episodes.row_plans import RowPlans
 from hoof_env.episodes.scene import ALL_ARRAYS, TaskKind, known_of
@@ -603,7 +602,7 @@ class EpisodeBatch:
                 kernels.measure.compile()
             self.engine.compile()
         except UserFunctionError as error:
-            raise user_error(self.task.id, error, MOVED) from None
+            raise user_error(self.task.id, error) from None
 
     def direct_step(self) -> Any:
         """Return `calls.step` as machine code, without what a call of it costs in Python. It must be called

@@ -24,7 +24,6 @@ from hoof_env.dynamics.layout import (
     leg_state,
     stride_sums,
 )
-from hoof_env.dynamics.names import present_name
 from hoof_env.gait import parameter_names
 
 
@@ -113,8 +112,7 @@ class NamedArray(np.ndarray[Any, np.dtype[np.float64]]):
         if not isinstance(key, str):
             return key
         if key not in self.names:
-            new = present_name(key, self.names)
-            raise KeyError(f"{key!r} is called {new!r} now" if new else key)
+            raise KeyError(key)
         return (..., self.names.index(key))
 
     def __array_wrap__(self, array: Any, context: Any = None, return_scalar: bool = False) -> Any:
@@ -142,10 +140,8 @@ class NamedArray(np.ndarray[Any, np.dtype[np.float64]]):
         return html_table(("name", "shape"), [(name, self[name].shape) for name in self.names])
 
     def get(self, key: str, default: Any = None) -> Any:
-        """Return the numbers of a name, or `default` if there is no such name; an old name raises a
-        `KeyError`."""
-        is_old = isinstance(key, str) and present_name(key, self.names)
-        return self[key] if is_old or key in self.names else default
+        """Return the numbers of a name, or `default` if there is no such name."""
+        return self[key] if key in self.names else default
 
     def _mapping(self) -> dict[str, Any]:
         return {name: self[name] for name in self.names}

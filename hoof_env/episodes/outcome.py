@@ -6,17 +6,9 @@ from typing import Any
 
 from hoof_env.dynamics.layout import LegMemory, StrideSums, TrunkMemory
 from hoof_env.dynamics.limits import has_moved
-from hoof_env.dynamics.names import RENAMED
 from hoof_env.simd import Lanes, Mask, Number, block_at, maximum, minimum, rounded, where
 from hoof_env.tasks.episode import FAILED, TRUNCATED, Episode, Memories
 from hoof_env.tasks.reward import BEARING, LONGEST_STRIDE, Outcome
-
-MOVED = {
-    **RENAMED,
-    **{name: f"sums.{name}" for name in StrideSums.names},
-    **{old: f"sums.{new}" for old, new in RENAMED.items() if new in StrideSums.names},
-}
-"""Present names of attributes by the old ones, for messages; sums were attributes of the `Outcome` itself."""
 
 
 def bear(episode: Episode, impulse: Lanes, seconds: Number) -> Lanes:

@@ -15,7 +15,6 @@ from numpy.typing import NDArray
 from hoof_env.dynamics.engine import TrunkEngine
 from hoof_env.dynamics.layout import engine_layout
 from hoof_env.dynamics.memory import LIFT_OFF
-from hoof_env.dynamics.names import NamedColumns
 from hoof_env.dynamics.parts import broken
 from hoof_env.episodes.batch import EpisodeBatch
 from hoof_env.record.columns import Columns, columns_of
@@ -112,7 +111,7 @@ class Recording:
         records += [self._go_on(*part) for part in rest]
         # Without the first instant, which is the end of the step or the part before.
         joined = {name: np.concatenate([record[name][1:] for record in records]) for name in records[0]}
-        return NamedColumns(joined)
+        return joined
 
     def _has_substeps(self, k: int) -> bool:
         """Return False for the first end, which has no predecessor, and after a step that failed, which did

@@ -91,8 +91,6 @@ def _set_state(batch: EpisodeBatch, state: Mapping[str, Any]) -> None:
     """Restore a state whose plans the batch is under."""
     rows = batch.rows
     episode = _read_episode(batch, state["episode"])
-    if "begun" in state:
-        raise ParameterError("state: 'begun' is called 'start_values' now")
     # States of older versions have no start values: infos then contain NaN.
     start_values = np.asarray(state.get("start_values", np.nan))
     if start_values.dtype.kind != "f" or start_values.shape not in ((), rows.start_values.shape):

@@ -9,7 +9,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hoof_env.dynamics.layout import stride_sums
-from hoof_env.dynamics.names import NamedColumns
 from hoof_env.dynamics.parts import broken
 from hoof_env.episodes.batch import EpisodeBatch
 from hoof_env.episodes.infos import name_columns
@@ -85,7 +84,7 @@ def infos_of(batch: EpisodeBatch, ended: bool = True) -> dict[str, NDArray[Any]]
 
 def summary_of(batch: EpisodeBatch, env: int) -> dict[str, float]:
     """Return the figures of one episode by name, see `summaries_of`."""
-    return NamedColumns({name: float(values[0]) for name, values in summaries_of(batch, [env]).items()})
+    return {name: float(values[0]) for name, values in summaries_of(batch, [env]).items()}
 
 
 def summaries_of(batch: EpisodeBatch, envs: Sequence[int] | NDArray[np.int64]) -> dict[str, Floats]:
@@ -170,7 +169,7 @@ def endings_of(batch: EpisodeBatch, done: NDArray[np.bool_]) -> dict[str, Any]:
         batch: an `EpisodeBatch`.
         done: True for environments that ended an episode, shape (num_envs,).
     """
-    figures: dict[str, Any] = NamedColumns()
+    figures: dict[str, Any] = {}
     for name, values in summaries_of(batch, np.flatnonzero(done)).items():
         figures[name] = np.zeros(batch.num_envs)
         figures[f"_{name}"] = done.copy()

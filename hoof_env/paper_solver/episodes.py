@@ -18,7 +18,6 @@ from numpy.typing import ArrayLike, NDArray
 from hoof_env.dynamics.engine import TrunkEngine
 from hoof_env.dynamics.layout import LEG_REPORT, LEG_STATE, TRUNK_REPORT, TRUNK_STATE, stride_sums
 from hoof_env.dynamics.memory import LIFT_OFF, which
-from hoof_env.dynamics.names import NamedColumns
 from hoof_env.dynamics.observables import StanceCounter
 from hoof_env.dynamics.parts import Result
 from hoof_env.errors import ParameterError
@@ -207,7 +206,7 @@ class PaperEngine(TrunkEngine):
         trace = self.traces[env]
         of_trunk = {*TRUNK_STATE, *TRUNK_REPORT}
         shapes = {name: (-1, 1) if name in of_trunk else (-1, 1, 1) for name in TRACE.names or ()}
-        return NamedColumns({name: trace[name].reshape(shape).copy() for name, shape in shapes.items()})
+        return {name: trace[name].reshape(shape).copy() for name, shape in shapes.items()}
 
     def get_state(self) -> dict[str, Any]:
         """Return copies of everything that changes."""

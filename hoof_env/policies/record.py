@@ -161,19 +161,14 @@ def refuse_misfit(path: Path, there: dict[str, Any], here: dict[str, Any]) -> No
         there: description of the environment in which it was trained; entries that it lacks are not compared.
         here: description of the environment in which it is to play, as `describe` returns it.
     """
-    is_old = bool(there) and "actions" in here and "actions" not in there
-    # Of an old policy spaces and names differ, too, but they follow from the form of its actions.
-    compared = {"env_id": here["env_id"]} if is_old else here
     unlike = []
-    for key, expected in compared.items():
+    for key, expected in here.items():
         trained = there.get(key, expected)
         if trained != expected and not (key == "env_id" and same_id(trained, expected)):
             unlike.append(_difference(key, trained, expected))
         # What follows from another environment is not told
         if key == "env_id" and unlike:
             break
-    if is_old:
-        unlike.insert(0, f"actions of an older form (positions in a box), expected {here['actions']}")
     if unlike:
         name_there, _, version_there = str(there.get("env_id")).rpartition("-v")
         name_here, _, version_here = str(here.get("env_id")).rpartition("-v")

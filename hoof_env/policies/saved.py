@@ -244,11 +244,7 @@ def save_policy(model: Any, folder: Path) -> bool:
 def read_plain(folder: Path) -> TrainedPolicy:
     """Read the policy that `save_policy` wrote into `folder`, without a model's other parts. Damaged files
     raise exceptions of any type."""
-    import torch
     from safetensors.torch import load_file
-    from stable_baselines3.common.policies import ActorCriticPolicy
-
-    from hoof_env.policies.delayed_adam import DelayedAdam
 
     about = parse_json((folder / ABOUT).read_text(encoding="utf-8"))
     if about["format"] != FORMAT:
@@ -258,19 +254,12 @@ def read_plain(folder: Path) -> TrainedPolicy:
     model.observation_space = built_box(**about["observation_space"])
     model.action_space = built_box(**about["action_space"])
     model.policy_kwargs = _built(about["policy_kwargs"])
-    arguments = dict(model.policy_kwargs)
-    if issubclass(model.policy_class, ActorCriticPolicy):
-        # What Stable-Baselines3 sets for torch's Adam, but not for another class.
-        arguments.setdefault("optimizer_kwargs", {"eps": 1e-5})
     model.policy = model.policy_class(
         model.observation_space,
         model.action_space,
         lambda _: 0.0,
-        optimizer_class=DelayedAdam,
-        **arguments,
+        **model.policy_kwargs,
     )
-    # A copy that `policy.save` writes has torch's Adam.
-    model.policy.optimizer_class = torch.optim.Adam
     weights = load_file(folder / WEIGHTS)
     if not all(bool(tensor.isfinite().all()) for tensor in weights.values()):
         raise ValueError(f"{WEIGHTS} holds numbers that are not finite")

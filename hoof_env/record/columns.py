@@ -8,7 +8,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from hoof_env.dynamics.names import NamedColumns
 from hoof_env.gait import PARAMETERS
 from hoof_env.ground.terrain import Terrain
 from hoof_env.record.instant import OF_TRUNK, POINTS, UNITS
@@ -45,7 +44,7 @@ def columns_of(
         wanted = None if commands is None else commands[:, i, :4]
         own = columns_of_engine(record, terrain, command=wanted, leg=i, hip=hip)
         columns |= {f"{prefix}{name}": values for name, values in own.items()}
-    return NamedColumns(columns)
+    return columns
 
 
 def body_units(of_leg: Mapping[str, str], prefixes: Iterable[str]) -> dict[str, str]:
@@ -111,7 +110,7 @@ def columns_of_engine(
             f"{point}_force_x": force.real,
             f"{point}_force_y": force.imag,
         }
-    return NamedColumns(columns | _together(columns))
+    return columns | _together(columns)
 
 
 _LEG = (

@@ -1,8 +1,6 @@
 """Numbers side by side: values of kernels that work on many environments, or many legs, in one
 instruction."""
 
-from typing import TYPE_CHECKING
-
 import hoof_env.simd.numpy_functions  # noqa: F401 - lets NumPy's functions work on values
 from hoof_env.simd.compile import on_numpy
 from hoof_env.simd.control import Cell, cond, loop, one_of, rolled, when
@@ -20,7 +18,6 @@ from hoof_env.simd.memory import (
     store_vectors,
     write,
 )
-from hoof_env.simd.renamed import refuse_old_names
 from hoof_env.simd.values import (
     Index,
     Lanes,
@@ -48,23 +45,6 @@ from hoof_env.simd.values import (
     where,
     whole,
 )
-
-if not TYPE_CHECKING:
-    _RENAMED = {
-        "across": "perpendicular",
-        "anywhere": "any_lane",
-        "choose": "where",
-        "fill": "load_rows",
-        "larger": "maximum",
-        "level": "full_like",
-        "nth": "block_at",
-        "plane": "vector",
-        "root": "sqrt",
-        "rows": "new_rows",
-        "size": "absolute",
-        "smaller": "minimum",
-    }
-    __getattr__ = refuse_old_names(__name__, {old: f"is called {new} now" for old, new in _RENAMED.items()})
 
 __all__ = [
     "Cell",

@@ -16,7 +16,7 @@ from collections import deque
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import AbstractContextManager, contextmanager
 from functools import cache
-from typing import TYPE_CHECKING, Any, get_type_hints
+from typing import Any, get_type_hints
 from weakref import WeakValueDictionary
 
 import llvmlite.binding as llvm
@@ -28,13 +28,7 @@ from hoof_env.errors import HoofEnvError, ParameterError
 from hoof_env.simd import objects
 from hoof_env.simd.machines import Eager, Place, Writer, running_on
 from hoof_env.simd.memory import AXES, Arrays, Given, Matrix, Pointer
-from hoof_env.simd.renamed import refuse_old_names
 from hoof_env.simd.values import Index, Lanes, Mask, Number, Whole, word
-
-if not TYPE_CHECKING:
-    _DECORATORS = ("inline_llvm", "inline_source", "inlined", "pasted")
-    _LEFT_OUT = "is gone: leave the decorator out, for any plain function can be part of a kernel"
-    __getattr__ = refuse_old_names(__name__, dict.fromkeys(_DECORATORS, _LEFT_OUT))
 
 LEVEL = 2
 """LLVM's level of optimisation: without its vectorisers, for the code is vectors already."""

@@ -10,10 +10,10 @@ import re
 import sysconfig
 import traceback
 from collections import deque
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator
 from functools import wraps
 from pathlib import Path
-from types import CodeType, FunctionType, MappingProxyType, ModuleType
+from types import CodeType, FunctionType, ModuleType
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -366,19 +366,14 @@ def inputs(kind: Any) -> Any:
     return kind
 
 
-def user_error(
-    name: str, error: UserFunctionError, moved: Mapping[str, str] = MappingProxyType({})
-) -> ParameterError:
+def user_error(name: str, error: UserFunctionError) -> ParameterError:
     """Return the error for the author of a function, about the task or setting of a name.
 
     Args:
         name: of the task or setting.
         error: what was wrong.
-        moved: present names of fields that had other ones, or were elsewhere.
     """
-    words = str(error)
-    now = next((place for old, place in moved.items() if f"no field {old!r}" in words), "")
-    return ParameterError(f"{name}: {words}{f'; it is .{now} now' if now else ''}")
+    return ParameterError(f"{name}: {error}")
 
 
 def function_name(function: Callable[..., Any]) -> str:

@@ -21,7 +21,7 @@ class About(NamedTuple):
 
     Attributes:
         unit: unit of the value, "" for none.
-        text: meaning, for the manual; $names stand for numbers and choices, see `envs.manual_words`.
+        text: meaning, for the manual; $names stand for numbers and choices, see `envs.manual.choices`.
         of_horse: meaning for a horse, if it differs.
         per_episode: True if `reset(options={"parameters": ...})` and `randomize` can change the setting.
         needs: another setting, and the values of it with which this one has an effect; () for any range,

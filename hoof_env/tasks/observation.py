@@ -15,7 +15,7 @@ from hoof_env.ground.terrain import surface
 from hoof_env.simd import Lanes, Number, where
 from hoof_env.simd.math import cos_sin
 from hoof_env.simd.user_functions import check_function, inputs
-from hoof_env.tasks.own_parts import Constant, check_arguments, check_parts, without_scalar
+from hoof_env.tasks.own_parts import Constant, check_arguments, check_parts
 
 if TYPE_CHECKING:
     from hoof_env.dynamics.layout import ContactMemory, LegMemory, TrunkMemory
@@ -71,7 +71,6 @@ class Scale:
             check_function(f"scale {self.text!r}: apply", self.apply, 2)
 
 
-@without_scalar
 @dataclass(frozen=True)
 class Entry:
     """Entry of the observation.
@@ -208,7 +207,7 @@ _UNITS = ("rad/s", "rad", "rad", "rad")
 IN_RANGE = tuple(map(_in_range, range(4)))
 IN_RATE = tuple(map(_in_rate, range(4)))
 """Scales of the gait parameters and their rates. They use the limits and bounds of the leg; their texts show
-those of the published one, see `envs.manual_bodies.LegPage.scaling`."""
+those of the published one, see `envs.manual_bodies.LegTables.scaling`."""
 
 ENTRIES = (
     Entry("sin(crank angle)", "crank", "-", _sine, PLAIN),

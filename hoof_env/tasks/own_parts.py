@@ -5,10 +5,9 @@ from __future__ import annotations
 import keyword
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
-from functools import wraps
-from typing import Any, NamedTuple, TypeVar
+from typing import Any, NamedTuple
 
-from hoof_env.errors import ParameterError, UnknownArgumentError, check_number
+from hoof_env.errors import ParameterError, check_number
 from hoof_env.simd.user_functions import check_function
 
 LARGEST = 1e12
@@ -29,26 +28,6 @@ def _is_text_by_name(pair: Any) -> bool:
     """True if something is a name and a text."""
     is_pair = isinstance(pair, tuple) and len(pair) == 2
     return is_pair and all(isinstance(text, str) for text in pair) and bool(pair[0])
-
-
-Part = TypeVar("Part", bound=type)
-
-
-def without_scalar(kind: Part) -> Part:
-    """Let a class refuse the argument `scalar`, which it had once, in words."""
-    made: Any = kind.__init__  # type: ignore[misc]
-
-    @wraps(made)
-    def begin(self: Any, *arguments: Any, **named: Any) -> None:
-        if "scalar" in named:
-            raise UnknownArgumentError(
-                f"{kind.__name__}: scalar is gone: write np.where for `if`, and NumPy's functions for those"
-                " of `math`"
-            )
-        made(self, *arguments, **named)
-
-    kind.__init__ = begin  # type: ignore[misc]
-    return kind
 
 
 @dataclass(frozen=True)
@@ -108,7 +87,6 @@ def _is_reserved(form: str) -> bool:
     return form in ("rates", "offsets") or form.startswith("offsets of ")
 
 
-@without_scalar
 @dataclass(frozen=True)
 class ActionMap:
     """Map from actions of one's own to those of the body.

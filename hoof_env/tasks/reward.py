@@ -15,7 +15,7 @@ import numpy as np
 from hoof_env.errors import ParameterError, check_choice, check_number
 from hoof_env.simd import Lanes, Number, absolute, maximum, minimum, where
 from hoof_env.simd.user_functions import inputs
-from hoof_env.tasks.own_parts import Constant, Kept, check_arguments, check_parts, without_scalar
+from hoof_env.tasks.own_parts import Constant, Kept, check_arguments, check_parts
 
 if TYPE_CHECKING:
     from hoof_env.dynamics.layout import LegMemory, StrideSums, TrunkMemory
@@ -124,7 +124,6 @@ OBJECTIVES = ("progress", "peak force", "energy")
 PROGRESS, PEAK_FORCE, ENERGY = OBJECTIVES
 
 
-@without_scalar
 @dataclass(frozen=True)
 class Term:
     """Term of the reward.

@@ -63,23 +63,23 @@ def test_a_replay_gives_the_same_bits(shelf, env_id, policies):
 def test_a_dataset_says_what_its_actions_are(shelf):
     data, _ = written(shelf, "run")
     assert dataset.load("hoof_env/some-v0").total_episodes == 2
-    for form, said in (("offsets", "got actions offsets"), (None, "got actions of an older form")):
+    for form, said in (("offsets", "got actions offsets"), (None, "got None")):
         data.storage.update_metadata({"actions": form})
         with pytest.raises(DataFileError, match=f"some-v0: expected actions rates, {said}"):
             dataset.load("hoof_env/some-v0")
 
 
 def test_a_dataset_without_a_tag_is_neither_read_nor_added_to(shelf):
-    """As Minari writes it, and as this package wrote it before actions were rates."""
+    """As Minari writes it."""
     env = gym.make("hoof_env/HorseLeg-v0", episode_seconds=0.1)
     collector = minari.DataCollector(env)
     collector.reset(seed=0)
     for _ in range(5):
         collector.step(np.zeros(4, np.float32))
     old = collector.create_dataset("hoof_env/old-v0")
-    with pytest.raises(DataFileError, match="older form"):
+    with pytest.raises(DataFileError, match="got None"):
         dataset.load("hoof_env/old-v0")
-    with pytest.raises(DataFileError, match="older form"):
+    with pytest.raises(DataFileError, match="got None"):
         dataset.check_actions(old, env)
 
 

@@ -6,7 +6,7 @@ import pytest
 
 from agents import gallery
 from agents.stock_plan import COLUMNS, LEG, RAIL, TUNED, read_curves
-from hoof_env.envs import manual
+from docs._manual.results import RETURNS, learning
 from hoof_env.envs.shipped import shipped_returns
 
 
@@ -39,27 +39,25 @@ def test_a_learner_that_does_not_pass_has_its_return_at_the_end():
     rows = [row for seed, end in enumerate((1.0, 2.0, 6.0)) for row in curve("ppo", seed, [0.0, end])]
     shown = gallery.learning_of(rows + curve("sac", 0, [0.0, 0.5, 1.5]), 5.0)
     assert shown == {"algo": "ppo", "seeds": 3, "return": 3.0, "steps": 100, "seconds": 1.0}
-    assert manual._learnt(shown) == "reaches 3 in 100 steps, 1 s<br>(PPO, 3 seeds)"
+    assert learning(shown) == "reaches 3 in 100 steps, 1 s<br>(PPO, 3 seeds)"
 
 
 def test_an_id_without_curves_shows_nothing():
     assert gallery.learning_of([], 5.0) == gallery.learning_of(curve(TUNED, 0, [9.0]), 5.0) == {}
-    assert manual._learnt({}) == ""
+    assert learning({}) == ""
 
 
 def test_the_committed_file_has_what_the_curves_say():
-    committed = json.loads((gallery.POLICIES / manual.RETURNS).read_text(encoding="utf-8"))
+    committed = json.loads((gallery.POLICIES / RETURNS).read_text(encoding="utf-8"))
     found = {env_id: gallery.returns_of(env_id, known["random"]) for env_id, known in committed.items()}
-    assert found == committed, (
-        "run `python -m agents.gallery` and `hoof-env manual --out docs/environments --films agents/policies`"
-    )
+    assert found == committed, "run `python -m agents.gallery` and `python -m docs._manual`"
     trained = {row["env_id"] for row in read_curves(gallery.CURVES) if row["algo"] != TUNED}
     assert {env_id for env_id in committed if "learnt" in committed[env_id]} == trained
 
 
 @pytest.mark.parametrize("name", ["HorseLegRail", "HorseLegSpeed", "HorseLegTerrain"])
 def test_the_committed_return_of_random_actions_is_that_of_the_present_reward(name):
-    committed = json.loads((gallery.POLICIES / manual.RETURNS).read_text(encoding="utf-8"))
+    committed = json.loads((gallery.POLICIES / RETURNS).read_text(encoding="utf-8"))
     env_id = f"hoof_env/{name}-v0"
     # Another machine has other last bits, which change an episode, and hardly the mean of a hundred
     assert gallery.random_return(env_id) == pytest.approx(committed[env_id]["random"], rel=0.1)

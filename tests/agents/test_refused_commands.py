@@ -102,29 +102,29 @@ CASES = [
     trains("Cow", env_id="hoof_env/Cow-v0"),
     trains("wheels", env_kwargs=("wheels=4",)),
     trains("flying", env_kwargs=("trunk=flying",)),
-    trains("--env-kwargs: expected .* got 'trunk'", env_kwargs=("trunk",)),
+    trains("--env-kwargs: expected .*got 'trunk'", env_kwargs=("trunk",)),
     trains("JSON", env_kwargs=("{trunk: 1}",)),
     trains("horsepower", params=("horsepower=1",)),
     trains("learning_rate.*fast", DataFileError, params=("learning_rate=fast",)),
-    trains("steps: expected .* got 0", steps=0),
-    trains("n_envs: expected .* got 0", n_envs=0),
-    trains("seed: expected .* got -1", seed=-1),
-    trains("max_minutes: expected .* got 0.0", max_minutes=0.0),
-    trains("checkpoint_every: expected .* got -1", checkpoint_every=-1),
-    trains("expected one number for a reward, got a vector", env_id="hoof_env/HorseLegMO-v0"),
-    trains("torch_threads: expected .* got 0", torch_threads=0),
-    trains(f"torch_threads: expected .* got {CORES + 1}", torch_threads=CORES + 1),
+    trains("steps: expected .*got 0", steps=0),
+    trains("n_envs: expected .*got 0", n_envs=0),
+    trains("seed: expected .*got -1", seed=-1),
+    trains("max_minutes: expected .*got 0.0", max_minutes=0.0),
+    trains("checkpoint_every: expected .*got -1", checkpoint_every=-1),
+    trains("expected .*reward, got a vector", env_id="hoof_env/HorseLegMO-v0"),
+    trains("torch_threads: expected .*got 0", torch_threads=0),
+    trains(f"torch_threads: expected .*got {CORES + 1}", torch_threads=CORES + 1),
     trains("device .*abacus", device="abacus"),
-    *([] if GPU else [trains("device: expected one that torch finds here, got 'cuda'", device="cuda")]),
+    *([] if GPU else [trains("device: expected .*torch finds here, got 'cuda'", device="cuda")]),
     trains(
-        "n_epochs: expected a whole number of 1 or more, got 0", DataFileError, params=(*TINY, "n_epochs=0")
+        "n_epochs: expected .*1 .*got 0", DataFileError, params=(*TINY, "n_epochs=0")
     ),
     trains(
-        "batch_size: expected a whole number .* got 2.5", DataFileError, params=(*TINY, "batch_size=2.5")
+        "batch_size: expected .*got 2.5", DataFileError, params=(*TINY, "batch_size=2.5")
     ),
     trains("normalize: expected .*'foo'", DataFileError, params=(*TINY, 'normalize={"foo": 1}')),
     trains(
-        "normalize: expected true, false or a mapping .* got 7",
+        "normalize: expected true, false .*got 7",
         DataFileError,
         params=(*TINY, "normalize=7"),
     ),
@@ -132,57 +132,57 @@ CASES = [
     trains("--out", resume=True, out=None),
     case(lambda folder: train_tiny(folder / "file" / "run"), "cannot write to .*file", OutputError, file=""),
     *(
-        case(train_tiny, rf"found {name} and no run\.json", OutputError, **{name: "mine"})
+        case(train_tiny, rf"found {name} .*run\.json", OutputError, **{name: "mine"})
         for name in ("config.yml", "monitor.csv")
     ),
     case(
         lambda folder: train_tiny(folder, resume=True),
-        r"found checkpoints and no run\.json; choose another folder$",
+        r"found checkpoints .*run\.json; choose another folder$",
         OutputError,
         **{"checkpoints/100/file": ""},
     ),
     trains_flat("expected nn.Tanh", params=('policy_kwargs={"activation_fn": "nn.ReLU"}',)),
     trains_flat("use_sde", params=("normalize=true", "use_sde=true")),
-    trains_flat("batch_size: expected 2 or more, .* got 1", params=("batch_size=1",)),
+    trains_flat("batch_size: expected 2 .*got 1", params=("batch_size=1",)),
     trains_flat("norm_reward: expected False", params=("normalize=true", "norm_reward=true")),
     trains_flat("policy_kwargs: expected some of", params=('policy_kwargs={"squash_output": true}',)),
-    *([] if GPU else [trains_flat("device: expected .* got 'cuda'", device="cuda")]),
+    *([] if GPU else [trains_flat("device: expected .*got 'cuda'", device="cuda")]),
     trains_flat("Discrete", env_id="CartPole-v1"),
     # evaluate and score
-    evaluates("policy: expected a name .* got none", policies=()),
-    evaluates("episodes: expected .* got 0", episodes=0),
-    evaluates("seed: expected .* got -1", seed=-1),
+    evaluates("policy: expected a name .*got none", policies=()),
+    evaluates("episodes: expected .*got 0", episodes=0),
+    evaluates("seed: expected .*got -1", seed=-1),
     evaluates("Cow", env_id="hoof_env/Cow-v0"),
     *(
         case(lambda _, policy=policy: score_vector(policy, ENV_ID, [7]), f"policy: expected .*{given}")
         for policy, given in ((0.5, "got 0.5"), (None, "got None"), ("gallop", "got 'gallop'"))
     ),
     # open loop
-    optimises("restarts: expected .* got 0", restarts=0),
-    optimises("episodes: expected .* got 10", episodes=10),
-    optimises("test_episodes: expected .* got 1", test_episodes=1),
+    optimises("restarts: expected .*got 0", restarts=0),
+    optimises("episodes: expected .*got 10", episodes=10),
+    optimises("test_episodes: expected .*got 1", test_episodes=1),
     optimises("Cow", env_id="hoof_env/Cow-v0"),
-    optimises("many at once, got 'Pendulum-v1'", env_id="Pendulum-v1", env_kwargs=()),
-    optimises("expected 'phase' for a horse, got 'constant'", env_id="hoof_env/Horse-v0", family="constant"),
+    optimises("many .*got 'Pendulum-v1'", env_id="Pendulum-v1", env_kwargs=()),
+    optimises("expected 'phase' .*horse, got 'constant'", env_id="hoof_env/Horse-v0", family="constant"),
     optimises("'gait' among the observed groups", env_kwargs=('observation=["crank"]',)),
     # stock learners and baselines
     *(
         case(lambda _, wrong=wrong: stock.jobs(stock.Args(**wrong)), words)
         for wrong, words in (
-            ({"algo": "a2c"}, "algo: expected one of .*ppo.*got 'a2c'"),
+            ({"algo": "a2c"}, "algo: expected .*ppo.*got 'a2c'"),
             (
                 {"env_id": "hoof_env/Cow-v0"},
-                "expected one of ppo on .*HorseLeg-v0.*got None on hoof_env/Cow-v0",
+                "expected .*ppo on .*HorseLeg-v0.*got None on hoof_env/Cow-v0",
             ),
             (
                 {"env_id": "hoof_env/Horse-v0", "algo": "td3"},
-                "expected one of .*got td3 on hoof_env/Horse-v0",
+                "expected .*got td3 on hoof_env/Horse-v0",
             ),
-            ({"seeds": 0}, "seeds: expected .* got 0"),
-            ({"steps": -1}, "steps: expected .* got -1"),
-            ({"workers": 0}, "workers: expected .* got 0"),
-            ({"preset": "identified"}, "preset: expected one of fourbar, jansen, klann, got 'identified'"),
-            ({"preset": "klann", "algo": "td3"}, "expected one of ppo on .*got td3"),
+            ({"seeds": 0}, "seeds: expected .*got 0"),
+            ({"steps": -1}, "steps: expected .*got -1"),
+            ({"workers": 0}, "workers: expected .*got 0"),
+            ({"preset": "identified"}, "preset: expected .*fourbar, jansen, klann, got 'identified'"),
+            ({"preset": "klann", "algo": "td3"}, "expected .*ppo on .*got td3"),
         )
     ),
     case(
@@ -196,7 +196,7 @@ CASES = [
     *(
         case(
             lambda _: baselines_run.load_plan("full"),
-            r"full\.yml: expected a list of entries",
+            r"full\.yml: expected .*entries",
             DataFileError,
             **{"full.yml": text},
         )
@@ -214,14 +214,14 @@ CASES = [
     plans("wheels", space=("env.wheels=[4]",)),
     plans("flying", space=('env.trunk=["flying"]',)),
     plans("--space: expected each key once, got gamma twice", space=("gamma=[0.9]", "gamma=[0.8]")),
-    plans("seeds: expected .* got 0", seeds=0),
-    plans("report_every: expected .* got 0", report_every=0),
-    plans("steps: expected .* got 0", steps=0),
+    plans("seeds: expected .*got 0", seeds=0),
+    plans("report_every: expected .*got 0", report_every=0),
+    plans("steps: expected .*got 0", steps=0),
     plans("prayer", algo="prayer"),
     plans("Cow", env_id="hoof_env/Cow-v0"),
     plans("wheels", env_kwargs=("wheels=4",)),
     # tune
-    tunes("trials: expected .* got 0", trials=0),
+    tunes("trials: expected .*got 0", trials=0),
     *(
         case(
             lambda folder: tune.load_space(folder / "space.yml", "ppo"),
@@ -236,25 +236,25 @@ CASES = [
     ),
     tunes("one number for a reward", env_id="hoof_env/HorseLegMO-v0"),
     tunes("'gama'", params=("gama=1",)),
-    tunes("n_envs: expected .* got 0", params=("n_envs=0",)),
+    tunes("n_envs: expected .*got 0", params=("n_envs=0",)),
     tunes("'gama'", space="ppo: {gama: {uniform: [0.9, 1]}}"),
     tunes("'net_arc'", space="ppo: {policy_kwargs.net_arc: [1]}"),
     case(
         lambda folder: tune.tune(tune.Args(trials=1, steps=256, env_kwargs=SHORT, out=folder)),
-        r"study\.db: expected the database of a study.* not a database$",
+        r"study\.db: expected the database .*study.* database$",
         DataFileError,
         **{"study.db": "no database"},
     ),
     # judge, falls, datasets, shipping, demo
-    judges("policies: expected at least one"),
+    judges("policies: expected .*one"),
     judges("policy: expected", "canter", "--episodes", "2", error=HoofEnvError),
     judges(
-        "--episodes: expected a whole number, 1 or more, got 0", "reference", "--episodes", "0"
+        "--episodes: expected .*1 .*got 0", "reference", "--episodes", "0"
     ),
     judges(
-        r"--froude: expected a finite number in \(0, inf\], got -1", "reference", "--froude", "-1"
+        r"--froude: expected .*\(0, inf\], got -1", "reference", "--froude", "-1"
     ),
-    case(lambda _: falls.main(["--strengths", "11"]), "--strengths: expected .* got 11"),
+    case(lambda _: falls.main(["--strengths", "11"]), "--strengths: expected .*got 11"),
     case(lambda folder: carry_over.main(["--strengths", "0", "--out", str(folder)]), "--strengths"),
     case(
         lambda folder: carry_over.main([AGENT, "--out", str(folder)]),
@@ -272,9 +272,9 @@ CASES = [
         collects("dataset_id: expected NAMESPACE/NAME-vK", "run", "--dataset-id", name)
         for name in ("foo", "x/foo-v0", "a b-v0", "ab/../foo-v0", "/foo-v0", "ab/foo-v")
     ),
-    collects("policies: expected at least one"),
-    collects("policies: expected each one once, got run 2 times", "run", "walk", "run"),
-    collects("episodes: expected a whole number", "run", "--episodes", "0"),
+    collects("policies: expected .*one"),
+    collects("policies: expected .*got run 2 times", "run", "walk", "run"),
+    collects("episodes: expected .*number", "run", "--episodes", "0"),
     *([collects("hoof_env/Cow-v0", "run", "--env-id", "hoof_env/Cow-v0")] if MINARI else []),
     case(
         lambda folder: dataset.main(["run", "--dataset-id", "ab/foo-v0", "--out", str(folder)]),
@@ -284,7 +284,7 @@ CASES = [
     ),
     case(
         lambda folder: ship.main([str(folder), "--out", str(folder / "out")]),
-        "expected a run of agents.train, .* got none",
+        "expected a run of agents.train, .*got none",
         DataFileError,
     ),
     case(
@@ -294,7 +294,7 @@ CASES = [
         file="",
     ),
     # settings and threads
-    case(lambda _: algorithm_class("dqn"), "expected one of .*got 'dqn'"),
+    case(lambda _: algorithm_class("dqn"), "expected .*got 'dqn'"),
     *(
         case(lambda _, given=given: model_arguments(given), next(iter(given)), DataFileError)
         for given in (
@@ -311,7 +311,7 @@ CASES = [
     *(
         case(
             lambda _, threads=threads: command.check_threads(threads),
-            rf"torch_threads: expected .* \[1, 2\], got {threads}",
+            rf"torch_threads: expected .*\[1, 2\], got {threads}",
         )
         for threads in (0, 3)
     ),

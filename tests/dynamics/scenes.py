@@ -5,11 +5,11 @@ import numpy as np
 from hoof_env.constants import GRAVITY
 from hoof_env.dynamics.engine import TrunkEngine
 from hoof_env.dynamics.parts import Limb, Motor, Trunk
-from hoof_env.dynamics.tally import tally_of
 from hoof_env.gait import load_gait
 from hoof_env.ground.contact import Ground
 from hoof_env.leg.geometry import load_geometry
 from hoof_env.leg.mechanism import FRAME
+from tests.dynamics.tally import tally_of
 from tests.legs import FIRST_FIT
 
 LEG = load_geometry(FIRST_FIT)

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from hoof_env import Limb, Motor, Prescribed, Trunk, TrunkEngine, load_gait, load_geometry
-from hoof_env.dynamics.tally import tally_of
 from hoof_env.errors import NotStartedError, ParameterError
 from hoof_env.ground.contact import load_ground
+from tests.dynamics.tally import tally_of
 
 LEG = load_geometry("identified")
 HIPS = (0.6, 0.6, -0.6, -0.6)

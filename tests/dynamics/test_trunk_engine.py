@@ -8,13 +8,13 @@ from hypothesis import strategies as st
 
 from hoof_env.dynamics.engine import TrunkEngine
 from hoof_env.dynamics.parts import TRUNKS, HoofSpring, Limb, Limits, Motor, Prescribed, Result, Trunk
-from hoof_env.dynamics.tally import tally_of
 from hoof_env.gait import LIMITS, Filter, FilterSettings, GaitParameters, command_filters, parameter_names
 from hoof_env.ground.contact import Ground
 from hoof_env.ground.laws import FRICTION_LAWS
 from hoof_env.ground.terrain import Terrain
 from hoof_env.leg.geometry import load_geometry
 from hoof_env.leg.profile import leg_profile, places
+from tests.dynamics.tally import tally_of
 from tests.legs import FIRST_FIT
 from tests.linkage import NUMBER
 from tests.oracle.horse import PlainHorse

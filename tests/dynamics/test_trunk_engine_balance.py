@@ -7,11 +7,11 @@ from hoof_env.constants import GRAVITY
 from hoof_env.dynamics.engine import TrunkEngine
 from hoof_env.dynamics.parts import TRUNKS, Limb, Prescribed, Trunk
 from hoof_env.dynamics.stepping import SCHEMES
-from hoof_env.dynamics.tally import tally_of
 from hoof_env.gait import GaitParameters, load_gait
 from hoof_env.ground.contact import Ground
 from hoof_env.leg.geometry import load_geometry
 from tests.dynamics.scenes import HIPS, LOWEST, NATURAL, RUN, THETA, WALK, drives_less_losses, energy, horse
+from tests.dynamics.tally import tally_of
 
 SMOOTH = Ground(restitution=0.9, approach_floor=0.3, friction_law="tanh", friction_fast=0.5)
 STRIDE = GaitParameters(5.0, 0.0, 0.0, 0.0)

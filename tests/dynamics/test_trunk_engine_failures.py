@@ -5,13 +5,13 @@ import pytest
 
 from hoof_env.dynamics.engine import TrunkEngine
 from hoof_env.dynamics.parts import Limb, Motor, Prescribed, Result, Trunk
-from hoof_env.dynamics.tally import tally_of
 from hoof_env.errors import ParameterError
 from hoof_env.gait import GaitParameters
 from hoof_env.ground.contact import Ground
 from hoof_env.ground.terrain import Terrain
 from hoof_env.leg.profile import functions
 from tests.dynamics.scenes import LEG, RUN, WALK, drives_less_losses, energy, same
+from tests.dynamics.tally import tally_of
 
 ROCKER = LEG.replace(lengths={"CF": 0.8 * LEG.lengths["CF"]}, full_turn=False)
 END = np.radians(144.5)  # where the engine knows no more: the crank's dead point is some 1 deg on
@@ -182,7 +182,7 @@ def test_a_run_that_fails_ends_its_record():
     assert record["result"].tolist() == [Result.DEAD_POINT, Result.OK]
     assert 2 < len(record["time"]) < 20
     assert np.isfinite(record["crank_angle"]).all()
-    with pytest.raises(ParameterError, match="every: expected a whole number, 1 or more, got 0"):
+    with pytest.raises(ParameterError, match=r"every: expected .*1 .*got 0"):
         e.run(steps=10, every=0)
 
 

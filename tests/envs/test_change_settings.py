@@ -99,7 +99,7 @@ def test_a_refused_reset_keeps_the_episode():
     env = gym.make(LEG, **SHORT).unwrapped
     env.reset(seed=0)
     env.change_settings(target_speed=None)
-    with pytest.raises(ParameterError, match=r"target_speed.*expected none where no speed is commanded"):
+    with pytest.raises(ParameterError, match=r"target_speed.*expected none .*speed is commanded"):
         env.reset(options={"target_speed": 1.0})
     assert env.settings.target_speed == (2.5, 2.5)
     assert "target_speed" in env.step(np.zeros(4, np.float32))[4]
@@ -119,7 +119,7 @@ def test_a_state_has_the_settings_of_each_row():
         same(other.step(action)[:4], envs.step(action)[:4])
     assert not other.batch.row_plans.are_mixed
     broken = {**state, "rows": {**state["rows"], "which": [0, 0, 0, 9]}}
-    with pytest.raises(ParameterError, match=r"state\['rows'\]: expected settings of each environment"):
+    with pytest.raises(ParameterError, match=r"state\['rows'\]: expected settings .*environment"):
         other.set_state(broken)
 
 

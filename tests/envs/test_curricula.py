@@ -211,7 +211,7 @@ def test_a_refused_state_leaves_the_names_of_what_is_drawn():
     other.change_settings(envs=[1], randomize={"friction": (0.3, 0.5)})
     other.reset()
     for steps in ([0.5, 0.0], [np.inf, 0.0], [np.nan, 0.0], [0.0]):
-        with pytest.raises(ParameterError, match=r"state\['steps_before'\]: expected a whole number"):
+        with pytest.raises(ParameterError, match=r"state\['steps_before'\]: expected .*number"):
             envs.set_state({**other.get_state(), "steps_before": steps})
         assert "parameters" not in envs.reset()[1]
 

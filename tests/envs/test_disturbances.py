@@ -355,9 +355,9 @@ def test_calls_and_options_that_cannot_be_are_refused_and_change_nothing():
     fixed, rail, leg = make(FIXED), make(RAIL), make(LEG, 3)
     for env in (fixed, rail, leg):
         env.reset(seed=0)
-    with pytest.raises(ParameterError, match="push: expected none on a fixed trunk"):
+    with pytest.raises(ParameterError, match=r"push: expected none .*fixed trunk"):
         fixed.push(1.0)
-    with pytest.raises(ParameterError, match="push: expected no impulse upward on a rail"):
+    with pytest.raises(ParameterError, match=r"push: expected no impulse upward .*rail"):
         rail.push(1.0, 1.0)
     before = leg.get_state()
     for bad in ((np.nan,), ("far",), (np.zeros(2),), (1.0, np.inf), (1.0, 0.0, [7])):
@@ -381,7 +381,7 @@ def test_calls_and_options_that_cannot_be_are_refused_and_change_nothing():
     with pytest.raises(ParameterError, match=r"state\['observations'\]"):
         leg.set_state(broken)
     for plan in ([1], [(5, 2e5, 0.0)], [(5, 0.0, np.nan)]):
-        with pytest.raises(ParameterError, match=r"state\['pushes'\]: expected .* up to 100000 N s"):
+        with pytest.raises(ParameterError, match=r"state\['pushes'\]: expected .*up to 100000 N s"):
             leg.set_state({**before, "pushes": [plan] * 3})
     same(leg.get_state(), before)
 

@@ -51,7 +51,7 @@ def test_states_pickles_and_infos_know_the_spring(soft):
     soft.unwrapped.set_state(state)
     action = soft.unwrapped.action_for("walk")
     assert np.array_equal(soft.step(action)[0], kept.step(action)[0])
-    with pytest.raises(ParameterError, match="state: of other settings; hoof_stiffness: None here"):
+    with pytest.raises(ParameterError, match=r"state: .*settings; hoof_stiffness: None here"):
         gym.make(LEG).unwrapped.set_state(state)
     soft.unwrapped.record()  # from here on steps are recorded
     soft.step(action)

@@ -80,7 +80,7 @@ def test_a_preset_without_a_ground_needs_one(soft, tmp_path, env_id):
     path.write_text(json.dumps(content), encoding="utf-8")
     for given in ({}, {"stiffness": 1e4}, {"exponent": 1.5}):
         for preset, error in ((content, ParameterError), (str(path), DataFileError)):
-            with pytest.raises(error, match="expected an entry 'ground' with the stiffness and the exponent"):
+            with pytest.raises(error, match=r"expected an entry 'ground' .*stiffness .*exponent"):
                 gym.make(env_id, preset=preset, **given)
     given = ground(env_id, preset=content, stiffness=1e4, exponent=1.25)
     assert (given.stiffness, given.exponent) == (1e4, 1.25)

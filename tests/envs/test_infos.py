@@ -172,12 +172,6 @@ def test_named_rows():
     assert (changed["swing_sin"], changed[0], row["swing_sin"] == 9.0) == (9.0, 8.0, False)
     with pytest.raises(KeyError, match="fast"):
         changed["fast"] = 1.0
-    horse = name_columns(np.arange(2.0), ("left_fore_highest_grf", "left_fore_toe_deflection_normal"))
-    for old, new in (("highest", "highest_grf"), ("toe_give_normal", "toe_deflection_normal")):
-        with pytest.raises(KeyError, match=f"'left_fore_{old}' is called 'left_fore_{new}' now"):
-            horse[f"left_fore_{old}"]
-    with pytest.raises(KeyError, match=r"'highest' is called 'highest_grf' now"):
-        gym.make(LEG).reset(seed=0)[1]["measured"]["highest"]
     gait = name_columns([5.0, 0.5, -0.1, 0.1], PARAMETERS)
     assert gym.make(LEG).reset(seed=0, options={"gait": gait})[1]["gait"] == gait
 

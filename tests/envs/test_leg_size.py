@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 import hoof_env
-from hoof_env.envs.manual import page
+from hoof_env.envs.manual import tables_of
 from hoof_env.errors import DataFileError, ParameterError
 from hoof_env.gait import LIMITS, FilterSettings, GaitParameters, gait_names, limits_of, speed_scale_of
 from hoof_env.ground.contact import load_ground
@@ -163,14 +163,13 @@ def test_the_manual_and_the_picture_of_a_small_leg_have_its_limits():
     name = "own/SmallLeg-v0"
     try:
         hoof_env.register(name, base="leg", preset=preset(0.25), trunk_mass=1.0)
-        text = page(name)
+        tables = tables_of(name)
         env = gym.make(name, render_mode="rgb_array")
     finally:
         gym.registry.pop(name, None), _OWN.pop(name, None)
-    assert "| crank speed | -72 | 72 | rad/s^2 | 0 to 25.133 rad/s |" in text
-    assert "linear, -1 at 0 and 1 at 25.132741" in text
-    assert "| / 80 |" in text
-    assert "| / 12 |" in text
+    assert tables["Actions"].rows[0][1:] == ("crank speed", "-72", "72", "rad/s^2", "0 to 25.133 rad/s")
+    scalings = {row[2] for row in tables["Observation"].rows}
+    assert {"linear, -1 at 0 and 1 at 25.132741", "/ 80", "/ 12"} <= scalings
     high = 8 * np.pi
     env.reset(seed=0, options={"gait": {**asdict(gait_of_size("walk", 0.25)), "crank_speed": high}})
     env.render()

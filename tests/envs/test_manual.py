@@ -1,14 +1,10 @@
-"""The manual pages say what the environments do, and the committed ones are those that the command writes."""
+"""The tables that `hoof-env manual` prints are what the environments do."""
 
 from __future__ import annotations
 
-import inspect
-import json
 import math
 import re
-import shutil
 from dataclasses import fields
-from pathlib import Path
 
 import gymnasium as gym
 import numpy as np
@@ -16,42 +12,19 @@ import pytest
 from family import HORSE, OTHER, scaled
 
 from hoof_env import cli
-from hoof_env.envs import manual, manual_bodies, manual_words, shipped
-from hoof_env.envs.manual import TABLES
-from hoof_env.envs.vector import HorseLegVectorEnv
+from hoof_env.envs import manual
 from hoof_env.errors import ParameterError
-from hoof_env.gait import LIMITS, WIDEST, load_gait
-from hoof_env.tasks import horse
-from hoof_env.tasks.horse import OPTIONS as HORSE_OPTIONS
-from hoof_env.tasks.horse_gaits import FASTEST, LEGS
-from hoof_env.tasks.leg_starts import OPTIONS
+from hoof_env.gait import LIMITS, load_gait
+from hoof_env.tasks.horse import MASS
+from hoof_env.tasks.horse_gaits import FOLLOWED, LEGS
 from hoof_env.tasks.one_leg import OneLeg
-from hoof_env.tasks.parameters import HILLS
 from hoof_env.tasks.plain import to_json
 from hoof_env.tasks.registry import TASKS
 from hoof_env.tasks.reward import BEARING, LONGEST_STRIDE
-from hoof_env.tasks.settings import PER_EPISODE, Settings
+from hoof_env.tasks.settings import Settings
 
-HORSES = "horse", "rough"  # pages of a horse
-
-ROOT = Path(__file__).parents[2]
-DOCS, POLICIES = ROOT / "docs" / "environments", ROOT / "agents" / "policies"
+HORSES = "horse", "rough"  # tasks of a horse
 OF_LEGS = [name for name, task in TASKS.items() if task.body is OneLeg]
-
-IDS = {page: re.search(r'gym.make\("(.+?)"', manual.page(page))[1] for page in manual.PAGES}
-
-
-def section(page, title):
-    return re.split(r"\n## ", page.split(f"\n## {title}\n", 1)[1])[0]
-
-
-def rows(text):
-    """Cells of the first table of a text, without its head."""
-    lines = text.splitlines()
-    first = next(k for k, line in enumerate(lines) if line.startswith("|"))
-    table = lines[first + 2 :]
-    stop = next((k for k, line in enumerate(table) if not line.startswith("|")), len(table))
-    return [[cell.strip() for cell in line.strip("|").split("|")] for line in table[:stop]]
 
 
 def numbers(cell):
@@ -63,112 +36,57 @@ def numbers(cell):
     return found
 
 
-def observed(page):
-    """Cells of a page's observation: those of each number, in their order, without the column Num."""
+def observed(task):
+    """Cells of an observation: those of each number, in their order, without the column Num."""
     cells = {}
-    for row in rows(section(page, "Observation Space")):
+    for row in manual.observations(task).rows:
         for name, places in zip(row[1].split(", "), numbers(row[0]), strict=True):
             cells |= {place: [name, *row[2:]] for place in places}
     return [cells[k] for k in sorted(cells)]
 
 
-def test_every_id_has_a_page():
-    assert sorted(IDS.values()) == sorted(name for name in gym.registry if name.startswith("hoof_env/"))
+@pytest.mark.parametrize("id", sorted(name for name in gym.registry if name.startswith("hoof_env/")))
+def test_the_command_prints_the_tables_of_every_id(id, capsys):
+    assert cli.main(["manual", "--id", id]) == 0
+    printed = capsys.readouterr().out
+    assert printed.startswith(f"{id}: ")
+    titles = re.findall(r"^(\w+)$", printed, re.MULTILINE)
+    assert [title for title in titles if title in manual.tables_of(id)] == list(manual.tables_of(id))
+    names = re.findall(r"^(\w+)  ", printed, re.MULTILINE)
+    for row in manual.tables_of(id)["Rewards"].rows:
+        assert row[0] in names
+    assert "](" not in printed
 
 
-def test_committed_pages_are_what_the_command_writes(tmp_path, capsys, monkeypatch):
-    shutil.copytree(POLICIES, tmp_path / "agents/policies", ignore=shutil.ignore_patterns("*.onnx", "*.png"))
-    monkeypatch.chdir(tmp_path)
-    out = Path("docs/environments")
-    assert cli.main(["manual", "--out", str(out), "--films", "agents/policies"]) == 0
-    assert f"{len(manual.PAGES) + 3} files written; read {out / 'README.md'} first" in capsys.readouterr().out
-    written = {file.name: file.read_text("utf-8") for file in out.iterdir()}
-    committed = {file.name: file.read_text("utf-8") for file in DOCS.glob("*.md")}
-    assert written == committed, "run `hoof-env manual --out docs/environments --films agents/policies`"
+def test_tables_fit_the_terminal(capsys, monkeypatch):
+    monkeypatch.setenv("COLUMNS", "90")
+    assert cli.main(["manual"]) == 0
+    assert max(map(len, capsys.readouterr().out.splitlines())) <= 90
 
 
-@pytest.mark.parametrize("page", manual.PAGES)
-def test_every_page_shows_its_film(page):
-    name = IDS[page].removeprefix("hoof_env/").removesuffix("-v0")
-    (told, film) = re.search(r"!\[(.+?)\]\((.+?)\)", (DOCS / f"{name}.md").read_text("utf-8")).groups()
-    # HorseLegMO has the agent of HorseLeg, and its film.
-    assert told.startswith(f"{'HorseLeg' if page == 'mo' else name}, the shipped agent")
-    assert ("footfall" in told) == (page in HORSES) == ("gait parameters" not in told)
-    policy = "HorseLeg-v0" if page == "mo" else f"{name}-v0"
-    assert film == f"../../agents/policies/{policy}/film.gif"
-    assert (DOCS / film).is_file()
-    assert "![" not in manual.page(page)
-
-
-@pytest.mark.parametrize("page", manual.PAGES)
-def test_every_page_says_which_returns_are_good(page):
-    """Those of the table of the policies that ship."""
-    name = "HorseLeg" if page == "mo" else IDS[page].removeprefix("hoof_env/").removesuffix("-v0")
-    words = "the mean over 100:" if name == "HorseLegFixed" else "over the same 100 episodes"
-    text = (DOCS / f"{name}.md").read_text("utf-8").partition(words)[2]
-    head = next(line for line in text.splitlines() if line.startswith("|")).strip("|").split("|")
-    told = dict(zip(map(str.strip, head), *rows(text)[:1], strict=True))
-    table = rows((POLICIES / "README.md").read_text("utf-8").partition("mean returns")[0])
-    shipped = next(row for row in table if f"/{name}-v0`" in row[0])[2]
-    assert told["shipped agent"] == f"{float(shipped.split()[0]):.3g}"
-    others = json.loads((POLICIES / "returns.json").read_text("utf-8"))[f"hoof_env/{name}-v0"]
-    assert told["random actions"] == f"{others['random']:.3g}"
-    stock = next((value for title, value in told.items() if "stock PPO" in title), None)
-    assert stock == (f"{others['stock']:.3g}" if "stock" in others else None)
-
-
-def test_a_policy_without_scores_is_named(tmp_path, capsys, monkeypatch):
-    shutil.copytree(POLICIES / "HorseLeg-v0", tmp_path / "HorseLeg-v0")
-    (tmp_path / "HorseLeg-v0" / "score.json").write_text("{}")
-    monkeypatch.setattr(shipped, "SHIPPED", tmp_path)
-    assert cli.main(["manual", "--out", str(tmp_path / "out"), "--films", str(tmp_path)]) == 2
-    assert "score.json: expected those that agents.ship writes" in capsys.readouterr().err
-    assert not (tmp_path / "out").exists()
-
-
-def test_a_policy_without_a_film_is_named(tmp_path, capsys):
-    assert cli.main(["manual", "--out", str(tmp_path / "out"), "--films", str(tmp_path)]) == 2
-    assert f"films {tmp_path}: expected HorseLeg-v0/film.gif" in capsys.readouterr().err
-    assert not (tmp_path / "out").exists()
-
-
-def test_a_page_is_printed(capsys):
-    assert cli.main(["manual", "--id", IDS["rail"]]) == 0
-    assert capsys.readouterr().out.strip() == manual.page("rail").strip()
-
-
-def test_unknown_pages_and_folders_are_one_line(tmp_path, capsys):
-    (tmp_path / "file").touch()
+def test_unknown_ids_are_one_line(capsys):
     assert cli.main(["manual", "--id", "HorseLeg"]) == 2
-    assert cli.main(["manual", "--out", str(tmp_path / "file")]) == 2
-    assert capsys.readouterr().err.count("hoof-env: error: ") == 2
-    with pytest.raises(ParameterError, match=r"task: expected one of .*rail"):
-        manual.page("trot")
+    assert capsys.readouterr().err.startswith("hoof-env: error: id: ")
+    with pytest.raises(ParameterError, match="HorseLegRail-v0"):
+        manual.tables_of("hoof_env/Trot-v0")
 
 
-@pytest.mark.parametrize("page", manual.PAGES)
-def test_tables_match_the_spaces(page):
-    text, env = manual.page(page), gym.make(IDS[page])
-    for space in (env.action_space, env.observation_space):
-        assert space.dtype == np.float32
-        assert (space.low == -1).all()
-        assert (space.high == 1).all()
-    if page == "mo":  # whose spaces are the leg's
-        return
-    assert f"`Box(-1, 1, {env.action_space.shape}, float32)`" in section(text, "Action Space")
-    assert f"`Box(-1, 1, {env.observation_space.shape}, float32)`" in section(text, "Observation Space")
+@pytest.mark.parametrize("task", TASKS)
+def test_tables_match_the_spaces(task):
+    env = gym.make(TASKS[task].id)
     legs = "|".join(leg.replace("_", " ") for leg in LEGS)
     names = [re.sub(rf"({legs})[:,] ", "", name) for name in env.unwrapped.observation_names]
-    assert [cells[0] for cells in observed(text)] == names
-    assert len(names) == env.observation_space.shape[0]
+    assert [cells[0] for cells in observed(TASKS[task])] == names
+    places = [place for row in manual.actions(TASKS[task]).rows for each in numbers(row[0]) for place in each]
+    assert sorted(places) == list(range(env.action_space.shape[0]))
 
 
-@pytest.mark.parametrize("page", OF_LEGS)
-def test_actions_change_the_gait_as_the_table_says(page):
+@pytest.mark.parametrize("task", OF_LEGS)
+def test_actions_change_the_gait_as_the_table_says(task):
     """From one end of the limits to the other, at the rates of the table once the filters follow."""
-    env = gym.make(IDS[page], episode_seconds=4.0)
+    env = gym.make(TASKS[task].id, episode_seconds=4.0)
     leg = env.unwrapped
-    table = rows(section(manual.page(page), "Action Space"))
+    table = manual.actions(TASKS[task]).rows
     limits = np.array([re.fullmatch(r"(\S+) to (\S+) \S+", row[5]).groups() for row in table], float)
     assert limits == pytest.approx(np.array(list(LIMITS.values())), rel=1e-4)
     for column, end, action in ((2, 0, -1.0), (3, 1, 1.0)):
@@ -188,30 +106,29 @@ def test_offsets_of_a_horse_are_those_of_the_table():
     cranks at the same angles."""
     env = gym.make(HORSE)
     leg = env.unwrapped
-    text = section(manual.page("horse"), "Action Space")
-    table = rows(text)
+    table = manual.actions(TASKS["horse"]).rows
     env.reset(seed=0, options={"target_speed": 2.0})
-    state, commands, followed = leg.get_state(), {}, float(re.search(r"moves ([\d.]+) of the way", text)[1])
+    state, commands = leg.get_state(), {}
     for action in (0.0, -1.0, 1.0):
         leg.set_state(state)
         info = env.step(np.full(16, action, np.float32))[4]
         commands[action] = np.array([info["measured"][f"left_hind_command_{name}"] for name in LIMITS])
     for column, action in ((3, -1.0), (4, 1.0)):
-        said = followed * np.array([float(row[column]) for row in table])
+        expected = FOLLOWED * np.array([float(row[column]) for row in table])
         found = commands[action] - commands[0.0]
         found[0] /= commands[0.0][0]
-        assert found == pytest.approx(said, rel=1e-6)
+        assert found == pytest.approx(expected, rel=1e-6)
     raw = leg.raw_observation()
-    assert raw["offset: left hind, swing offset"] == pytest.approx(followed)
+    assert raw["offset: left hind, swing offset"] == pytest.approx(FOLLOWED)
 
 
-@pytest.mark.parametrize("page", OF_LEGS)
-def test_observations_are_scaled_as_the_table_says(page):
-    env = gym.make(IDS[page])
+@pytest.mark.parametrize("task", OF_LEGS)
+def test_observations_are_scaled_as_the_table_says(task):
+    env = gym.make(TASKS[task].id)
     leg = env.unwrapped
     env.reset(seed=5, options={"speed": 1.0} if leg.settings.trunk != "fixed" else {})
     leg.record()
-    table = {cells[0]: cells[1] for cells in observed(manual.page(page))}
+    table = {cells[0]: cells[1] for cells in observed(TASKS[task])}
     checked, landed, allowance = set(), False, BEARING * LONGEST_STRIDE
     for _ in range(60):
         observation, *_, info = env.step(leg.action_for(load_gait("run", leg.settings.preset)))
@@ -250,18 +167,25 @@ def test_observations_are_scaled_as_the_table_says(page):
     assert set(table) - checked <= {"commanded speed"}
 
 
-@pytest.mark.parametrize("page", TASKS)
-def test_every_setting_is_documented_with_its_default(page):
-    made = gym.make(IDS[page]).unwrapped.settings
-    table = rows(section(manual.page(page), "Arguments"))
-    *settings, render_mode, width, height = [(row[0].strip("`"), row[1].strip("*")) for row in table]
-    assert [render_mode, width, height] == [("render_mode", "None"), ("width", "960"), ("height", "540")]
-    names = [name for name, _ in settings]
-    assert names == [item.name for item in fields(Settings) if page not in HORSES or item.name in names]
-    for name, value in settings:
-        assert eval(value) == to_json(made)[name], name
-    bold = {row[0].strip("`") for row in table if row[1].startswith("**")}
-    assert bold == set(TASKS[page].defaults) & set(names)
+@pytest.mark.parametrize("task", TASKS)
+def test_every_setting_has_its_default(task):
+    settings = to_json(gym.make(TASKS[task].id).unwrapped.settings)
+    table = {row[0]: row[1] for row in manual.arguments(TASKS[task]).rows}
+    pictures = {name: table.pop(name) for name in ("render_mode", "width", "height")}
+    assert pictures == {"render_mode": "None", "width": "960", "height": "540"}
+    names = [item.name for item in fields(Settings) if task not in HORSES or item.name in table]
+    assert list(table) == names
+    for name, value in table.items():
+        assert eval(value) == settings[name], name
+
+
+@pytest.mark.parametrize("task", TASKS)
+def test_rewards_are_those_of_the_environment(task):
+    env = gym.make(TASKS[task].id, episode_seconds=0.02)
+    _, info = env.reset(seed=0)
+    weights = {row[0]: float(row[1]) for row in manual.rewards(TASKS[task]).rows}
+    assert [f"reward_{name}" for name in weights] == [name for name in info if name.startswith("reward_")]
+    assert weights == dict(env.unwrapped.batch.weights)
 
 
 CHANGED = OTHER | {
@@ -281,9 +205,9 @@ BESIDE = {name: {"drive": "motor"} for name in ("motor_gain", "motor_torque", "m
 BESIDE["push_seconds"] = {"push_impulse": 9.0}
 
 
-def test_the_page_of_the_horse_lists_what_a_horse_takes():
+def test_the_table_of_the_horse_lists_what_a_horse_takes():
     """Each setting with another value than the default, beside what it needs."""
-    listed = {row[0].strip("`") for row in rows(section(manual.page("horse"), "Arguments"))}
+    listed = {row[0] for row in manual.arguments(TASKS["horse"]).rows}
     for name in (item.name for item in fields(Settings)):
         try:
             TASKS["horse"].settings(given := {name: CHANGED[name]} | BESIDE.get(name, {}))
@@ -295,98 +219,8 @@ def test_the_page_of_the_horse_lists_what_a_horse_takes():
         assert is_taken == (name in listed), name
 
 
-def test_the_page_of_the_horse_has_the_numbers_of_the_code(monkeypatch):
-    """One that is written down instead would not follow."""
-    for name, value in (
-        ("PHASE_SPREAD", 0.0123), ("PITCH_SPREAD", 0.0234), ("SPEED_SPREAD", 0.345), ("PITCH", 0.456),
-        ("HEIGHT", (0.567, 1.678)), ("CLEARANCE", 0.0789), ("MASS", 489.0),
-    ):  # fmt: skip
-        monkeypatch.setattr(horse, name, value)
-    tables = manual_words.tables()
-    for module in (manual, manual_bodies, manual_words):
-        monkeypatch.setattr(module, "TABLES", tables)
-    monkeypatch.setattr(manual, "WORDS", tables["words"])
-    page = manual.page("horse")
-    start, end = section(page, "Starting State"), section(page, "Episode End")
-    assert "within 0.0123 strides of it, pitch within 0.0234 rad" in start
-    assert "34.5 % up or down" in start
-    assert "more than 0.456 rad or leaves 0.567 to 1.678 m over" in end
-    assert "than 7.89 cm" in end
-    assert "under a fourth of 489 kg" in section(page, "Arguments")
-
-
-def test_the_page_of_the_horse_says_where_commands_are_clipped():
-    limits = manual.page("horse").partition("### Limits of Commands")[2].replace("\n", " ")
-    assert f"the crank's speed to 0 to {FASTEST:g} rad/s at `size` 1" in limits
-    for name in ("swing_offset", "swing_sin", "higher"):
-        low, high = WIDEST[name]
-        assert f"{low:g} to {high:g} rad" in limits
-    assert WIDEST["swing_sin"] == WIDEST["swing_cos"]  # the page says one range of both
-
-
-def test_sentences_are_apart():
-    for page in manual.PAGES:
-        prose = re.sub(r"```.*?```|`[^`\n]*`", "x", manual.page(page), flags=re.DOTALL)
-        assert not re.findall(r"[a-z]{3}\.[A-Z]\w* \w+", prose)
-
-
-def test_the_tables_have_what_there_is_and_nothing_else():
-    assert list(TABLES["settings"]) == [item.name for item in fields(Settings)]
-    assert set(TABLES["options"]) == {"gait", "parameters", "pushes", *OPTIONS}
-    assert list(TABLES["hills"]) == list(HILLS)
-    known = inspect.signature(HorseLegVectorEnv).parameters
-    assert set(TABLES["vector"]) == {*known} - {"num_envs", "task"} - set(TABLES["settings"])
-    assert all(meaning for table in (TABLES["settings"], TABLES["options"]) for _, meaning in table.values())
-
-
-@pytest.mark.parametrize("page", TASKS)
-def test_rewards_options_and_figures_are_those_of_the_environment(page):
-    text, env = manual.page(page), gym.make(IDS[page], episode_seconds=0.02)
-    weights = env.unwrapped.weights
-    options = HORSE_OPTIONS if page in HORSES else OPTIONS
-    _, started = env.reset(seed=0, options={"parameters": {"friction": 0.3}})
-    info = env.step(np.zeros(env.action_space.shape, np.float32))[4]
-    table = rows(section(text, "Rewards"))
-    terms = [row[0].strip("`") for row in table]
-    assert [f"reward_{name}" for name in terms] == [name for name in info if name.startswith("reward_")]
-    assert [float(row[1]) for row in table] == [weights[name] for name in terms]
-    figures = [row[0].strip("`") for row in rows(section(text, "Episode Summary"))]
-    assert figures == list(info["episode_summary"])
-    told = {f"reward_{name}" for name in terms} | {row[0].strip("`") for row in rows(section(text, "Infos"))}
-    assert set(started) == told
-    assert set(info) == told - {"parameters"} | {"episode_summary", "end", "is_success"}
-    start = section(text, "Reset Options")
-    assert {row[0].strip("`") for row in rows(start)} == {*options, "gait", "parameters", "pushes"}
-    suspended = {"trunk_share", "trunk_stiffness", "trunk_damping", "trunk_drag"}
-    refused = suspended | {"friction_slow", "friction_fast"} if page in HORSES else set()
-    for name in PER_EPISODE:
-        assert (f"`{name}`" in start) != (name in refused)
-
-
-@pytest.mark.parametrize("page", manual.PAGES)
-def test_examples_run(page):
-    blocks = re.findall(r"```python\n(.*?)```", manual.page(page), re.DOTALL)
-    assert len(blocks) == (4 if page in TASKS else 1)
-    for block in blocks:
-        exec(compile(block, page, "exec"), {})
-
-
-@pytest.mark.parametrize("page", list(TASKS))
-def test_every_key_of_infos_and_every_quantity_is_there(page):
-    text, env = manual.page(page), gym.make(IDS[page], randomize=None)
-    infos, measured = section(text, "Infos").split("### What is Measured")
-    _, info = env.reset(seed=0)
-    told = [cells[0].strip("`") for cells in rows(infos)]
-    assert [key for key in told if key != "parameters"] == [key for key in info if "reward" not in key]
-    found = {"both": [], "record": [], "measured": []}
-    legs = LEGS if page in HORSES else []
-    shown = {re.sub(f"^({'|'.join(LEGS)})_", "", name) for name in info["measured"].names}
-    for names, within, unit, _ in rows(measured):
-        found[within] += re.findall(r"`(\w+)`", names)
-        assert unit
-    record = env.unwrapped.record()
-    assert sorted(found["both"] + found["record"]) == sorted(record)
-    assert sorted(found["both"] + found["measured"]) == sorted(shown)
-    assert len(info["measured"].names) == len(set(info["measured"].names))
-    assert f"shape\n({len(info['measured'])},)" in measured
-    assert {array.shape for array in record.values()} == {(1, 1), (1, max(len(legs), 1), 1)}
+def test_meanings_have_their_numbers_and_choices():
+    for task in TASKS.values():
+        assert not [row for row in manual.arguments(task).rows if "$" in row[3] or not row[3]]
+    rows = {row[0]: row[3] for row in manual.arguments(TASKS["horse"]).rows}
+    assert f"{MASS:g} kg" in rows["hoof_damping"]

@@ -9,14 +9,11 @@ import re
 
 import gymnasium as gym
 import numpy as np
-import pytest
 
 from hoof_env.dynamics import layout
-from hoof_env.dynamics.names import RENAMED, NamedColumns, present_name
-from hoof_env.episodes.outcome import MOVED
 from hoof_env.gait import PARAMETERS
 from hoof_env.record.columns import RECORD
-from hoof_env.record.instant import UNITS, Instant
+from hoof_env.record.instant import Instant
 from hoof_env.records import substeps
 
 LEG = "hoof_env/HorseLeg-v0"
@@ -99,48 +96,6 @@ def test_a_quantity_has_one_name():
         assert re.sub(r"^(toe|heel)_", "", name) in OF_FILES
     for name in named["summary"] - {*OF_EPISODES}:
         assert UNIT.sub("", name) in layout.StrideSums.names
-
-
-def test_no_place_has_an_old_name():
-    for place, names in places().items():
-        old = {name for name in names if present_name(name, names)}
-        assert old <= ({"crank_speed"} if place in ("info", "engine", "record") else set()), place
-
-
-def test_old_names_are_refused_with_the_present_ones():
-    env = gym.make(LEG, episode_seconds=0.02).unwrapped
-    env.reset(seed=0)
-    summary = env.step(np.zeros(4, np.float32))[4]["episode_summary"]
-    horse = gym.make(HORSE).unwrapped
-    horse.reset(seed=0)
-    run = env.engine.alone()
-    run.reset(env.gaits["run"])
-    for columns, old, new in (
-        (summary, "peak_grf_n", "highest_grf_n"),
-        (env.engine.state, "theta", "crank_angle"),
-        (env.engine.report, "pitch_acc", "pitch_acceleration"),
-        (run.run(steps=2), "phi", "swing_angle"),
-        (env.record(), "phi_rate", "swing_angle_rate"),
-        (substeps(env), "trunk_x", "x"),
-        (substeps(env), "crank_speed", "crank_angle_rate"),
-        (substeps(horse), "left_fore_crank_speed", "left_fore_crank_angle_rate"),
-        (env.step(np.zeros(4, np.float32))[4]["measured"], "theta_acc", "crank_angle_acceleration"),
-    ):
-        with pytest.raises(KeyError, match=f"'{old}' is called '{new}' now"):
-            columns[old]
-        with pytest.raises(KeyError, match=f"'{old}' is called '{new}' now"):
-            columns.get(old)
-        assert columns[new] is not None
-        assert (columns.get("nothing", 3), columns.get(new) is None) == (3, False)
-    with pytest.raises(KeyError, match=r"^'thet'$"):
-        env.record()["thet"]
-    with pytest.raises(KeyError, match=r"^3$"):
-        NamedColumns(time=0.0)[3]
-    assert MOVED["theta"] == "crank_angle"
-    assert {*RENAMED.values()} <= set.union(
-        *places().values(), set(layout.leg_state(layout.Features(1, True)))
-    )
-    assert UNITS["crank_angle_rate"] == "rad/s"
 
 
 if __name__ == "__main__":

@@ -12,7 +12,7 @@ from family import actions, same
 import hoof_env
 from hoof_env import ActionMap, Constant, Entry, Kept, Scale, Term
 from hoof_env.dynamics.layout import TRUNK_STATE
-from hoof_env.envs.manual import page_of
+from hoof_env.envs.manual import tables_of
 from hoof_env.errors import ParameterError
 from hoof_env.policies.record import describe_actions
 from hoof_env.tasks import registry as tasks
@@ -109,18 +109,16 @@ def test_an_action_of_step_length_lengthens_the_step_and_keeps_its_height(exampl
 def test_what_needs_actions_of_the_leg_is_refused(example):
     env = gym.make(ID).unwrapped
     env.reset(seed=0)
-    with pytest.raises(ParameterError, match=r"action_for: expected actions that are rates, got .* steps"):
+    with pytest.raises(ParameterError, match=r"action_for: expected actions .*rates, got .*steps"):
         env.action_for("walk")
-    with pytest.raises(ParameterError, match="policy 'run': expected actions of the leg"):
+    with pytest.raises(ParameterError, match=r"policy 'run': expected actions .*leg"):
         hoof_env.make_policy("run", env)
     assert hoof_env.make_policy("random", env).predict(np.zeros(3))[0].shape == (3,)
-    page = page_of(ID)
-    for words in (
-        "Box(-1, 1, (3,), float32)",
-        "rate of step length",
-        "| `free` | 1000 | N | force that costs",
-    ):
-        assert words in page
+    tables = tables_of(ID)
+    assert len(tables["Actions"].rows) == 3
+    assert any("rate of step length" in cells for cells in map(" ".join, tables["Actions"].rows))
+    free = next(row for row in tables["Constants"].rows if row[0] == "free")
+    assert free[1:3] == ("1000", "N")
 
 
 def test_change_of_constants_acts_from_the_next_episode_on(example):
@@ -238,9 +236,7 @@ def test_nan_of_an_entry_is_told(example):
         "my_lab/NoNumber-v0", entries=[Entry("no number", "own", "-", no_number, Scale("none"))]
     )
     env = gym.make("my_lab/NoNumber-v0").unwrapped
-    with pytest.raises(
-        ParameterError, match=r"entry 'no number': expected a number, got NaN .* after 0 steps"
-    ):
+    with pytest.raises(ParameterError, match=r"entry 'no number': expected .*got NaN .*after 0 steps"):
         env.reset(seed=0)
     assert env.step(np.zeros(4, np.float32))[0][-1] == 1.0
 

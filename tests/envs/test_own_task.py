@@ -25,7 +25,7 @@ from hoof_env import Scale, Term, register
 from hoof_env.cli import main
 from hoof_env.dynamics.hoof import GroundHere
 from hoof_env.dynamics.layout import TRUNK_STATE, LegMemory, TrunkMemory
-from hoof_env.envs.manual import page_of
+from hoof_env.envs.manual import tables_of
 from hoof_env.simd import compile as compile_room
 from hoof_env.tasks import registry as tasks
 from hoof_env.tasks.episode import Episode
@@ -120,15 +120,15 @@ def test_a_spec_makes_it_again(own):
         same(one, two)
 
 
-def test_its_manual_page_has_its_rows(own, capsys):
-    page = page_of(own.ID)
-    assert page == page_of(own.MODULE_ID)
-    assert "| `friction` | 0.5 | 1/kJ | power of friction |" in page
-    assert re.search(r"\| \d+ \| load angle \| / pi \| rad \| feel \|", page)
-    assert "`own_functions.equation_14`" in page
-    assert f'gym.make("{own.ID}"' in page
+def test_its_tables_have_its_rows(own, capsys):
+    tables = tables_of(own.ID)
+    assert tables == tables_of(own.MODULE_ID)
+    assert ("friction", "0.5", "1/kJ", "power of friction") in tables["Rewards"].rows
+    assert ("load angle", "/ pi", "rad", "feel") in [row[1:] for row in tables["Observation"].rows]
     assert main(["manual", "--id", own.MODULE_ID]) == 0
-    assert "| `comfort` |" in capsys.readouterr().out
+    printed = capsys.readouterr().out
+    assert printed.startswith(f"{own.ID} (import own_functions): ")
+    assert re.search(r"^comfort ", printed, re.MULTILINE)
 
 
 def test_the_same_id_again_replaces_it_with_gymnasiums_warning(own):
@@ -353,7 +353,7 @@ def test_the_page_has_every_name_that_functions_reach():
     ):  # fmt: skip
         for key, field in layout.fields.items():
             if key not in hidden:
-                is_table = name != "trunk" and key == "sums"  # the manual pages list those
+                is_table = name != "trunk" and key == "sums"  # docs/environments/common.md lists those
                 inner = {} if is_table else getattr(field.kind, "fields", {})
                 expected |= {f"{name}.{key}.{k}" for k, part in inner.items() if part.size}
                 expected |= set() if inner else {f"{name}.{key}"}

@@ -194,15 +194,15 @@ def test_each_leg_of_a_horse_follows_its_own_crank_and_left_is_as_right():
 
 def test_a_motor_takes_a_clock_and_not_its_crank(env):
     motor = gym.make(ENV_ID, drive="motor")
-    with pytest.raises(ParameterError, match=r'expected "frequency_hz", a clock, as the drive is a motor'):
+    with pytest.raises(ParameterError, match=r'expected "frequency_hz", a clock, .*drive .*motor'):
         open_loop(PHASE, motor)
     open_loop(CLOCKED, motor)
     open_loop(PHASE, motor, blind=False)
-    with pytest.raises(ParameterError, match="expected 'target' among the observed groups"):
+    with pytest.raises(ParameterError, match=r"expected 'target' .*groups"):
         open_loop({"coefficients": COEFFICIENTS * 2}, env)
-    with pytest.raises(ParameterError, match="expected 8 numbers of a horse, got 4"):
+    with pytest.raises(ParameterError, match=r"expected 8 .*horse, got 4"):
         open_loop(PHASE, gym.make("hoof_env/Horse-v0"))
-    with pytest.raises(ParameterError, match="expected 'crank' among the observed groups"):
+    with pytest.raises(ParameterError, match=r"expected 'crank' .*groups"):
         open_loop(PHASE, gym.make(ENV_ID, observation=["gait"]))
 
 

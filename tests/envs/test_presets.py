@@ -63,7 +63,5 @@ def test_gaits_of_presets_carry_the_trunk_and_keep_their_speed(preset):
 def test_the_paper_is_not_reproduced_by_another_leg(preset):
     from hoof_env.paper.reproduce import reproduce
 
-    with pytest.raises(
-        ParameterError, match="preset: expected a leg of the paper's mechanism with the gaits"
-    ):
+    with pytest.raises(ParameterError, match=r"preset: expected a leg .*paper's mechanism .*gaits"):
         reproduce(preset=preset)

@@ -33,26 +33,26 @@ def horse():
     return made("hoof_env/Horse-v0")
 
 
-UNSEEN = r"policy: expected 'gait' among the observed groups.*got \['crank', 'hoof'\]"
-NO_ENV = "env: expected an environment of this package, make_policy.*got"
+UNSEEN = r"policy: expected 'gait' .*groups.*got \['crank', 'hoof'\]"
+NO_ENV = "env: expected an environment .*make_policy.*got"
 CALLS = [
     *((lambda name=name: make_policy(name, blind()), UNSEEN) for name in ("run", "idle", "drag", "airborne")),
     (lambda: open_loop(CLOCKED, blind()), UNSEEN),
     *(
         (
             lambda name=name: make_policy(name, made(LEG, "gait")),
-            r"expected 'crank' among the observed groups, got \['gait'\]",
+            r"expected 'crank' .*groups, got \['gait'\]",
         )
         for name in ("drag", "airborne")
     ),
     (
         lambda: make_policy("idle", horse()),
-        "policy: expected one of bang-bang, random, reference, zero, got 'idle'",
+        "policy: expected .*bang-bang, random, reference, zero, got 'idle'",
     ),
     (lambda: make_policy(made(), "run"), NO_ENV),
     (lambda: make_policy("run", "walk"), NO_ENV),
     (lambda: make_policy("run", made("CartPole-v1")), NO_ENV),
-    (lambda: make_policy(3, made()), "policy: expected one of .*got 3"),
+    (lambda: make_policy(3, made()), "policy: expected .*got 3"),
     (
         lambda: make_policy("run", made()).predict(None),
         r"observation: expected what .*shape \(\.\.\., \d+\).*got None",
@@ -68,8 +68,8 @@ def test_calls(call, words):
 
 
 GAIT = {"env_id": LEG, "form": "gait", "parameters": CLOCKED}
-NO_GAIT = r"gait\.json: expected the JSON object of agents\.open_loop"
-OLD = r"gait\.json: expected form 'gait'.*got .*actions that were positions"
+NO_GAIT = r"gait\.json: expected the JSON .*agents\.open_loop"
+OLD = r"gait\.json: expected form 'gait'.*got .*agents"
 FILES = [
     ({**GAIT, "form": None}, OLD),
     ({**GAIT, "form": "actions"}, OLD),
@@ -116,12 +116,12 @@ def test_a_file_for_an_environment_whose_actions_mean_something_else(tmp_path):
         load_open_loop(path, horse())
     content = {"form": horse().unwrapped.action_form, "parameters": {"constant": [6.0, 0.0, 0.0, 0.0]}}
     path.write_text(json.dumps(content))
-    with pytest.raises(DataFileError, match="constant: expected an environment of one leg, got a horse"):
+    with pytest.raises(DataFileError, match=r"constant: expected an environment .*leg, got a horse"):
         load_open_loop(path, horse())
 
 
 def test_an_id_without_a_gait():
-    with pytest.raises(DataFileError, match=r"of Cow-v0: expected one of .*HorseLeg-v0-constant\.json"):
+    with pytest.raises(DataFileError, match=r"of Cow-v0: expected .*HorseLeg-v0-constant\.json"):
         load_open_loop("hoof_env/Cow-v0", made())
 
 

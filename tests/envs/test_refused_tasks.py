@@ -11,7 +11,7 @@ import pytest
 
 import hoof_env
 from hoof_env import Entry, Scale, Term, register
-from hoof_env.envs.manual import page_of
+from hoof_env.envs.manual import tables_of
 from hoof_env.errors import ParameterError
 from hoof_env.tasks import registry as tasks
 
@@ -40,32 +40,32 @@ def powers(penetration, rate, inverse_approach_speed, ground):
 REGISTRATIONS = [
     (
         lambda: {"env_id": "Turf"},
-        "env_id: expected 'namespace/Name-v0' of a namespace of yours, got 'Turf'",
+        "env_id: expected 'namespace/Name-v0' .*namespace .*got 'Turf'",
     ),
-    (lambda: {"env_id": "hoof_env/HorseLeg-v0"}, "of a namespace of yours, got 'hoof_env/HorseLeg-v0'"),
+    (lambda: {"env_id": "hoof_env/HorseLeg-v0"}, "of a namespace .*got 'hoof_env/HorseLeg-v0'"),
     (lambda: {"env_id": 3}, "env_id: expected .*got 3"),
-    (lambda: {"base": "pony"}, r"task: expected one of fixed, horse, leg, .*, terrain.*, got 'pony'"),
+    (lambda: {"base": "pony"}, r"task: expected .*fixed, horse, leg, .*, terrain.*, got 'pony'"),
     (lambda: {"terms": [term(constant), term(constant)]}, "expected names that differ, got mine twice"),
     (
         lambda: {"entries": [entry(len), entry(len)]},
-        "expected a plain function of 1 arguments, got <built-in",
+        "expected .*1 arguments, got <built-in",
     ),
     (
         lambda: {"entries": [entry(lambda s: 0.0), entry(lambda s: 1.0)]},
         "names that differ, got mine twice",
     ),
     (lambda: {"entries": [entry(lambda s: 0.0, "height")]}, "names that differ, got height twice"),
-    (lambda: {"terms": [constant]}, f"{BAD}: terms: expected a list of hoof_env.Term, got <function"),
-    (lambda: {"terms": None}, f"{BAD}: terms: expected a list of hoof_env.Term, got None"),
-    (lambda: {"entries": 3}, f"{BAD}: entries: expected a list of hoof_env.Entry, got 3"),
-    (lambda: {"entries": ["speed"]}, f"{BAD}: entries: expected a list of hoof_env.Entry, got 'speed'"),
+    (lambda: {"terms": [constant]}, f"{BAD}: terms: expected .*hoof_env.Term, got <function"),
+    (lambda: {"terms": None}, f"{BAD}: terms: expected .*hoof_env.Term, got None"),
+    (lambda: {"entries": 3}, f"{BAD}: entries: expected .*hoof_env.Entry, got 3"),
+    (lambda: {"entries": ["speed"]}, f"{BAD}: entries: expected .*hoof_env.Entry, got 'speed'"),
     (
         lambda: {"terms": [term(lambda step: 0.0)]},
-        r"compute: expected a function of 2 arguments, got one of \(step\)",
+        r"compute: expected .*2 arguments, got .*\(step\)",
     ),
     (
         lambda: {"contact_law": constant},
-        r"contact_law: expected a function of 4 arguments, got one of \(step, weight\)",
+        r"contact_law: expected .*4 arguments, got .*\(step, weight\)",
     ),
     (
         lambda: {"stiffnes": 1.0},
@@ -73,19 +73,19 @@ REGISTRATIONS = [
     ),
     (
         lambda: {"motor_gain": 1.0},
-        "motor_gain: expected drive='motor' beside it, without which it has no effect",
+        "motor_gain: expected drive='motor' .*effect",
     ),
     (
         lambda: {"reward_weights": {"slop": 1.0}},
-        "reward_weights: expected a mapping with some of progress, .*slop",
+        "reward_weights: expected .*progress, .*slop",
     ),
     (
         lambda: {"observation": ["crank", "smell"]},
-        "observation: expected a list of some of crank, .*smell",
+        "observation: expected .*crank, .*smell",
     ),
     (
         lambda: {"base": "fixed", "solver": "paper", "contact_law": powers},
-        'solver: expected "exact" beside a contact law of one\'s own, got "paper"',
+        'solver: expected "exact" .*contact law of one\'s own, got "paper"',
     ),
 ]
 """Arguments of `register`, and words."""
@@ -120,9 +120,9 @@ CALLS = [
         r"some of .*support, overspeed, loading, friction, comfort, got \{'slop': 1\}",
     ),
     (pickled, "pickled with other terms, entries or law"),
-    (registered_no_more, "task: expected one of .*, got 'own/Everything-v0'"),
+    (registered_no_more, "task: expected .*, got 'own/Everything-v0'"),
     (lambda own: hoof_env.HorseLegEnv(task="nobody:own/Nothing-v0"), "No module named 'nobody'"),
-    (lambda own: page_of("own/Nothing-v0"), "expected one of .*, got 'own/Nothing-v0'"),
+    (lambda own: tables_of("own/Nothing-v0"), "expected .*, got 'own/Nothing-v0'"),
 ]
 """Calls with the module of a user, and words."""
 

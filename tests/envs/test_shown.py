@@ -4,7 +4,6 @@ import gymnasium as gym
 import pytest
 
 import hoof_env  # noqa: F401 - registers the ids
-from hoof_env.envs.manual import page_of
 from hoof_env.envs.policies import make_policy
 
 
@@ -29,9 +28,6 @@ def test_measurements_are_a_table(env):
     assert f"{measured['toe_x']:.6g}" in table
 
 
-def test_engine_policy_and_manual(env):
+def test_engine_and_policy(env):
     assert repr(env.engine).startswith("<TrunkEngine suspended, 1 leg, ")
     assert repr(make_policy("walk", env)).startswith("<Scripted name=walk start={'gait': GaitParameters(")
-    page = page_of("hoof_env/HorseLeg-v0")
-    assert page._repr_markdown_() == page
-    assert page.startswith("# HorseLeg")

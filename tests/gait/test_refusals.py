@@ -32,25 +32,25 @@ CALLS = [
     ),
     *(
         (lambda name=name, value=value: GaitParameters(**{**GAIT, name: value}),
-         f"{name}: expected a finite number in .* got {value!r}")
+         f"{name}: expected .*got {value!r}")
         for name, (low, high) in BOUNDS.items()
         for value in (low - 1e-6, high + 1e-6, np.nan, np.inf, "fast", None, True)
     ),
-    (lambda: load_gait("trot", FIRST_FIT), "gait: expected one of run, walk, got 'trot'"),
-    (lambda: load_gait("carrying_walk", FIRST_FIT), "gait: expected one of run, walk, got 'carrying_walk'"),
+    (lambda: load_gait("trot", FIRST_FIT), "gait: expected .*run, walk, got 'trot'"),
+    (lambda: load_gait("carrying_walk", FIRST_FIT), "gait: expected .*run, walk, got 'carrying_walk'"),
     (
         lambda: ConstrainedLeg(load_geometry(), Ground()).reset(HARMONIC),
-        "gait: expected a swing of at most 1 harmonic, got",
+        "gait: expected a swing .*1 harmonic, got",
     ),
     *(
         (lambda given=given: FilterSettings(**given), words)
         for given, words in (
-            ({"gain": 0.0}, "filters.gain: expected .* got 0.0"),
-            ({"swing_rate": -1.0}, "filters.swing_rate: expected .* got -1.0"),
+            ({"gain": 0.0}, "filters.gain: expected .*got 0.0"),
+            ({"swing_rate": -1.0}, "filters.swing_rate: expected .*got -1.0"),
             ({"crank_rate": 20.0, "crank_acc": 399.0},
-             r"gain \* crank_rate <= crank_acc .* got 20 \* 20 > 399"),
+             r"gain \* crank_rate <= crank_acc .*got 20 \* 20 > 399"),
             ({"swing_rate": 5.0, "swing_acc": 80.0},
-             r"gain \* swing_rate <= swing_acc .* got 20 \* 5 > 80"),
+             r"gain \* swing_rate <= swing_acc .*got 20 \* 5 > 80"),
         )
     ),
 ]  # fmt: skip
@@ -63,15 +63,15 @@ def test_calls(call, words):
         call()
 
 
-NONE = "expected an object 'gaits' with at least one gait, got"
+NONE = "expected .*'gaits' .*gait, got"
 FILES = [
     (load_gait, None, DataFileError, f"{NONE} None"),
     (load_gait, {}, DataFileError, f"{NONE} {{}}"),
     (gait_names, None, DataFileError, f"{NONE} None"),
     (gait_names, {}, DataFileError, f"{NONE} {{}}"),
-    (load_gait, {"walk": 3}, DataFileError, "gait 'walk': expected crank_speed, .* got 3"),
-    (load_gait, {"walk": {"crank_speed": 6.0}}, DataFileError, "gait 'walk': expected crank_speed, .* got"),
-    (load_gait, {"walk": {**GAIT, "crank_speed": 9999}}, ParameterError, "crank_speed: expected .* got 9999"),
+    (load_gait, {"walk": 3}, DataFileError, "gait 'walk': expected crank_speed, .*got 3"),
+    (load_gait, {"walk": {"crank_speed": 6.0}}, DataFileError, "gait 'walk': expected crank_speed, .*got"),
+    (load_gait, {"walk": {**GAIT, "crank_speed": 9999}}, ParameterError, "crank_speed: expected .*got 9999"),
 ]
 """Function, gaits of a preset, class and words of the error."""
 

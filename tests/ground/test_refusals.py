@@ -15,18 +15,18 @@ from hoof_env.ground.terrain import Terrain
 from tests.ground.test_preset import with_ground
 
 GROUNDS = [
-    ({"stiffness": 0.0}, "stiffness: expected .* got 0.0"),
-    ({"exponent": 1.4}, "exponent: expected a multiple of 1/8, .* got 1.4"),
-    ({"exponent": 0.5}, r"exponent: expected a finite number in \[1, 3\], got 0.5"),
-    ({"normal_law": "hertz"}, "normal_law: expected one of .* got 'hertz'"),
-    ({"restitution": -0.1}, "restitution: expected .* got -0.1"),
+    ({"stiffness": 0.0}, "stiffness: expected .*got 0.0"),
+    ({"exponent": 1.4}, "exponent: expected a multiple of 1/8, .*got 1.4"),
+    ({"exponent": 0.5}, r"exponent: expected .*\[1, 3\], got 0.5"),
+    ({"normal_law": "hertz"}, "normal_law: expected .*got 'hertz'"),
+    ({"restitution": -0.1}, "restitution: expected .*got -0.1"),
     ({"restitution": 0.0, "normal_law": "flores"}, "damping grows without bound"),
-    ({"approach_floor": 0.0}, "approach_floor: expected .* got 0.0"),
-    ({"approach": "guessed"}, "approach: expected one of interpolated, sampled, got 'guessed'"),
-    ({"friction_law": "coulomb"}, "friction_law: expected one of ambrosio, tanh, threlfall, got 'coulomb'"),
-    ({"friction": math.nan}, "friction: expected .* got nan"),
-    ({"friction_slow": 0.02}, "friction_fast: expected more than friction_slow = 0.02"),
-    ({"reference_mass": 0.0}, "reference_mass: expected .* got 0.0"),
+    ({"approach_floor": 0.0}, "approach_floor: expected .*got 0.0"),
+    ({"approach": "guessed"}, "approach: expected .*interpolated, sampled, got 'guessed'"),
+    ({"friction_law": "coulomb"}, "friction_law: expected .*ambrosio, tanh, threlfall, got 'coulomb'"),
+    ({"friction": math.nan}, "friction: expected .*got nan"),
+    ({"friction_slow": 0.02}, "friction_fast: expected .*friction_slow = 0.02"),
+    ({"reference_mass": 0.0}, "reference_mass: expected .*got 0.0"),
 ]
 """Settings and words."""
 
@@ -38,14 +38,14 @@ def test_grounds(given, words):
 
 
 PRESETS = [
-    (1.375, "ground: expected an object .*got 1.375"),
+    (1.375, "ground: expected .*got 1.375"),
     ({"n": 1.375}, "no other entries than stiffness, exponent, got .*'n'"),
-    ({"friction": 0.4}, "no other entries than .* got .*'friction'"),
-    ({"exponent": 0.5}, r"ground: exponent: expected a finite number in \[1, 3\], got 0.5"),
-    ({"exponent": "1.5"}, "ground: exponent: expected .* got '1.5'"),
-    ({"exponent": None}, "ground: exponent: expected .* got None"),
-    ({"stiffness": math.nan}, "ground: stiffness: expected .* got nan"),
-    ({"stiffness": -2e4}, "ground: stiffness: expected .* got -20000.0"),
+    ({"friction": 0.4}, "no other entries than .*got .*'friction'"),
+    ({"exponent": 0.5}, r"ground: exponent: expected .*\[1, 3\], got 0.5"),
+    ({"exponent": "1.5"}, "ground: exponent: expected .*got '1.5'"),
+    ({"exponent": None}, "ground: exponent: expected .*got None"),
+    ({"stiffness": math.nan}, "ground: stiffness: expected .*got nan"),
+    ({"stiffness": -2e4}, "ground: stiffness: expected .*got -20000.0"),
 ]
 """Grounds of a preset, and words."""
 
@@ -63,19 +63,19 @@ def test_presets(ground, words, tmp_path):
 CALLS = [
     (lambda: load_ground("identified", exponent=9), "exponent: expected .*got 9"),
     # damping of a law
-    (lambda: damping("hertz", 1.0, 2e4, 80.0), r"normal_law: expected one of exact, .*, got 'hertz'"),
+    (lambda: damping("hertz", 1.0, 2e4, 80.0), r"normal_law: expected .*exact, .*, got 'hertz'"),
     (
         lambda: damping("hu-guo", 1.5, 2e4, 80.0),
-        r"restitution: expected a finite number in \[0, 1\], got 1.5",
+        r"restitution: expected .*\[0, 1\], got 1.5",
     ),
     (
         lambda: damping("lankarani-nikravesh", np.nan, 2e4, 80.0),
-        r"restitution: expected a finite number in \[0, 1\], got nan",
+        r"restitution: expected .*\[0, 1\], got nan",
     ),
     *(
         (
             lambda law=law: damping(law, 0, 2e4, 80.0),
-            rf"restitution: expected a number in \[0.01, 1\] for '{law}'",
+            rf"restitution: expected .*\[0.01, 1\] for '{law}'",
         )
         for law in ("flores", "gonthier", "hu-guo")
     ),
@@ -85,33 +85,33 @@ CALLS = [
     (lambda: contact_rates(Ground(), 1.0, 1.0, sliding_mass=math.nan), "sliding_mass: expected .*got nan"),
     (
         lambda: contact_rates(Ground(), 1.0, 1.0).longest_steps("leapfrog"),
-        "scheme: expected one of .*got 'leapfrog'",
+        "scheme: expected .*got 'leapfrog'",
     ),
     (lambda: contact_rates(Ground(), 1.0, 1.0).longest_steps("rk4", 0.0), "tolerance: expected .*got 0.0"),
     # terrains
-    (lambda: Terrain(()), r"terrain.height: expected a row of numbers, got \(\)"),
-    (lambda: Terrain(3.0), "terrain.height: expected a row of numbers, got 3.0"),
-    (lambda: Terrain("012"), r"terrain.height\[0\]: expected a finite number .*got '0'"),
-    (lambda: Terrain((0, math.nan)), r"terrain.height\[1\]: expected a finite number .*got nan"),
+    (lambda: Terrain(()), r"terrain.height: expected a row .*got \(\)"),
+    (lambda: Terrain(3.0), "terrain.height: expected a row .*got 3.0"),
+    (lambda: Terrain("012"), r"terrain.height\[0\]: expected .*got '0'"),
+    (lambda: Terrain((0, math.nan)), r"terrain.height\[1\]: expected .*got nan"),
     (lambda: Terrain((0, 1), (1, 1, 1)), r"terrain.stiffness: expected 2 numbers, got \(1, 1, 1\)"),
     (lambda: Terrain((0, 1), stiffness=0), "terrain.stiffness: expected .*got 0"),
     (lambda: Terrain((0, 1), friction=(1, -1)), r"terrain.friction\[1\]: expected .*got -1"),
     (lambda: Terrain((0, 1), spacing=0), "terrain.spacing: expected .*got 0"),
-    (lambda: Terrain((0, 1), start=math.inf), "terrain.start: expected a finite number .*got inf"),
+    (lambda: Terrain((0, 1), start=math.inf), "terrain.start: expected .*got inf"),
     (lambda: Terrain.slope(1.6), "angle: expected .*got 1.6"),
     (lambda: Terrain.ramp(0.1, length=-1), "length: expected .*got -1"),
-    (lambda: Terrain.through([0, 0], [1, 1]), r"x: expected two or more increasing .*got \[0, 0\]"),
+    (lambda: Terrain.through([0, 0], [1, 1]), r"x: expected .*increasing .*got \[0, 0\]"),
     (lambda: Terrain.through([0, 1], [1]), r"height: expected 2 numbers, got \[1\]"),
-    (lambda: Terrain.through([0, 1e6], [1, 1]), "terrain.spacing: expected at most .* knots.*got"),
+    (lambda: Terrain.through([0, 1e6], [1, 1]), "terrain.spacing: expected .*knots.*got"),
     (lambda: Terrain.patches([(1, 0, 1, 1)]), r"patches\[0\]: expected \(x0, x1, .*got \(1, 0, 1, 1\)"),
     (lambda: Terrain.patches([(0, 1, 1)]), r"patches\[0\]: expected \(x0, x1, .*got \(0, 1, 1\)"),
     (lambda: Terrain.patches(None), "patches: expected a row of patches, got None"),
     (lambda: Terrain.patches([(0, 1, 1, 1)], spacing="fine"), "terrain.spacing: .*got 'fine'"),
-    (lambda: Terrain.patches([1]), r"patches\[0\]: expected a row of numbers, got 1"),
+    (lambda: Terrain.patches([1]), r"patches\[0\]: expected a row .*got 1"),
     (lambda: Terrain.patches([(0, 2, 1, 1), (1, 3, 1, 1)]), "patches: expected patches apart.*got"),
     (lambda: Terrain.patches([(0, 2, 1, 1)], spacing=0), "terrain.spacing: expected .*got 0"),
     (lambda: Terrain.from_dict({"heights": [0]}), "no other entries than height, .*got .*heights"),
-    (lambda: Terrain.from_dict([]), r"terrain: expected an object.*got \[\]"),
+    (lambda: Terrain.from_dict([]), r"terrain: expected .*got \[\]"),
 ]
 """Calls and words."""
 

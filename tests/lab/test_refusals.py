@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import re
 import sys
 
 import gymnasium as gym
@@ -60,16 +61,16 @@ def of_plate(group, name, value):
 
 
 FILES = [
-    ("none.csv", None, {}, DataFileError, "expected a file, found none"),
-    ("empty.csv", "", {}, DataFileError, "expected two rows of numbers or more, found fewer"),
-    ("head.csv", "time [s],force_y [N]\n", {}, DataFileError, "expected two rows of numbers or more, found"),
+    ("none.csv", None, {}, DataFileError, "expected .*found none"),
+    ("empty.csv", "", {}, DataFileError, "expected two rows .*found fewer"),
+    ("head.csv", "time [s],force_y [N]\n", {}, DataFileError, "expected two rows .*found"),
     ("words.csv", STEADY + "1,x,2\n", {}, DataFileError, "line 3: expected numbers, got 'x'"),
     ("short.csv", STEADY + "1,2\n", {}, DataFileError, "line 3: expected numbers, got 2 cells under 3"),
-    ("nan.csv", STEADY + "1,2,nan\n", {}, DataFileError, "force_y: expected finite numbers, got nan"),
+    ("nan.csv", STEADY + "1,2,nan\n", {}, DataFileError, "force_y: expected .*got nan"),
     ("twice.csv", "time,force_y,force_y\n0,1,2\n1,2,3\n", {}, DataFileError, "expected names that differ"),
     ("uneven.csv", STEADY + "1,1,2\n3,1,2\n", {}, DataFileError, "expected evenly spaced times"),
     ("unitless.csv", "time,force_x,force_y\n0,1,2\n1,1,2\n", {}, ParameterError,
-     "units: expected one of N, kN, N/kg, BW"),
+     "units: expected .*N, kN, N/kg, BW"),
     ("pounds.csv", "time,force_x [lbf],force_y [lbf]\n0,1,2\n1,1,2\n", {}, ParameterError, "which says lbf"),
     ("names.csv", "t,Fx,Fz\n0,1,2\n1,1,2\n", {}, ParameterError,
      "expected columns of names.csv for time, force_x and force_y"),
@@ -86,40 +87,40 @@ FILES = [
     ("row.mot", "x\nendheader\ntime a ground_force_vy\n0 1 2\n1 1\n", {}, DataFileError,
      "got 2 cells under 3 names"),
     ("headless.mot", "time\tground_force_vy\n0\t1\n", {}, DataFileError, "expected a line endheader"),
-    ("bytes.parquet", "not a table", {}, DataFileError, "expected a .parquet that can be read, cannot"),
+    ("bytes.parquet", "not a table", {}, DataFileError, "expected a .parquet .*read, cannot"),
     ("bytes.c3d", "not a c3d", {}, DataFileError, "cannot read it"),
-    ("other.xlsx", "", {}, ParameterError, "expected a file that ends in .c3d, .csv"),
+    ("other.xlsx", "", {}, ParameterError, "expected .*.c3d, .csv"),
     # texts in the layouts of laboratories
     ("garbage.csv", NAMED + text(ROWS[:50]) + "no numbers\n" + text(ROWS[50:]), {}, DataFileError,
      "line 52: expected numbers"),
     ("both.txt", "time\tleft_force_y [N]\n0.1\t1,234\n0.2\t987.5\n", {}, DataFileError,
      "'1,234' beside numbers with decimal"),
-    ("zeros.csv", NAMED + "0,\0,1\n", {}, DataFileError, "found bytes 0 in line 2; save it as UTF-8"),
+    ("zeros.csv", NAMED + "0,\0,1\n", {}, DataFileError, "found bytes 0 in line 2; save .*UTF-8"),
     ("nexus.csv", NEXUS, {"mapping": {"force_y": "Fz"}, "rate": 100}, DataFileError,
-     r"names in line 4: .* got 'Fz' 2 times; choose Fz#1 \(Plate 1\), Fz#2 \(Plate 2\)"),
+     r"names in line 4: .*got 'Fz' 2 times; choose Fz#1 \(Plate 1\), Fz#2 \(Plate 2\)"),
     ("opposite.csv", "time,p-1 [N],p-2 [N]\n" + text(np.column_stack([TIME, UP, -UP])),
      {"mapping": {"left_force_y": "p-1+p-2"}}, ParameterError,
      "for left, got p-1 upward and p-2 downward; a minus before"),
     ("axes.csv", NAMED.replace("_y", "_z") + text(ROWS),
      {"mapping": {"force_y": "left_force_z"}, "up": "z"}, ParameterError,
-     r"up, forward: expected neither with columns of axes\.csv"),
+     r"up, forward: expected .*columns of axes\.csv"),
     # a sample is missing
     *(
         ("missing.csv", lacks(missing, rate, decimals), {}, DataFileError,
-         rf"of {int(2000 / rate) / 1000}\d* after .* in row {missing}; .* \(--rate-a, --rate-b\)")
+         rf"of {int(2000 / rate) / 1000}\d* after .*in row {missing}; .*\(--rate-a, --rate-b\)")
         for missing in (1, 200, 450, 898)
         for rate, decimals in ((600, 4), (1000, 3), (100, 2), (960, 6))
     ),
     # force plates
     *(
         ("cut.c3d", cut(part), {}, DataFileError,
-         "frames, as its header says, found .*: is the file cut off")
+         "frames, .*header says, found .*: .*cut off")
         for part in (0.6, 0.95)
     ),
     ("volts.c3d", of_plate("ANALOG", "UNITS", ["V"] * 6), {}, ParameterError,
-     "volts.c3d, which says V; name it by --units-a"),
+     "volts.c3d, .*V; name .*--units-a"),
     ("mixed.c3d", of_plate("ANALOG", "UNITS", ["N", "N", "kN", "V", "V", "V"]), {}, ParameterError,
-     "mixed.c3d, which says N and kN; name it by --units-a"),
+     "mixed.c3d, .*N and kN; name .*--units-a"),
     ("plates.c3d", of_plate("FORCE_PLATFORM", "USED", [0]), {}, DataFileError, "found no force plates"),
     ("type.c3d", of_plate("FORCE_PLATFORM", "TYPE", [6]), {}, DataFileError,
      r"cannot read it \(ezc3d says: Type 6 is not supported yet\)"),
@@ -128,7 +129,7 @@ FILES = [
     ("minus.c3d", twice, {"mapping": {"left": "plate_1-plate_2"}}, ParameterError,
      r"map: expected a limb of minus\.c3d .*, got left=plate_1-plate_2"),
     ("once.c3d", twice, {"mapping": {"left": "plate_1", "right": "plate_1"}}, ParameterError,
-     r"expected plate_1 of once\.c3d once, got it for left and for right"),
+     r"expected plate_1 of once\.c3d once, got .*left .*right"),
 ]  # fmt: skip
 """File, its content or what writes it, arguments of `read_record`, class and words of the error."""
 
@@ -172,25 +173,25 @@ OPTIONS = [
     for options, words in (
         (["--units-b", "lb"], "units: expected one of"),
         (["--reverse-b", "z"], "reverse: expected one of"),
-        (["--map-b", "left_fore=tail"], "map: expected a limb of a.csv"),
-        (["--map-b", "left_fore_force_y=Fz"], "map: expected a column of a.csv"),
+        (["--map-b", "left_fore=tail"], "map: expected a limb .*.csv"),
+        (["--map-b", "left_fore_force_y=Fz"], "map: expected a column .*.csv"),
         (["--map-b", "force_x=left_force_x"], "map: expected force_y beside"),
-        (["--map-b", "x"], "--map-b: expected a JSON object or key=value"),
+        (["--map-b", "x"], "--map-b: expected a JSON .*key=value"),
         (["--threshold", "-1"], "threshold: expected"),
-        (["--threshold", "1e5"], "expected a whole stance above 100000 N, found none"),
+        (["--threshold", "1e5"], "expected .*stance above 100000 N, found none"),
         (["--rate-b", "0"], "rate: expected"),
-        (["--rate-b", "1e9"], "rate: expected at most 20000000 samples"),
+        (["--rate-b", "1e9"], "rate: expected .*20000000 samples"),
         (["--mass-b", "-3"], "mass: expected"),
         (["--align", "best"], "align: expected one of"),
         (["--units", "lb"], "units: expected one of"),
-        (["--out", "x.jpg"], "out: expected a file that ends in .pdf, .png, .svg"),
+        (["--out", "x.jpg"], "out: expected .*.pdf, .png, .svg"),
     )
 ] + [
     (["average", "a.csv", "--out", "x.csv", "--forward", "w"],
-     "forward: expected one of -x, -y, -z, auto, x, y, z, got 'w'"),
-    (["average", "b.csv", "--out", "x.csv"], "b.csv, which says none; name it by --units-in\n"),
-    (["average", "a.csv", "--out", "x.txt"], "out: expected a file that ends in .csv"),
-    (["average", "a.csv", "--out", "b.csv"], "'b.csv' exists already; name another file, or add --overwrite"),
+     "forward: expected .*-x, -y, -z, auto, x, y, z, got 'w'"),
+    (["average", "b.csv", "--out", "x.csv"], "b.csv, .*none; name .*--units-in\n"),
+    (["average", "a.csv", "--out", "x.txt"], "out: expected .*.csv"),
+    (["average", "a.csv", "--out", "b.csv"], "'b.csv' exists already; name .*add --overwrite"),
 ]  # fmt: skip
 """Command line and words."""
 
@@ -205,7 +206,7 @@ def test_options(command, words, tmp_path, capsys, monkeypatch):
     before = {file.name: file.read_bytes() for file in tmp_path.iterdir()}
     assert cli.main(command) == 2
     said = capsys.readouterr().err
-    assert words in said
+    assert re.search(words, said), said
     assert said.count("\n") == 1
     assert {file.name: file.read_bytes() for file in tmp_path.iterdir()} == before
 
@@ -243,11 +244,11 @@ def pair(a, b, *arguments, **more):
 
 CALLS = [
     # comparing
-    (apart, ParameterError, "overlap, got 0 to 2.99 s of a.csv and 10.5 to 13.49 s of c.csv"),
+    (apart, ParameterError, "overlap, got 0 to 2.99 s .*.csv and 10.5 to 13.49 s of c.csv"),
     *(
         (lambda path, low=low, high=high: compare(part_of(path / "a.csv", 0, 2.99),
                                                   part_of(path / "b.csv", low, high)),
-         DataFileError, f"whole stance above 20 N, found none: .* cut off by {where}")
+         DataFileError, f"whole stance above 20 N, found none: .*cut off by {where}")
         for low, high, where in (
             (0.0, 0.6, r"the end \(0.6 s\)"), (0.5, 1.2, r"the start \(0.5 s\)"),
             (0.5, 0.8, r"both ends of the record \(0.5 and 0.8 s\)"),
@@ -256,23 +257,23 @@ CALLS = [
     (pair(strides(), strides(unit="BW")), ParameterError,
      r"mass-b: expected the mass \[kg\].*compare N with BW"),
     (pair(strides(), strides(scale=0.0)), DataFileError,
-     "'0.csv': expected a whole stance above 20 N, found none: the h"),
+     "'0.csv': expected .*stance above 20 N, found none: the h"),
     (pair(strides(), changed_limbs(lambda force: force + np.array([0.0, 30.0]))), DataFileError,
      "hardly falls below 30 N; subtract the plate's offset, or raise"),
     (pair(strides(), changed_limbs(np.copy, ("plate_1", "plate_2"))), ParameterError,
-     "has left, right, .* has plate_1, plate_2; name one as in"),
+     "has left, right, .*has plate_1, plate_2; name .*in"),
     (pair(strides(), strides(), "best"), ParameterError, "align: expected one of"),
     (pair(strides(**WEIGHED, weight=900.0), strides(**WEIGHED), threshold=50.0), ParameterError,
-     r"mass-b: expected the mass \[kg\] .* to know 50 N in body weights"),
+     r"mass-b: expected the mass \[kg\] .*to know 50 N in body weights"),
     (pair(strides(**WEIGHED), strides(**WEIGHED, weight=900.0), threshold=50.0), ParameterError,
      "mass-a: expected"),
     # averaging
     (mean(strides(), units="BW"), ParameterError,
-     r"mass: expected the mass \[kg\] of the animal of 1\.csv, to have N in BW"),
+     r"mass: expected the mass \[kg\] .*animal of 1\.csv, .*N in BW"),
     (mean(strides(scale=0.01)), DataFileError,
-     "0.01.csv: left: expected a whole stance above 20 N, found none: the highest"),
-    (mean(strides(), points=1), ParameterError, "points: expected a whole number, 2 or more"),
-    (mean(), ParameterError, "records: expected one file or more, got none"),
+     "0.01.csv: left: expected .*stance above 20 N, found none: the highest"),
+    (mean(strides(), points=1), ParameterError, "points: expected .*2 or more"),
+    (mean(), ParameterError, "records: expected .*got none"),
     # columns, units, bodies, writing
     *(
         (lambda _, items=items: parse_mapping("--map-b", items), ParameterError,
@@ -282,14 +283,14 @@ CALLS = [
         )
     ),
     (lambda _: in_units({}, {"weight_n": 1.0, "units": {}}, "lb"), ParameterError,
-     "units: expected one of BW, N"),
+     "units: expected .*BW, N"),
     (lambda _: limbs_of(["time"]), ParameterError, "expected a column force_y, got time"),
     *(
         (lambda _, bodies=bodies: check_bodies(bodies, [""]), ParameterError, "bodies: expected leg=BODY")
         for bodies in ({"tail": "x"}, {"leg": ""}, {"leg": 3})
     ),
     (lambda path: write_c3d(LONG, {}, path / "long.c3d"), ParameterError,
-     "at most 65535 frames of a c3d, got 70000"),
+     "at most 65535 frames .*c3d, got 70000"),
     (lambda _: JointReactions(gym.make("hoof_env/HorseLegFixed-v0", solver="paper")), ParameterError,
      "reactions: expected an environment with solver"),
 ]  # fmt: skip

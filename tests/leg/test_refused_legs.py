@@ -27,7 +27,7 @@ KLANN = load_geometry("klann")
 JANSEN = load_geometry("jansen")
 SHORT = {"CF": 0.8 * LEG.lengths["CF"]}
 ROCKER = LEG.replace(lengths=SHORT, full_turn=False)
-NUMBER = r"expected a finite number in \(0, inf\], got"
+NUMBER = r"expected .*\(0, inf\], got"
 
 
 def four_bar(**numbers):
@@ -59,31 +59,31 @@ VALUES = [
     *(
         (LEG.to_dict(), changes, ParameterError, words)
         for changes, words in (
-            ({"lengths": WITHOUT_FG}, "lengths: expected exactly .* missing FG"),
-            ({"lengths": {**LEG.lengths, "XY": 1.0}}, "lengths: expected exactly .* unknown XY"),
-            ({"lengths": {**LEG.lengths, "FG": -0.1}}, r"lengths\['FG'\]: expected .* got -0.1"),
-            ({"lengths": {**LEG.lengths, "FG": 0}}, r"lengths\['FG'\]: expected .* got 0"),
-            ({"lengths": {**LEG.lengths, "FG": np.nan}}, r"lengths\['FG'\]: expected .* got nan"),
-            ({"lengths": {**LEG.lengths, "FG": "long"}}, r"lengths\['FG'\]: expected .* got 'long'"),
+            ({"lengths": WITHOUT_FG}, "lengths: expected exactly .*missing FG"),
+            ({"lengths": {**LEG.lengths, "XY": 1.0}}, "lengths: expected exactly .*unknown XY"),
+            ({"lengths": {**LEG.lengths, "FG": -0.1}}, r"lengths\['FG'\]: expected .*got -0.1"),
+            ({"lengths": {**LEG.lengths, "FG": 0}}, r"lengths\['FG'\]: expected .*got 0"),
+            ({"lengths": {**LEG.lengths, "FG": np.nan}}, r"lengths\['FG'\]: expected .*got nan"),
+            ({"lengths": {**LEG.lengths, "FG": "long"}}, r"lengths\['FG'\]: expected .*got 'long'"),
             ({"lengths": [0.1] * 15}, "lengths: expected a mapping"),
-            ({"pivot": (0.0, np.inf)}, r"pivot\[1\]: expected .* got inf"),
+            ({"pivot": (0.0, np.inf)}, r"pivot\[1\]: expected .*got inf"),
             ({"pivot": (0.0,)}, "pivot: expected two numbers"),
             ({"pivot": 1.0}, "pivot: expected two numbers"),
-            ({"pivot": [[1.0], 1.0]}, r"pivot\[0\]: expected .* got \[1.0\]"),
+            ({"pivot": [[1.0], 1.0]}, r"pivot\[0\]: expected .*got \[1.0\]"),
             ({"assembly": {**LEG.assembly, "B": 0}}, r"assembly\['B'\]: expected \+1 or -1, got 0"),
-            ({"assembly": {"B": 1}}, "assembly: expected exactly .* missing D, E, F, I, J"),
-            ({"toe": "J"}, "toe and heel: expected I and J, one each, got 'J' and 'J'"),
+            ({"assembly": {"B": 1}}, "assembly: expected exactly .*missing D, E, F, I, J"),
+            ({"toe": "J"}, "toe and heel: expected I and J, .*got 'J' and 'J'"),
             ({"toe": ["I"]}, "toe.*: expected"),
             ({"heel": "G"}, "toe and heel: expected I and J"),
             ({"travel": 0}, r"travel: expected \+1 or -1, got 0"),
             ({"travel": [1, 1]}, "travel.*: expected"),
-            ({"hip_height": 0.0}, "hip_height: expected a finite number in"),
+            ({"hip_height": 0.0}, "hip_height: expected .*in"),
             ({"linear_density": -1.0}, "linear_density: expected"),
             ({"masses": (1.0,) * 13}, "masses: expected 14 link masses, got"),
             ({"masses": (1.0,) * 13 + (0.0,)}, r"masses\[13\]: expected"),
             ({"masses": 3.0}, "masses: expected 14 link masses"),
             ({"masses": [[1.0], 2.0]}, "masses: expected 14 link masses"),
-            ({"inertia": "sphere"}, "inertia: expected one of paper, uniform_rod, got 'sphere'"),
+            ({"inertia": "sphere"}, "inertia: expected .*paper, uniform_rod, got 'sphere'"),
             ({"name": ["l"]}, "name.*: expected"),
             ({"provenance": 3}, "provenance.*: expected"),
             ({"full_turn": 1}, "full_turn: expected True or False, got 1"),
@@ -98,14 +98,14 @@ VALUES = [
                 for value in (np.array(True), np.array("1"), bytearray(b"1"), np.complex128(1), 10**400)
             ),
             *(
-                ({"pivot": value}, f"pivot: expected two numbers .* got {re.escape(repr(value))}")
+                ({"pivot": value}, f"pivot: expected .*got {re.escape(repr(value))}")
                 for value in (np.array(1.0), np.ones((2, 2)), b"12", "12", {1.0, 2.0}, None)
             ),
             *(
                 ({"masses": value}, f"masses: expected 14 link masses, got {re.escape(repr(value))}")
                 for value in (np.array(1.0), bytearray(range(1, 15)), "1" * 14, [])
             ),
-            ({"masses": [True] * 14}, r"masses\[0\]: expected a finite number .* got True"),
+            ({"masses": [True] * 14}, r"masses\[0\]: expected .*got True"),
             ({"toe": np.array("I")}, "toe and heel: expected I and J"),
             ({"toe": None}, "toe and heel: expected I and J"),
         )
@@ -116,7 +116,7 @@ VALUES = [
         for changes, words in (
             (
                 {"mechanism": four_bar(mass=-1)},
-                r"^mechanism\.bodies\[1\]\['mass'\]: expected a finite number in \(0, inf\]",
+                r"^mechanism\.bodies\[1\]\['mass'\]: expected .*\(0, inf\]",
             ),
             (
                 {"mechanism": four_bar(centre=3)},
@@ -130,19 +130,19 @@ VALUES = [
                 {"mechanism": four_bar(mass=1), "solids": {"AC": {}}},
                 r"^solids\['AC'\]: mechanism\.bodies\[1\] has numbers of 'AC', too",
             ),
-            ({"solids": {"XX": {}}}, r"^solids: expected some of OA, AC, BC; unknown XX$"),
-            ({"solids": None}, r"^solids: expected a mapping with OA, AC, BC, got None$"),
-            ({"lengths": 3}, r"^lengths: expected a mapping with OA, AC, BC, CD, got 3$"),
+            ({"solids": {"XX": {}}}, r"^solids: expected .*OA, AC, BC; unknown XX$"),
+            ({"solids": None}, r"^solids: expected .*OA, AC, BC, got None$"),
+            ({"lengths": 3}, r"^lengths: expected .*OA, AC, BC, CD, got 3$"),
             *(
                 (
                     {"solids": {"AC": {"centre": value}}},
-                    rf"^solids\['AC'\]\['centre'\]: expected two numbers, .* got {re.escape(repr(value))}",
+                    rf"^solids\['AC'\]\['centre'\]: expected .*got {re.escape(repr(value))}",
                 )
                 for value in (np.array(1.0), b"12", (0.1,), None)
             ),
-            ({"solids": {"AC": {"inertia": np.inf}}}, r"^solids\['AC'\]\['inertia'\]: expected .* got inf"),
-            ({"solids": {"AC": 3}}, r"^solids\['AC'\]: expected a mapping with mass, .* got 3"),
-            (Z, r"^pivot\['Z'\]\[1\]: expected a finite number"),
+            ({"solids": {"AC": {"inertia": np.inf}}}, r"^solids\['AC'\]\['inertia'\]: expected .*got inf"),
+            ({"solids": {"AC": 3}}, r"^solids\['AC'\]: expected .*mass, .*got 3"),
+            (Z, r"^pivot\['Z'\]\[1\]: expected .*number"),
         )
     ),
     *(
@@ -175,7 +175,7 @@ VALUES = [
         IDENTIFIED.to_dict(),
         {"mechanism": with_a_free_body()},
         GeometryError,
-        r"mechanism.joints: .* while the crank stands: 'CB'; tie",
+        r"mechanism.joints: .*crank stands: 'CB'; tie",
     ),
 ]
 """Values of a leg, others instead, class and words of the error."""
@@ -205,7 +205,7 @@ def test_the_list_alone_does_not_tell_that_a_body_is_free():
 
 CALLS = [
     *(
-        (lambda _, make=make: make(), ParameterError, rf"{name}: expected a finite number")
+        (lambda _, make=make: make(), ParameterError, rf"{name}: expected .*number")
         for make, name in (
             (lambda: pose(LEG, np.nan), "theta"),
             (lambda: pose(LEG, 0.0, np.inf), "theta_rate"),
@@ -220,7 +220,7 @@ CALLS = [
         (
             lambda _, value=value: FrameMotion(acceleration=value),
             ParameterError,
-            rf"frame\.acceleration: expected two numbers \(x, y\), got {re.escape(repr(value))}",
+            rf"frame\.acceleration: expected .*\(x, y\), got {re.escape(repr(value))}",
         )
         for value in (1.0, np.array(1.0), (0.0, 1.0, 2.0), (), "12", b"12", None)
     ),
@@ -236,14 +236,14 @@ CALLS = [
     (
         lambda _: KLANN.pose(0.0).point("X"),
         ParameterError,
-        r"point: expected one of B, D, .*, O, P, got 'X'",
+        r"point: expected .*B, D, .*, O, P, got 'X'",
     ),
     # entries of a leg
     (lambda _: LEG.replace(lengths={"XY": 1.0}), ParameterError, "unknown XY"),
     (
         lambda _: Geometry.from_dict({name: each for name, each in LEG.to_dict().items() if name != "toe"}),
         ParameterError,
-        r"geometry: expected exactly .* and perhaps .*; missing toe",
+        r"geometry: expected exactly .*; missing toe",
     ),
     (
         lambda _: leg_with_everything(solids={"plate": {"mass": 0.0}}),
@@ -272,13 +272,13 @@ CALLS = [
         (
             lambda _, factor=factor: LEG.scaled(factor),
             ParameterError,
-            r"lengths\['..'\]: expected a finite number in \[0.001, 1000\]",
+            r"lengths\['..'\]: expected .*\[0.001, 1000\]",
         )
         for factor in (1e-4, 1e4)
     ),
     # masses of a limb
     *(
-        (call, ParameterError, f"^limb: expected one of fore, hind, got {limb!r}")
+        (call, ParameterError, f"^limb: expected .*fore, hind, got {limb!r}")
         for limb in ("middle", "Fore", None, 1)
         for call in (
             lambda _, limb=limb: segment_masses(limb),
@@ -316,8 +316,8 @@ CALLS = [
             ({"motor": True}, "motor: expected a Motor"),
             ({"motor": Motor}, "motor: expected a Motor"),
             ({"ground": 0.4}, "ground: expected a Ground"),
-            ({"path": "leg.urdf"}, "path: expected a file that ends in .xml"),
-            ({"path": 3}, r"path: expected the path of a file .*, got 3"),
+            ({"path": "leg.urdf"}, "path: expected .*.xml"),
+            ({"path": 3}, r"path: expected the path .*, got 3"),
         )
     ),
     # what a leg is for
@@ -339,13 +339,13 @@ CALLS = [
     (
         lambda _: TrunkEngine([Limb(IDENTIFIED), Limb(JANSEN, (0.5, 0.0))], Trunk(kind="free", height=1.6)),
         ParameterError,
-        r"limbs\[1\].geometry: expected the mechanism of the first leg",
+        r"limbs\[1\].geometry: expected the mechanism .*leg",
     ),
     # presets that are written
     (
         lambda folder: LEG.save(folder / "mine.txt"),
         ParameterError,
-        r"path: expected a file that ends in \.json, got .*mine\.txt",
+        r"path: expected .*\.json, got .*mine\.txt",
     ),
     (lambda folder: LEG.save(folder / "file" / "mine.json"), OutputError, "cannot write to"),
     *(
@@ -357,10 +357,10 @@ CALLS = [
                 r"gaits\['trot'\]\['crank_speed'\]: expected .*fast",
             ),
             ({"gaits": ["walk"]}, "gaits: expected a mapping"),
-            ({"gaits": {5: {"crank_speed": 1.0}}}, "gaits: expected names that are texts, got 5"),
-            ({"gaits": {"trot": {5: 1.0}}}, r"gaits\['trot'\]: expected names that are texts, got 5"),
-            ({"gaits": {"trot": {}}}, r"gaits\['trot'\]: expected numbers by name, got {}"),
-            ({"ground": 1.4}, "ground: expected a mapping with stiffness, exponent, got 1.4"),
+            ({"gaits": {5: {"crank_speed": 1.0}}}, "gaits: expected names .*texts, got 5"),
+            ({"gaits": {"trot": {5: 1.0}}}, r"gaits\['trot'\]: expected names .*texts, got 5"),
+            ({"gaits": {"trot": {}}}, r"gaits\['trot'\]: expected .*name, got {}"),
+            ({"ground": 1.4}, "ground: expected .*stiffness, exponent, got 1.4"),
             *(
                 (
                     {"ground": {"exponent": value}},
@@ -374,7 +374,7 @@ CALLS = [
         (
             lambda _, path=path: LEG.save(path),
             ParameterError,
-            rf"path: expected the path of a file that ends in \.json, got {re.escape(repr(path))}",
+            rf"path: expected the path .*\.json, got {re.escape(repr(path))}",
         )
         for path in (3, None, True, b"leg.json", ["leg.json"])
     ),

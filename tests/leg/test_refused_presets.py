@@ -31,19 +31,19 @@ FILES = [
             ("{", "does not parse"),
             ("[" * 100_000, "does not parse"),
             (b"\xff\xfe\x00\x80", "does not parse"),
-            ("[]", "expected a JSON object with 'geometry' and 'gaits', got list"),
+            ("[]", "expected a JSON .*'geometry' and 'gaits', got list"),
             ("{}", r"leg\.json: expected an entry 'provenance' .*; found nothing"),
             ('{"geometry": {}, "gaits": {}}', "expected an entry 'provenance' .*; found geometry, gaits"),
             ('{"geometry": {}, "provenance": 3}', "expected an entry 'provenance' .*; got 3"),
-            ('{"provenance": ""}', "expected an entry 'geometry' .*, an object; found provenance"),
-            ('{"provenance": "", "geometry": 3}', "expected an entry 'geometry' .*, an object; got 3"),
+            ('{"provenance": ""}', "expected an entry 'geometry' .*found provenance"),
+            ('{"provenance": "", "geometry": 3}', "expected an entry 'geometry' .*got 3"),
             (
                 '{"provenance": "", "geometry": {"pivot": 3}}',
                 r"leg\.json: geometry: .*; missing assembly, heel,",
             ),
             (
                 '{"provenance": "", "colour": "bay"}',
-                r"leg\.json: unknown entries colour; expected some of prov",
+                r"leg\.json: unknown entries colour; expected .*prov",
             ),
             (edited(colour="bay"), r"leg\.json: geometry: expected exactly .*; unknown colour$"),
         )
@@ -70,16 +70,16 @@ def test_a_folder_is_no_file(tmp_path):
 
 PRESETS = [
     *(
-        (lambda given=given: load_geometry(given), "preset: expected one of fourbar, .* got")
+        (lambda given=given: load_geometry(given), "preset: expected .*fourbar, .*got")
         for given in (3, None, True, ["klann"], np.zeros(2), b"klann", "")
     ),
     (
         lambda: load_geometry("first_fit"),
-        "preset: expected one of fourbar, identified, jansen, klann, got 'first_fit'",
+        "preset: expected .*fourbar, identified, jansen, klann, got 'first_fit'",
     ),
     (
         lambda: load_geometry({**CONTENT, "colour": "bay"}),
-        "preset: unknown entries colour; expected some of provenance, ",
+        "preset: unknown entries colour; expected .*provenance, ",
     ),
     (
         lambda: load_geometry({name: CONTENT[name] for name in ("geometry", "gaits")}),
@@ -87,7 +87,7 @@ PRESETS = [
     ),
     (
         lambda: load_gait("walk", {**CONTENT, "gaits": {5: CONTENT["gaits"]["walk"]}}),
-        "gaits: expected names that are texts",
+        "gaits: expected names .*texts",
     ),
     (
         lambda: load_geometry({**CONTENT, "geometry": {**BARE, "colour": "bay"}}),

@@ -125,10 +125,10 @@ def test_a_stamp_says_nothing_else_than_the_environment(env, tmp_path):
     write(path)
     before = path.read_bytes()
     for entry in ("env_id", "actions", "settings", "hoof_env"):
-        with pytest.raises(ParameterError, match=rf"besides those that are read off env, got \['{entry}'\]"):
+        with pytest.raises(ParameterError, match=rf"besides those .*read off env, got \['{entry}'\]"):
             hoof_env.stamp_onnx(path, env, **{entry: "other"})
     for value in (3, None, ["ppo"]):
-        with pytest.raises(ParameterError, match=r"algo: expected a text, as in seed=\"3\", got"):
+        with pytest.raises(ParameterError, match=r"algo: expected .*seed=\"3\", got"):
             hoof_env.stamp_onnx(path, env, algo=value)
     assert path.read_bytes() == before
 
@@ -143,7 +143,7 @@ def test_arguments_that_are_no_file_or_no_environment(env, tmp_path):
         with pytest.raises(ParameterError, match=r"env: expected a single environment made by"):
             hoof_env.stamp_onnx(path, given)
     for given in (other, 3, tmp_path):
-        with pytest.raises(ParameterError, match=r"path: expected that of a file that ends in \.onnx, got"):
+        with pytest.raises(ParameterError, match=r"path: expected .*\.onnx, got"):
             hoof_env.stamp_onnx(given, env)
 
 

@@ -133,7 +133,7 @@ def test_letters_survive_whoever_quits_pygame(quit):
 
 
 def test_bad_input_is_named():
-    with pytest.raises(ParameterError, match=r"render_mode: expected one of human, rgb_array, got 'ansi'"):
+    with pytest.raises(ParameterError, match=r"render_mode: expected .*human, rgb_array, got 'ansi'"):
         renderer("ansi")
     for size in ((960,), (100, 100), (9000, 540), (960, 10**9), (960.5, 540), "wide", None):
         with pytest.raises(ParameterError, match="size: expected"):

@@ -1,5 +1,6 @@
 """Files of machine code: written at once, never out of date, not read if others could have written them."""
 
+import ast
 import os
 import re
 import shutil
@@ -103,6 +104,60 @@ def test_an_edit_is_compiled_and_going_back_is_not(place):
         assert ended(start_python(CALL, place))[0] == wanted
         shutil.rmtree(place / "__pycache__", ignore_errors=True)
     assert len(files(place)) == 2
+
+
+ENVIRONMENTS = """
+import hoof_env
+import gymnasium as gym
+from hoof_env.simd.compile import COMPILED
+
+for name in ("HorseLeg", "HorseLegFixed"):
+    env = gym.make(f"hoof_env/{name}-v0")
+    env.reset(seed=0)
+    env.step(env.action_space.sample())
+print(hoof_env.__file__)
+print(*COMPILED)
+"""
+
+
+def with_longer_docstrings(source):
+    """Add a line to every docstring of a module."""
+    lines = source.splitlines(keepends=True)
+    nodes = (node for node in ast.walk(ast.parse(source)) if isinstance(node, ast.Expr))
+    ends = {node.end_lineno for node in nodes if ast.get_source_segment(source, node).endswith('"""')}
+    return "".join(
+        line.replace('"""\n', '\n\nOne more line.\n"""\n')
+        if number in ends and line.endswith('"""\n')
+        else line
+        for number, line in enumerate(lines, 1)
+    )
+
+
+def test_docstrings_and_line_numbers_compile_nothing(tmp_path):
+    """Each docstring of the package gains a line, which also moves the code below it."""
+    package = tmp_path / "hoof_env"
+    shutil.copytree(
+        objects.__file__.partition("simd")[0], package, ignore=shutil.ignore_patterns("__pycache__")
+    )
+    variables = {"PYTHONPATH": str(tmp_path), "PYTHONSAFEPATH": "1", "PYTHONDONTWRITEBYTECODE": "1"}
+
+    def compiled():
+        place, *names = ended(start_python(ENVIRONMENTS, tmp_path, **variables))[0].splitlines()
+        assert Path(place).is_relative_to(tmp_path)
+        return names[0].split() if names else []
+
+    assert "step_one" in compiled()
+    edited = 0
+    for path in package.rglob("*.py"):
+        source = path.read_text(encoding="utf-8")
+        longer = with_longer_docstrings(source)
+        edited += longer.count("One more line.")
+        path.write_text(longer, encoding="utf-8")
+    assert edited > 1000
+    assert compiled() == []
+    rewards = package / "tasks" / "reward.py"
+    rewards.write_text(rewards.read_text(encoding="utf-8").replace("BEARING = 0.9", "BEARING = 0.8"), "utf-8")
+    assert "step_one" in compiled()
 
 
 def test_the_name_is_the_digest_of_text_processor_and_llvm(own, monkeypatch):

@@ -105,7 +105,7 @@ def test_four_conditions_play_side_by_side():
     with pytest.raises(HoofEnvError, match="records"):
         Playback("nothing", [])
     short = {"env_id": LEG, "arguments": {"episode_seconds": 0.1}}
-    with pytest.raises(ParameterError, match="skip: expected less than the episode takes, got 2 s"):
+    with pytest.raises(ParameterError, match=r"skip: expected less .*episode takes, got 2 s"):
         Playback.play(short, skip=2.0)
 
 

@@ -3,12 +3,24 @@ integrated."""
 
 from __future__ import annotations
 
+from typing import Any, NamedTuple
+
 import numpy as np
 
 from hoof_env.constants import GRAVITY
 from hoof_env.dynamics.engine import TrunkEngine
-from hoof_env.dynamics.parts import Motor, Tally
+from hoof_env.dynamics.parts import Motor
 from hoof_env.leg.profile import by_name, cross
+
+
+class Tally(NamedTuple):
+    """Sums over all bodies of an engine, shape (num_envs,) each."""
+
+    centre: Any  # common centre of mass, complex [m]
+    momentum: Any  # complex [kg m/s]
+    spin: Any  # angular momentum about the centre [kg m^2/s]
+    kinetic: Any  # rotors included [J]
+    potential: Any  # of weight and, on a suspended trunk, of spring and support [J]
 
 
 def tally_of(engine: TrunkEngine) -> Tally:
