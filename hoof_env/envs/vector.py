@@ -516,7 +516,10 @@ class HorseLegVectorEnv(LegBase, VectorEnv[NDArray[np.float32], NDArray[np.float
         self._check_state(state, "ended")
         n = self.num_envs
         states = state["generator"]
-        ended = array_of("state['ended']", state["ended"]).copy()
+        try:
+            ended = np.array(state["ended"])
+        except (TypeError, ValueError):
+            ended = np.empty(0, object)  # refused below
         if ended.dtype != bool or ended.ndim != 1:
             raise ParameterError(
                 f"state['ended']: expected a bool array of shape ({n},), got {state['ended']!r}"

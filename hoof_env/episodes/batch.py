@@ -622,6 +622,7 @@ class EpisodeBatch:
 
     def __setstate__(self, state: dict[str, Any]) -> None:
         vars(self).update(state)
+        self.rows.open(self.plan.layout)
         self._open()
 
     def __deepcopy__(self, memo: dict[int, Any]) -> EpisodeBatch:

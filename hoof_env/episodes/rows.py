@@ -76,11 +76,12 @@ class Rows:
     named: Any = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
-        self.open()
+        self.open(self.layout)
 
-    def open(self) -> None:
-        """Find the views of the episodes' memory, after the array was replaced."""
-        self.named = views(self.layout, self.episode)
+    def open(self, layout: Any) -> None:
+        """Find the views of the episodes' memory, in rows that come from a pickle."""
+        self.layout = layout
+        self.named = views(layout, self.episode)
 
     # Operations by declaration
 
@@ -114,12 +115,9 @@ class Rows:
         return Rows(**{**given, **{name: array.copy() for name, array in arrays.items()}})
 
     def __getstate__(self) -> dict[str, Any]:
-        """Return the fields for a pickle: without the views, which belong to one process."""
-        return {name: value for name, value in vars(self).items() if name != "named"}
-
-    def __setstate__(self, state: dict[str, Any]) -> None:
-        vars(self).update(state)
-        self.open()
+        """Return the fields for a pickle: without layout and views, whose classes are of one process. The
+        rows then need `open`."""
+        return {name: value for name, value in vars(self).items() if name not in ("layout", "named")}
 
 
 ARRAYS: dict[str, Declared] = {

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from hoof_env.episodes.batch import EpisodeBatch
 from hoof_env.episodes.row_plans import RowPlans
-from hoof_env.episodes.rows import ARRAYS, repeated
+from hoof_env.episodes.rows import repeated
 from hoof_env.errors import ParameterError
 from hoof_env.tasks.disturbances import MOST_PUSH, Push
 from hoof_env.tasks.settings import Settings
@@ -55,8 +55,8 @@ def spread_state(batch: EpisodeBatch, state: Mapping[str, Any]) -> dict[str, Any
         if np.shape(state["episode"])[-1] != 1:
             raise ValueError
         spread = {**state, "engine": batch.engine.repeated(state["engine"], n)}
-        of_rows = [name for name in ARRAYS if name in state]
-        spread |= {name: repeated(name, state[name], n) for name in of_rows if name != "pushes"}
+        of_rows = [*batch.rows.saved(), "observations"]
+        spread |= {name: repeated(name, state[name], n) for name in of_rows if name in state}
         if "pushes" in state:
             spread["pushes"] = [*state["pushes"]] * n
         if "rows" in state:

@@ -41,7 +41,13 @@ def test_every_array_has_the_rows_on_its_axis(rows):
         assert rows.get(name).shape[ARRAYS[name].axis] == 3, name
 
 
-@pytest.mark.parametrize("copied", [lambda rows: rows.copy(), lambda rows: pickle.loads(pickle.dumps(rows))])
+def unpickled(rows):
+    made = pickle.loads(pickle.dumps(rows))
+    made.open(rows.layout)
+    return made
+
+
+@pytest.mark.parametrize("copied", [lambda rows: rows.copy(), unpickled])
 def test_copies_have_arrays_of_their_own(rows, copied):
     made = copied(rows)
     for name, array in arrays_of(rows).items():
