@@ -39,7 +39,6 @@ LONGEST = (
     "test_setup.py",
     "test_site.py",
     "envs/test_refused_tasks.py",
-    "agents/test_soft_landing.py",
     "agents/test_demo.py",
     "view/test_tab.py",
     "paper/test_figures.py",

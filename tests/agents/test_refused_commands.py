@@ -14,14 +14,11 @@ import torch
 from agents import (
     baselines,
     baselines_run,
-    carry_over,
     command,
     dataset,
     demo,
     distribute,
-    falls,
     judge,
-    legs,
     open_loop,
     ship,
     stock,
@@ -253,20 +250,6 @@ CASES = [
     ),
     judges(
         r"--froude: expected a finite number in \(0, inf\], got -1", "reference", "--froude", "-1"
-    ),
-    case(lambda _: falls.main(["--strengths", "11"]), "--strengths: expected .* got 11"),
-    case(lambda folder: carry_over.main(["--strengths", "0", "--out", str(folder)]), "--strengths"),
-    case(
-        lambda folder: carry_over.main([AGENT, "--out", str(folder)]),
-        "expected the columns",
-        DataFileError,
-        **{carry_over.TABLE: "a,b\n1,2\n"},
-    ),
-    case(
-        lambda folder: legs.read_gaits(folder / "gaits.json"),
-        r"gaits.json: expected the gaits of agents.legs --search",
-        DataFileError,
-        **{"gaits.json": '{"jansen": {}}'},
     ),
     *(
         collects("dataset_id: expected NAMESPACE/NAME-vK", "run", "--dataset-id", name)
