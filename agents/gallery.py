@@ -21,9 +21,9 @@ import numpy as np
 from agents import runs
 from agents.cards import FILM, POLICIES
 from agents.command import run
-from agents.stock import OUT as CURVES
-from agents.stock_page import at
-from agents.stock_plan import TUNED, read_curves
+from agents.experiments.curves import PUBLISHED as CURVES
+from agents.experiments.curves import TUNED, read_curves
+from agents.experiments.stock_page import at
 from hoof_env.envs.manual import RETURNS, STILL
 from hoof_env.envs.policies import STANDS_FOR
 from hoof_env.envs.shipped import shipped_returns

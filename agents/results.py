@@ -396,7 +396,8 @@ def stock_row(env_id: str) -> Row:
     return Row(
         env_id, "stock", "", _sha(CURVES.read_bytes()), _FINAL,
         {"return": float(iqm(list(last.values()))[0])}, {"return": None}, last, {"steps": steps},
-        f"python -m agents.stock --env-id {env_id} --algo ppo", ", ".join(commits), {},
+        f"python -m agents.experiments --plan stock --only ppo-{env_id.rpartition('/')[2]}",
+        ", ".join(commits), {},
         "interquartile mean over seeds of the last return on the learning curves; no policy is kept",
     )  # fmt: skip
 

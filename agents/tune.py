@@ -4,7 +4,7 @@
     python -m agents.tune --trials 60 --steps 1500000          the same study goes on until it has 60
     optuna trials --storage sqlite:///runs/tune/ppo-HorseLeg-v0/study.db --study-name study
 
-A trial draws settings from agents/studies/spaces.yml, trains by agents.train with a seed of its own, and is
+A trial draws settings from agents/search_spaces.yml, trains by agents.train with a seed of its own, and is
 scored as it goes on 64 episodes with which no training starts; a bad one is pruned. Ctrl-C ends the trial in
 hand; the same command goes on, even after kill -9, when the trial that was killed is run again. One process
 works on a study. Its folder holds study.db (Optuna's), best.yml (for --hyperparams of agents.train) and
@@ -31,7 +31,7 @@ from agents.train import checked, make_model, make_record, train
 from agents.watch import DivergedError, EndedError, Scorer
 from hoof_env.errors import DataFileError, ParameterError, check_number, parse_json
 
-SPACES = Path(__file__).parent / "studies" / "spaces.yml"
+SPACES = Path(__file__).with_name("search_spaces.yml")
 SEEDS = range(1000, 1064)  # scored episodes; trainings start theirs from other seeds
 
 
@@ -52,7 +52,7 @@ class Args(TrainingArgs):
 
 
 def load_space(path: Path, algo: str) -> dict[str, Any]:
-    """Return the ranges of `algo` in a file like agents/studies/spaces.yml: key to a list, or to a mapping
+    """Return the ranges of `algo` in a file like agents/search_spaces.yml: key to a list, or to a mapping
     with "uniform" or "log" [low, high] and perhaps "lin".
 
     Raises:

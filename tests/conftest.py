@@ -48,7 +48,7 @@ LONGEST = (
     "dynamics/test_animal.py",
     "test_typing.py",
     "ecosystem/test_gymnasium.py",
-    "agents/test_stock.py",
+    "agents/test_experiments.py",
     "test_cli.py",
     "envs/test_rewards_of_tasks.py",
     "paper/test_legs_that_fit.py",
