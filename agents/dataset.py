@@ -33,7 +33,7 @@ from tyro.conf import Positional
 
 import hoof_env
 from agents import runs
-from agents.command import parse_pairs, run
+from agents.command import parse, parse_pairs, run
 from hoof_env.envs.policies import start_of
 from hoof_env.errors import DataFileError, MissingExtraError, OutputError, ParameterError, count
 from hoof_env.gait import GaitParameters
@@ -70,9 +70,7 @@ class Args:
 
 def main(argv: list[str] | None = None) -> None:
     """Write a dataset."""
-    import tyro
-
-    args = tyro.cli(Args, args=argv, prog="python -m agents.dataset", description=__doc__)
+    args = parse(Args, argv, "python -m agents.dataset", __doc__)
     print(f"written: {write(args)}")
 
 

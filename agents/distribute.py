@@ -24,7 +24,7 @@ from typing import Any, Literal
 from tyro.conf import Positional
 
 from agents import runs
-from agents.command import parse_pairs, run
+from agents.command import parse, parse_pairs, run
 from agents.settings import ENV, TrainingArgs, algorithm_class
 from agents.train import Args as TrainArgs
 from agents.train import checked
@@ -226,9 +226,7 @@ def start(args: Cluster) -> None:
 
 def main(argv: list[str] | None = None) -> int:
     """Run the trials and return the exit code."""
-    import tyro
-
-    return run_trials(tyro.cli(Trials, args=argv, prog="python -m agents.distribute", description=__doc__))
+    return run_trials(parse(Trials, argv, "python -m agents.distribute", __doc__))
 
 
 if __name__ == "__main__":

@@ -26,7 +26,7 @@ import torch
 from tyro.conf import Positional
 
 from agents import runs
-from agents.command import run
+from agents.command import parse, run
 from hoof_env._output import check_new, new_file
 from hoof_env.errors import DataFileError, HoofEnvError, ParameterError
 from hoof_env.policies.onnx_file import INPUT, LISTS, OUTPUT, OnnxPolicy
@@ -233,9 +233,7 @@ def difference(trained: Any, predict: Any, observations: Any) -> float:
 
 def main(argv: list[str] | None = None) -> None:
     """Export, and print the difference."""
-    import tyro
-
-    args = tyro.cli(Args, args=argv, prog="python -m agents.export", description=__doc__)
+    args = parse(Args, argv, "python -m agents.export", __doc__)
     off = export(args.model, args.out, args.env_id, args.overwrite)
     print(
         f"written: {args.out} ({args.out.stat().st_size / 1000:.0f} kB); on {TRIED} random observations its "

@@ -20,7 +20,7 @@ import numpy as np
 
 from agents import runs
 from agents.cards import FILM, POLICIES
-from agents.command import run
+from agents.command import parse, run
 from agents.experiments.curves import PUBLISHED as CURVES
 from agents.experiments.curves import TUNED, read_curves
 from agents.experiments.stock_page import at
@@ -123,9 +123,7 @@ def returns_of(env_id: str, random: float) -> dict[str, Any]:
 
 def main(argv: list[str] | None = None) -> None:
     """Write stills and returns."""
-    import tyro
-
-    args = tyro.cli(Args, args=argv, prog="python -m agents.gallery", description=__doc__)
+    args = parse(Args, argv, "python -m agents.gallery", __doc__)
     path = args.out / RETURNS
     returns = {}
     for folder in sorted(card.parent for card in args.out.glob("*/card.md")):

@@ -23,7 +23,7 @@ import numpy as np
 from tyro.conf import Positional
 
 from agents import runs
-from agents.command import run
+from agents.command import parse, run
 from agents.gait_figures import SETTLED
 from agents.horse_gaits import speed_of
 from agents.statistics import described
@@ -144,9 +144,7 @@ def tell(what: str, figures: Mapping[str, Mapping[str, float]]) -> None:
 
 def main(argv: list[str] | None = None) -> None:
     """Play and write."""
-    import tyro
-
-    args = tyro.cli(Args, args=argv, prog="python -m agents.horse_figures", description=__doc__)
+    args = parse(Args, argv, "python -m agents.horse_figures", __doc__)
     seeds = FINAL_SEEDS[: count("--episodes", args.episodes, most=len(FINAL_SEEDS))]
     envs = make_rows(ENV_ID, len(seeds))
     with runs.make_env(ENV_ID) as env:

@@ -23,7 +23,7 @@ from gymnasium.vector import AutoresetMode
 from numpy.typing import NDArray
 
 from agents import gait_figures, runs
-from agents.command import run
+from agents.command import parse, run
 from agents.evolution import generations, make_strategy, mean_costs, require
 from hoof_env.constants import GRAVITY
 from hoof_env.envs.policies import make_policy
@@ -423,9 +423,7 @@ def shipped(searches: dict[str, Any]) -> dict[str, Any]:
 
 def main(argv: list[str] | None = None) -> None:
     """Find gaits."""
-    import tyro
-
-    args = tyro.cli(Args, args=argv, prog="python -m agents.horse_gaits", description=__doc__)
+    args = parse(Args, argv, "python -m agents.horse_gaits", __doc__)
     finder = Finder(args)
     finder.family("free")
     finder.family("trot-like", TROT_FROUDE, LAG)

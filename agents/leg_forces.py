@@ -24,7 +24,7 @@ from numpy.typing import NDArray
 from tyro.conf import Positional
 
 from agents import runs
-from agents.command import run
+from agents.command import parse, run
 from agents.gait_figures import SETTLED
 from agents.statistics import described
 from hoof_env.errors import ParameterError, count
@@ -166,9 +166,7 @@ def over_episodes(episodes: Sequence[Mapping[str, float]]) -> dict[str, dict[str
 
 def main(argv: list[str] | None = None) -> None:
     """Play and write."""
-    import tyro
-
-    args = tyro.cli(Args, args=argv, prog="python -m agents.leg_forces", description=__doc__)
+    args = parse(Args, argv, "python -m agents.leg_forces", __doc__)
     seeds = FINAL_SEEDS[: count("--episodes", args.episodes, most=len(FINAL_SEEDS))]
     policies = {}
     with runs.make_env(ENV_ID) as env:

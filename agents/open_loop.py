@@ -31,7 +31,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from agents import runs
-from agents.command import parse_pairs, run
+from agents.command import parse, parse_pairs, run
 from agents.evolution import generations, make_strategy, mean_costs, require
 from hoof_env._output import check_folder
 from hoof_env.envs.open_loop import COMMAND, GAIT, gait_file, open_loop, open_loop_record
@@ -526,9 +526,7 @@ def place(args: Args) -> Path:
 
 def main(argv: list[str] | None = None) -> None:
     """Search, and print the searches and the score."""
-    import tyro
-
-    args = tyro.cli(Args, args=argv, prog="python -m agents.open_loop", description=__doc__)
+    args = parse(Args, argv, "python -m agents.open_loop", __doc__)
     content = optimise(args)
     for restart in content["restarts"]:
         end = "stalled" if restart["stalled"] else "most episodes spent"

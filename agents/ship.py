@@ -28,7 +28,7 @@ from tyro.conf import Positional
 
 from agents import runs
 from agents.cards import CARD, FILM, POLICIES, SCORE, card
-from agents.command import run
+from agents.command import parse, run
 from agents.export import write_policy
 from agents.pages import draw_learning_curve, training_length
 from hoof_env._output import check_folder, markdown_table, staged
@@ -71,7 +71,7 @@ class Args:
 
     runs: Positional[Path]
     """a run folder of agents.train, or a folder with several beneath it"""
-    ids: tuple[str, ...] = ()
+    env_id: tuple[str, ...] = ()
     """only these ids"""
     out: Path = POLICIES
     """folder for the policies' folders; in another one than this they have all files"""
@@ -298,9 +298,7 @@ def write_index(folder: Path, scores: Path) -> None:
 
 def main(argv: list[str] | None = None) -> None:
     """Choose and ship the policy of each id."""
-    import tyro
-
-    args = tyro.cli(Args, args=argv, prog="python -m agents.ship", description=__doc__)
+    args = parse(Args, argv, "python -m agents.ship", __doc__)
     models = find_runs(args.runs)
     sources = {env_id: env_id for env_id in models}
     # An id without a training of its own may be played by another's policy
@@ -309,7 +307,7 @@ def main(argv: list[str] | None = None) -> None:
         for env_id, trained_on in STANDS_FOR.items()
         if env_id not in models and trained_on in models
     }
-    ids = [check_choice("ids", env_id, sources) for env_id in args.ids] or list(sources)
+    ids = [check_choice("env_id", env_id, sources) for env_id in args.env_id] or list(sources)
     check_folder(args.out)
     choices = {source: choose(models[source], source) for source in {sources[env_id] for env_id in ids}}
     for env_id in ids:
@@ -318,7 +316,9 @@ def main(argv: list[str] | None = None) -> None:
         write_index(args.out, SHIPPED if args.out == POLICIES else args.out)
         print(f"{env_id}: " + ", ".join(f"{name} {value:.2f}" for name, value in means.items()), flush=True)
     if args.out == POLICIES:
-        print("next: python -m agents.results score NAME shipped --runs RUNS, for each; then ... pages")
+        print(
+            "next: python -m agents.results score shipped --env-id ID --runs RUNS, for each; then ... pages"
+        )
 
 
 if __name__ == "__main__":

@@ -24,7 +24,7 @@ from typing import Any
 import yaml
 
 from agents import runs
-from agents.command import parse_pairs, run
+from agents.command import parse, parse_pairs, run
 from agents.settings import FOLDER, TrainingArgs, load_settings
 from agents.train import Args as TrainArgs
 from agents.train import checked, make_model, make_record, train
@@ -291,9 +291,7 @@ def write_best(study: Any, folder: Path, env_id: str) -> None:
 
 def main(argv: list[str] | None = None) -> None:
     """Search, and print the number of trials."""
-    import tyro
-
-    args = tyro.cli(Args, args=argv, prog="python -m agents.tune", description=__doc__)
+    args = parse(Args, argv, "python -m agents.tune", __doc__)
     study = tune(args)
     print(f"{args.algo} on {args.env_id}: {len(finished(study))} trials")
 

@@ -17,6 +17,7 @@ from pathlib import Path
 from hoof_env._output import bear_any_output, flush_or_drop
 from hoof_env._version import __version__
 from hoof_env.commands.lab import average, compare
+from hoof_env.commands.options import parse
 from hoof_env.commands.played import USUAL, Played
 from hoof_env.commands.policies import demo, evaluate, list_ids
 from hoof_env.commands.said import say as _say
@@ -75,7 +76,7 @@ def render(
     check_place(out, FFMPEG)
     with new_file(out, overwrite) as file:
         count = render_episode(
-            file, episode.policy, episode.id, episode.args, episode.seed, seconds, slow, fps, size
+            file, episode.policy, episode.env_id, episode.env_kwargs, episode.seed, seconds, slow, fps, size
         )
     _say(f"{out}: {count} frames, {count / fps:.1f} s, {_size(out)}{made}")
 
@@ -101,7 +102,7 @@ def view(
     """
     from hoof_env.view.server import view
 
-    view(episode.id, episode.args, episode.policy, episode.seed, address, port, open, out, host)
+    view(episode.env_id, episode.env_kwargs, episode.policy, episode.seed, address, port, open, out, host)
 
 
 def export(
@@ -139,8 +140,8 @@ def export(
         rows, weight = export_episode(
             file,
             episode.policy,
-            episode.id,
-            episode.args,
+            episode.env_id,
+            episode.env_kwargs,
             episode.seed,
             seconds,
             threshold,
@@ -152,18 +153,18 @@ def export(
     _say(f"{out}: {rows} rows, 1 BW = {weight:.1f} N, {_size(out)}{others}{made}")
 
 
-def manual(id: str = "hoof_env/HorseLeg-v0", out: Path | None = None, films: Path | None = None) -> None:
+def manual(env_id: str = "hoof_env/HorseLeg-v0", out: Path | None = None, films: Path | None = None) -> None:
     """Print the manual page of an environment, or write the pages of all environments.
 
     Args:
-        id: id of the environment.
+        env_id: id of the environment.
         out: folder for a page of each id, and their index; made if it is missing.
         films: folder of trained policies, as agents/policies, whose films the pages show; with `out`.
     """
     from hoof_env.envs.manual import page_of, write_pages
 
     if out is None:
-        _say(page_of(id))
+        _say(page_of(env_id))
         return
     written = len(write_pages(out, films))
     _say(f"{written} files written; read {out / 'README.md'} first")
@@ -253,19 +254,13 @@ def main(arguments: Sequence[str] | None = None) -> int:
     if options == ["--version"]:
         _say(f"hoof-env {__version__}")
         return 0
-    # For --id module:..., as `python -m hoof_env` has it; last, so that no file there hides another module.
+    # For --env-id module:..., as `python -m hoof_env` has it; last, so that no file there hides a module.
     if not {"", os.getcwd()} & set(sys.path):
         sys.path.append(os.getcwd())
     try:
-        import tyro
-
+        about = "A horse's leg, or a horse, on the ground. --version prints the version."
         with _warnings_of_one_line():
-            tyro.extras.subcommand_cli_from_dict(
-                COMMANDS,
-                prog="hoof-env",
-                description="A horse's leg, or a horse, on the ground. --version prints the version.",
-                args=options,
-            )
+            parse(COMMANDS, options, "hoof-env", about)
         sys.stdout.flush()
     except HoofEnvError as error:
         print(f"hoof-env: error: {error}", file=sys.stderr)

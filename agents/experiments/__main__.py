@@ -22,7 +22,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from agents.command import run
+from agents.command import parse, run
 from agents.experiments import baselines_page, curves, runner, stock_page
 from agents.experiments.outcomes import is_done, read_outcome
 from agents.experiments.plans import FOLDERS, Entry, Plan, Run, load_plan, runs_of
@@ -125,14 +125,13 @@ def write_page(args: Args) -> Path:
 
 def main(argv: list[str] | None = None) -> int:
     """Train all, write the page and return the exit code."""
-    import tyro
 
     # SIGTERM ends the trainings as Ctrl-C does, each with a checkpoint
     def interrupt(*_: Any) -> None:
         raise KeyboardInterrupt
 
     signal.signal(signal.SIGTERM, interrupt)
-    args = tyro.cli(Args, args=argv, prog="python -m agents.experiments", description=__doc__)
+    args = parse(Args, argv, "python -m agents.experiments", __doc__)
     failed = train_planned(args) if args.train else []
     if args.page:
         print(f"written: {write_page(args)}")

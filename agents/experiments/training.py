@@ -19,7 +19,7 @@ from pathlib import Path
 from typing import Any
 
 from agents import runs
-from agents.command import parse_pairs, run
+from agents.command import parse, parse_pairs, run
 from agents.settings import FOLDER, TrainingArgs, load_settings
 from agents.train import Args as TrainArgs
 from agents.train import train
@@ -178,11 +178,7 @@ def read_curve(path: Path) -> list[dict[str, float]]:
 
 def main(argv: list[str] | None = None) -> int:
     """Train, and return the exit code."""
-    import tyro
-
-    done = train_one(
-        tyro.cli(Args, args=argv, prog="python -m agents.experiments.training", description=__doc__)
-    )
+    done = train_one(parse(Args, argv, "python -m agents.experiments.training", __doc__))
     print("done" if done else "interrupted; the same command goes on")
     return 0 if done else 130
 

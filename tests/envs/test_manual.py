@@ -133,13 +133,13 @@ def test_a_policy_without_a_film_is_named(tmp_path, capsys):
 
 
 def test_a_page_is_printed(capsys):
-    assert cli.main(["manual", "--id", IDS["rail"]]) == 0
+    assert cli.main(["manual", "--env-id", IDS["rail"]]) == 0
     assert capsys.readouterr().out.strip() == manual.page("rail").strip()
 
 
 def test_unknown_pages_and_folders_are_one_line(tmp_path, capsys):
     (tmp_path / "file").touch()
-    assert cli.main(["manual", "--id", "HorseLeg"]) == 2
+    assert cli.main(["manual", "--env-id", "HorseLeg"]) == 2
     assert cli.main(["manual", "--out", str(tmp_path / "file")]) == 2
     assert capsys.readouterr().err.count("hoof-env: error: ") == 2
     with pytest.raises(ParameterError, match=r"task: expected one of .*rail"):

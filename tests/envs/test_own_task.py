@@ -127,7 +127,7 @@ def test_its_manual_page_has_its_rows(own, capsys):
     assert re.search(r"\| \d+ \| load angle \| / pi \| rad \| feel \|", page)
     assert "`own_functions.equation_14`" in page
     assert f'gym.make("{own.ID}"' in page
-    assert main(["manual", "--id", own.MODULE_ID]) == 0
+    assert main(["manual", "--env-id", own.MODULE_ID]) == 0
     assert "| `comfort` |" in capsys.readouterr().out
 
 
