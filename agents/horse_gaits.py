@@ -122,7 +122,7 @@ class BatchRollout:
             **{"episode_seconds": SECONDS, **settings},
         )
         self.envs = envs
-        self.steps = int(envs.unwrapped.batch.steps_per_episode)
+        self.steps = round(envs.unwrapped.settings.episode_seconds / envs.unwrapped.dt)
 
     def play(
         self, gaits: Floats, seed: int, starts: int = STARTS
@@ -344,7 +344,7 @@ def trunk_series(gait: list[float], speed: float) -> list[list[float]]:
     course = BatchRollout(speed, 64, episode_seconds=2 * SECONDS)
     envs = course.envs
     numbers = np.array(gait)
-    body = envs.unwrapped.batch.body
+    body = runs.body_of(envs)
     stride = Stride(*numbers[-len(LIMITS) :][:2])
     envs.reset(seed=1, options={"gait": numbers})
     rows: list[list[Floats]] = []

@@ -293,13 +293,13 @@ def main(argv: list[str] | None = None) -> None:
     figures: dict[str, list[dict[str, Any]]] = {}
     text = []
     assert envs is not None
-    if envs.batch.episode_seconds < SECONDS:
+    if envs.settings.episode_seconds < SECONDS:
         raise ParameterError(
             f"episode_seconds: expected {SECONDS:g} or more, for that long is judged, got"
-            f" {envs.batch.episode_seconds:g}"
+            f" {envs.settings.episode_seconds:g}"
         )
     # An animal of another size reaches a Froude number at another speed
-    pace = envs.batch.body.height / HIP_HEIGHT  # Froude numbers are of the animal's own hips
+    pace = runs.body_of(envs).height / HIP_HEIGHT  # Froude numbers are of the animal's own hips
     with runs.make_env(ENV_ID, **env_kwargs) as env:
         for name in args.policies:
             policy = find_policy(name, env, ENV_ID)

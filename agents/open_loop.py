@@ -177,7 +177,7 @@ class Family(NamedTuple):
 
 def family_of(env: Any, family: str, harmonics: int | None = None) -> Family:
     """Return the layout of a family for an environment, single and unwrapped."""
-    body = env.batch.body
+    body = runs.body_of(env)
     is_leg = env.action_form == "rates"
     middle, half = (body.middle, body.half) if is_leg else (np.zeros(8), np.ones(8))
     if family == "constant":
@@ -233,7 +233,7 @@ class Objective:
         """Return the mean return of the zero action, the gait in which an episode starts."""
         from hoof_env.envs.policies import Scripted
 
-        count = len(self.env.batch.action_names)
+        count = len(self.env.action_names)
         idle = Scripted(lambda observation, time: np.zeros(count, np.float32), self.env.dt)
         return float(np.mean([episode["return"] for episode in play_rows(self.envs, idle, seeds)]))
 

@@ -47,7 +47,7 @@ def test_an_episode_that_ends_before_figures_count_has_only_its_return():
 
 def test_a_spring_alone_pushes_by_its_length():
     with runs.make_env(leg_forces.ENV_ID, trunk_share=1.0, trunk_damping=0.0) as env:
-        height = env.unwrapped.batch.body.height
+        height = runs.body_of(env).height
         force, damper = leg_forces.suspension(env, np.array([height - 0.1]), np.array([-1.0]))
     assert force == pytest.approx(0.1 * 12000)
     assert damper == 0.0
