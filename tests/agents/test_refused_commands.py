@@ -235,7 +235,7 @@ MISSING = [
         r'pip install "hoof-env\[minari\]"',
     ),
     without_ray(lambda _: distribute.start(distribute.Trials())),
-    without_ray(lambda _: distribute.main(["trials", "--seeds", "2", "--steps", "99"])),
+    without_ray(lambda _: distribute.main(["--seeds", "2", "--steps", "99"])),
 ]
 """Package, call with a folder, words."""
 
