@@ -6,7 +6,7 @@
 For each id it searches a gait that is locked to the crank (`agents.open_loop`) and trains blind agents, whose
 observation is crank, gait and command alone, with the settings and steps of the shipped agent. Gait and best
 agent are stored, proved blind (`agents.blindness`) and scored as rows (`agents.results`); the better one is
-the bar. Searches and runs that are through are not made again, so that an interrupted command goes on.
+the bar. Finished searches and runs are not repeated, so that an interrupted command goes on.
 """
 
 from __future__ import annotations
@@ -60,7 +60,7 @@ class Args:
     seeds: int | None = None
     """blind training runs of each id; otherwise 10 on HorseLeg-v0 and HorseRough-v0, 3 on the rest"""
     steps: int | None = None
-    """of each; otherwise those of the shipped agent"""
+    """steps of each; otherwise as many as the shipped agent's"""
     episodes: int | None = None
     """least of each search for a gait"""
     most: int | None = None

@@ -1,8 +1,8 @@
 """Proof that a policy sees nothing of the ground: its actions, computed in a world with other ground and
 replayed in the real one, return the same.
 
-A policy without feedback acts on its start, on its crank and gait, and on the command, and none of them
-depends on a force. So it acts alike on any ground, and the returns must be the same to the last bit.
+A policy without feedback acts on its start, on its crank and gait, and on the command, which depend on
+no force. So it acts alike on any ground, and the returns must be the same to the last bit.
 """
 
 from __future__ import annotations

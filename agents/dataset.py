@@ -7,7 +7,7 @@ A policy is what `hoof-env evaluate` takes. Episode k of each is reset with seed
 policy starts with, so that resetting `dataset.recover_environment()` likewise and taking the same actions
 gives the same numbers. Next to Minari's files lies manifest.json with the command, the versions, the licence,
 the returns of each policy and how its episodes start, and the SHA-256 of every file and of the files of
-trained policies. A dataset that is not whole is not kept: it is made in a folder of its own and moved.
+trained policies. A dataset is written in a folder of its own and moved when it is whole.
 
 Minari's metadata record the form of the actions: `load` and `check_actions` refuse a dataset with actions of
 another form, which may have the same shape.

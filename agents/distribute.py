@@ -3,9 +3,9 @@
     python -m agents.distribute --seeds 5                                             five seeds
     python -m agents.distribute --seeds 3 --space 'learning_rate=[1e-3,5e-4]'         a sweep
 
-Without --address a cluster of this machine's cores is made and ended with the command. A worker that dies is
-replaced and its trial goes on from its last checkpoint. Ctrl-C keeps what is there; the same command, given
-again, runs what is missing. docs/agents.md says how to use a real cluster and where results land.
+Without --address a cluster of this machine's cores starts and ends with the command. A worker that dies is
+replaced and its trial goes on from its last checkpoint. Ctrl-C keeps all results; the same command, given
+again, runs the missing trials. docs/agents.md describes a real cluster and the place of results.
 """
 
 from __future__ import annotations
@@ -59,7 +59,7 @@ class Cluster:
     address: str | None = None
     """a running Ray cluster: auto (this machine is part of it), host:port or ray://host:10001"""
     cpus: int | None = None
-    """of the cluster that is made where no address is given; otherwise all"""
+    """cores of the cluster that starts where no address is given; otherwise all"""
     runtime_env: tuple[str, ...] = ()
     """more for Ray's runtime_env on a cluster: key=value ..., or one JSON object, as
     '{"pip": ["gymnasium", "stable-baselines3"]}'"""
@@ -277,7 +277,7 @@ class Reporter(Scorer):
 
     Attributes:
         last: the last score: "return", mean over the episodes of `CURVE_SEEDS`, "steps", and "train_s",
-            seconds of training alone, those of earlier tries included.
+            seconds of training alone, with earlier tries included.
     """
 
     def __init__(

@@ -2,7 +2,7 @@
 
     python -m agents.gallery
 
-Stills are cut out of the films of the policies. Returns are those of random actions, and of stock PPO where
+Stills are cut out of the films of the policies. Returns are of random actions, and of stock PPO where
 docs/evidence/stock has its curves, in the episodes of the published scores. Ids with curves also have
 the steps and seconds that the best stock learner takes to pass the best policy without feedback.
 """

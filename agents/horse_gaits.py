@@ -153,7 +153,7 @@ class BatchRollout:
             ended |= terminated | truncated
             if ended.all():
                 break
-            # Only stances in the gait itself count, not those of the start
+            # Only stances in the gait itself count, not the first ones
             if step > self.steps // 3:  # hooves have landed in the gait
                 m = infos["measured"]
                 lags += ~ended * landings(gaits, np.array([m[f"{leg}_stance_began"] for leg in LEGS]))
@@ -391,7 +391,7 @@ def shipped(searches: dict[str, Any]) -> dict[str, Any]:
     def steps_of(family: str) -> list[dict[str, Any]]:
         """Return the upright steps of a family: the best start, and the ramps from it."""
         begins = [search["steps"][0] for name, search in searches.items() if name[:-1] == f"{family} "]
-        steps = sorted(begins, key=lambda step: float(step["return"]))[-1:]  # the others are another gait
+        steps = sorted(begins, key=lambda step: float(step["return"]))[-1:]  # the rest is another gait
         for way in ("faster", "slower"):
             steps += searches.get(f"{family}, {way}", {"steps": []})["steps"]
         return [step for step in steps if step["failed"] < STABLE]

@@ -6,8 +6,8 @@
 The suspension is the spring, the damper and the constant force that stand for the animal's other legs. Its
 force follows from the motion of the trunk and the settings of the environment; the test checks it against
 the momentum of all bodies. Forces are over the weight of trunk and leg, positive upward, and count from
-`SETTLED` on; the heat of the damper, the work of the drives and depths are those of the whole episode.
-Intervals are those of the mean over the episodes of one policy and say nothing about other trainings.
+`SETTLED` on; the heat of the damper, the work of the drives and depths are of the whole episode.
+Intervals are for the mean over the episodes of one policy and do not cover other trainings.
 """
 
 from __future__ import annotations
@@ -46,7 +46,7 @@ COLUMNS = (
     "toe_penetration",
     "heel_penetration",
 )
-"""Columns of a record that are kept."""
+"""Columns of a record for the figures."""
 
 UNITS = {
     "return": "-",
@@ -77,7 +77,7 @@ class Args:
     policies: Positional[tuple[str, ...]] = ("run", "constant", "open-loop", "shipped")
     """names of gaits, and names or paths of trained policies"""
     episodes: int = 100
-    """of each policy, the first of those of the published scores"""
+    """episodes of each policy, the first of the published scores"""
     out: Path = OUT
     """file of the figures"""
 

@@ -12,7 +12,7 @@ the crank's place.
 A search goes on until its last quarter gains less than a hundredth of what it gained over the zero action.
 Searches start in turn from random points, from a gait that is known, and from that gait through easier
 settings (`--easier`). The best of them is chosen by starts that none has met and scored with yet others, the
-starts of `hoof-env evaluate`. The file is written after every search; searches in it are not made again.
+starts of `hoof-env evaluate`. The file is written after every search; searches in it are not repeated.
 """
 
 from __future__ import annotations
@@ -65,7 +65,7 @@ STALLED = 0.01
 TEST_SEED = 1000
 SEARCH_SEED = 10_000_000
 LOOK_SEED = 900_000_000
-"""First seeds of the final score, those of `hoof-env evaluate`, of the searches, and of the looks at them."""
+"""First seeds of the final score (as in `hoof-env evaluate`), of the searches, and of their progress."""
 
 TOLERANCES = {"tolx": 1e-4, "tolfun": 0, "tolfunhist": 0, "tolstagnation": 10**9}
 """Options of CMA-ES that end a search when its steps are small, and for no other reason."""
@@ -157,7 +157,7 @@ class Family(NamedTuple):
 
     def encode(self, parameters: dict[str, Any]) -> Floats:
         """Convert parameters of this family, or of a smaller one, to a point within the box; `ParameterError`
-        for those of another body."""
+        if they are of another body."""
         given = np.asarray(parameters.get("coefficients", parameters.get("constant")), float)
         given = given.reshape(1, 1, -1) if given.ndim == 1 else given
         if given.shape[-1] != len(self.half):
@@ -209,7 +209,7 @@ class Objective:
     ) -> None:
         env: Any = runs.make_env(env_id, **env_kwargs).unwrapped
         self.env = env
-        # Before many are made, whose kernels would have to be compiled
+        # Before the batch, whose kernels would have to be compiled
         form = getattr(env, "action_form", None)
         if form is None or env.task.action_map:
             raise ParameterError(f"env_id: expected an id of this package with many at once, got {env_id!r}")

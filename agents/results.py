@@ -520,7 +520,7 @@ def head_kinds() -> tuple[str, ...]:
 
 
 def filled(text: str, folder: Path = RESULTS) -> str:
-    """Return the text of a page with its tables made again."""
+    """Return the text of a page with its tables written anew."""
 
     def again(found: re.Match[str]) -> str:
         opening, name, columns, closing = found.groups()
@@ -609,7 +609,7 @@ class ScoreOne:
     steps: int | None = None
     """environment steps of each training run"""
     among: int | None = None
-    """number of training runs of which the policy is the best, where their returns were not kept"""
+    """number of training runs of which the policy is the best, where their returns are gone"""
     note: str = ""
     """what a reader must know"""
 

@@ -1,11 +1,11 @@
-"""Ship trained policies: a small folder for each id, everything in it made by one command.
+"""Ship trained policies: a small folder for each id, written by one command.
 
     python -m agents.ship runs/baselines                for each id the best of all runs beneath this folder
     python -m agents.ship runs/ppo-HorseLeg-v0-s0       this run
 
 The best of an id is that with the highest mean return in episodes on which nothing is reported. What plays is
-in the package, hoof_env/data/policies/NAME: its weights as plain data, how it was trained, its returns with
-those of gaits and how far other machines may be off. agents/policies/NAME has the exported policy, a model
+in the package, hoof_env/data/policies/NAME: its weights as plain data, how it was trained, its returns beside
+the gaits' and how far other machines may be off. agents/policies/NAME has the exported policy, a model
 card, a curve and a film, and agents/policies/README.md lists all. Each folder is written whole or not at all.
 After a change of the card's template `python -m agents.cards` writes the cards of all policies anew.
 """
@@ -62,7 +62,7 @@ FILM_SECONDS = 4.0
 
 COPIED = (WEIGHTS, ABOUT, runs.CONFIG)
 PACKAGED = (WEIGHTS, ABOUT, runs.RECORD, SCORE)
-"""Files of the package; the others are looked at."""
+"""Files of the package; people read the rest."""
 
 
 @dataclass(frozen=True)
@@ -136,7 +136,7 @@ def ship(choice: Choice, env_id: str, out: Path) -> dict[str, Any]:
     """
     saved = choice.saved
     trained_on = own_id(choice.saved.record["env_id"])
-    # A vector reward has no score: the episodes are those of the id whose policy it shares
+    # A vector reward has no score: it plays the episodes of the id whose policy it shares
     played_on = trained_on if env_id in STANDS_FOR else env_id
     if not len(runs.read_episodes(saved.path.parent)):
         raise DataFileError(f"run {saved.path.parent}: expected a training in which episodes end, got none")

@@ -52,7 +52,7 @@ class Args(TrainingArgs):
     """go on with the run in --out, which the same command began; without one there, start it. Its checkpoints
     are pickles, which can run any code: resume only runs that you trust"""
     checkpoint_every: float = 30.0
-    """seconds between two checkpoints, which stand between two rollouts; the last two are kept; 0: none"""
+    """seconds between two checkpoints, which stand between two rollouts; the last two stay; 0: none"""
     max_minutes: float | None = None
     """stop after this time, counted from this start, even if steps are left"""
     device: str = "cpu"

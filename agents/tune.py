@@ -40,7 +40,7 @@ class Args(TrainingArgs):
     """Arguments of the command."""
 
     trials: int = 20
-    """that the study has in the end, those of earlier starts counted"""
+    """trials of the study in the end, with earlier starts counted"""
     scores: int = 10
     """how often a trial is scored, the last time at its end"""
     space: Path = SPACES
@@ -222,7 +222,7 @@ def finished(study: Any) -> list[Any]:
 
 
 def open_study(args: Args, folder: Path, about: dict[str, Any]) -> Any:
-    """Return the study in `folder`, made if need be; a trial that was killed is queued to be run again.
+    """Return the study in `folder`, or a new one; a trial that was killed is queued to run again.
 
     Raises:
         ParameterError: Optuna is missing, the settings do not fit the algorithm, or the study was begun with

@@ -395,7 +395,7 @@ def write(title: str, plan: Sequence[Entry], folder: Path) -> Path:
     write_data(rows, pictures)
     parts += ["## What the gaits are like", figures_table(rows, gaits)]
     if LEG in gaits:
-        # The run is what the others are compared with
+        # All are compared with the run
         others = [policy for name, policy in gaits[LEG].items() if name != "run"]
         agents = others + [row.scored for row in of_id(rows, LEG)]
         parts += ["## Beside the paper's run", compare(agents, gaits[LEG]["run"])]

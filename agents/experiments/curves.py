@@ -18,12 +18,12 @@ PUBLISHED = Path(__file__).parents[2] / "docs" / "evidence" / "stock"
 CURVES = "curves.csv"
 
 COLUMNS = ("env_id", "algo", "seed", "steps", "return", "train_seconds", "commit", "processor")
-"""Columns of curves.csv: a line for each score. The seconds are those of the processor for learning alone so
+"""Columns of curves.csv: a line for each score. The seconds are the processor's for learning alone so
 far; the commit is that of the code that trained, empty if there is no git. The processor is empty in rows
 from before it was noted."""
 
 TUNED: Final = "ppo_flat"
-"""Name of the one learner that is not stock, for comparison: its settings are those of agents/hyperparams."""
+"""Name of the one learner that is not stock, for comparison: its settings are in agents/hyperparams."""
 
 
 def read_curves(folder: Path) -> list[dict[str, Any]]:

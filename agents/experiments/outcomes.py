@@ -49,7 +49,7 @@ class Row:
 
     @cached_property
     def scored(self) -> Scored:
-        """Figures over the seeds, with intervals, and those of each seed."""
+        """Figures over the seeds, with intervals, and of each seed."""
         seeds = [outcome.figures for outcome in self.outcomes]
         return Scored(self.title, over_seeds(seeds), seeds)
 
@@ -115,7 +115,7 @@ def seconds_to(level: float, outcome: Outcome) -> float:
 
 
 def versions_of(rows: Sequence[Row]) -> dict[str, str]:
-    """Return the versions that the trainings were made with; several of one package are listed together."""
+    """Return the versions of the packages that trained; several of one package are listed together."""
     versions: dict[str, set[str]] = {}
     for row in rows:
         for outcome in row.outcomes:

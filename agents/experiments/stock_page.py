@@ -116,8 +116,8 @@ def usual_processor(rows: Sequence[dict[str, Any]]) -> str:
 
 
 def _seconds(ends: Sequence[dict[str, Any]], processor: str) -> str:
-    """Return the median of the seconds of trainings on a processor; with a star those of others, if none was
-    trained on it."""
+    """Return the median of the seconds of trainings on a processor; with a star the median of all, if
+    none ran on it."""
     timed = [row["train_seconds"] for row in ends if row["processor"] == processor]
     if timed:
         return f"{np.median(timed):.0f}"

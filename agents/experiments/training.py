@@ -44,7 +44,7 @@ class Args(TrainingArgs):
     points: int = 30
     """scores on the way, at equal distances, between two rollouts"""
     every: int | None = None
-    """steps between two scores, in place of their number; each is made at that very step, on the episodes of
+    """steps between two scores, in place of their number; at that very step, on the episodes of
     the final score"""
     hyperparams: Path | None = None
     """YAML file in rl-baselines3-zoo's format; otherwise agents/hyperparams/ALGO.yml"""
@@ -53,8 +53,8 @@ class Args(TrainingArgs):
 
 
 def train_one(args: Args) -> bool:
-    """Train, or go on training, and score; return False if it was interrupted. Errors are those of
-    `train`."""
+    """Train, or go on training, and score; return False if it was interrupted. Errors as
+    in `train`."""
     check_number("points", args.points, low=1)
     if args.every is not None:
         check_number("every", args.every, low=1)
