@@ -25,7 +25,7 @@ help:
 	@echo 'make test-lab    force records and datasets with OpenSim, ezc3d and Minari, in an environment under .lab/'
 	@echo 'make test-ecosystem  every RL library on every id, in environments under .ecosystem/: 6 GB, one to two hours'
 	@echo 'make bench       how fast engine and environments are beside MuJoCo, Exudyn and EnvPool'
-	@echo 'make baselines   the agents of agents/plans/full.yml, hours; ARGS="--subset nightly": a small part, minutes'
+	@echo 'make baselines   the agents of agents/plans/full.yml, hours; ARGS="--plan nightly": a small part, minutes'
 	@echo 'make docs        these pages and the API as a site in build/site'
 	@echo 'make test-site   every page of it in Chromium: errors, widths, images, contrast; installs Playwright'
 	@echo 'make test-links  links to other sites; needs a network'
@@ -88,7 +88,7 @@ bench: setup
 	@$(PY) -m benchmarks.env_speed
 
 baselines: setup
-	@$(PY) -m agents.baselines $(ARGS)
+	@$(PY) -m agents.experiments $(ARGS)
 
 docs: setup
 	@echo 'sphinx' && $(PY) -m sphinx -q -W --keep-going -c docs -d build/doctrees . build/site && echo 'read build/site/index.html'

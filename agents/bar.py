@@ -1,12 +1,12 @@
 """The bar of an id: the best policy that sees nothing, searched and trained, by one command.
 
     python -m agents.bar                                 all ids; hours
-    python -m agents.bar --ids HorseLeg-v0 --seeds 3
+    python -m agents.bar --env-id hoof_env/HorseLeg-v0 --seeds 3
 
 For each id it searches a gait that is locked to the crank (`agents.open_loop`) and trains blind agents, whose
 observation is crank, gait and command alone, with the settings and steps of the shipped agent. Gait and best
 agent are stored, proved blind (`agents.blindness`) and scored as rows (`agents.results`); the better one is
-the bar. Searches and runs that are through are not made again, so that an interrupted command goes on.
+the bar. Finished searches and runs are not repeated, so that an interrupted command goes on.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from typing import Any
 import numpy as np
 
 from agents import open_loop, results, runs, train
-from agents.command import run
+from agents.command import parse, run
 from agents.ship import CHOOSING_SEEDS, shown_command
 from hoof_env.envs.open_loop import BLIND, GAITS, check_blind
 from hoof_env.errors import OutputError, ParameterError, check_choice, check_number
@@ -55,12 +55,12 @@ AGENTS = results.RESULTS / "policies"
 class Args:
     """Arguments of the command."""
 
-    ids: tuple[str, ...] = IDS
-    """ids, without their namespace"""
+    env_id: tuple[str, ...] = tuple(f"hoof_env/{name}" for name in IDS)
+    """one id or more"""
     seeds: int | None = None
     """blind training runs of each id; otherwise 10 on HorseLeg-v0 and HorseRough-v0, 3 on the rest"""
     steps: int | None = None
-    """of each; otherwise those of the shipped agent"""
+    """steps of each; otherwise as many as the shipped agent's"""
     episodes: int | None = None
     """least of each search for a gait"""
     most: int | None = None
@@ -209,15 +209,14 @@ def find(name: str, args: Args) -> results.Row:
 
 def main(argv: list[str] | None = None) -> None:
     """Find the bars."""
-    import tyro
-
-    args = tyro.cli(Args, args=argv, prog="python -m agents.bar", description=__doc__)
+    args = parse(Args, argv, "python -m agents.bar", __doc__)
     if args.seeds is not None:
         check_number("seeds", args.seeds, low=1, high=1000)
-    for name in args.ids:
-        check_choice("ids", name, IDS)
-        blind_groups(f"hoof_env/{name}", args.observation)
-    for name in args.ids:
+    for env_id in args.env_id:
+        check_choice("env_id", env_id, [f"hoof_env/{name}" for name in IDS])
+        blind_groups(env_id, args.observation)
+    for env_id in args.env_id:
+        name = env_id.removeprefix("hoof_env/")
         row = find(name, args)
         print(f"{name}: {results.KINDS[row.kind]}, {row.mean['return']:.1f}", flush=True)
 

@@ -1,8 +1,8 @@
 """Proof that a policy sees nothing of the ground: its actions, computed in a world with other ground and
 replayed in the real one, return the same.
 
-A policy without feedback acts on its start, on its crank and gait, and on the command, and none of them
-depends on a force. So it acts alike on any ground, and the returns must be the same to the last bit.
+A policy without feedback acts on its start, on its crank and gait, and on the command, which depend on
+no force. So it acts alike on any ground, and the returns must be the same to the last bit.
 """
 
 from __future__ import annotations
@@ -66,13 +66,13 @@ def prove(
     if real is None:
         raise ParameterError(f"env_id: expected an id of this package with many at once, got {env_id!r}")
     settings: Any = real.settings
-    stiffness = float(real.batch.engine.ground.stiffness)
+    stiffness = float(real.engine.ground.stiffness)
     proof = None
     for friction, factor in OTHER_GROUNDS:
         ground = {"friction": friction, "stiffness": factor * stiffness}
         other = make_rows(env_id, len(seeds), **kwargs | ground)
         assert other is not None
-        if other.batch.engine.substeps != real.batch.engine.substeps:
+        if other.engine.substeps != real.engine.substeps:
             continue
         own, here, there, whole, actions = replay(policy, real, other, seeds)
         proof = Proof(

@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 
 from agents import runs
-from agents.command import run
+from agents.command import parse, run
 from agents.pages import render_template
 from hoof_env.envs.policies import STANDS_FOR
 from hoof_env.envs.shipped import SHIPPED
@@ -122,9 +122,7 @@ def card(
 
 def main(argv: list[str] | None = None) -> None:
     """Write the cards."""
-    import tyro
-
-    args = tyro.cli(Args, args=argv, prog="python -m agents.cards", description=__doc__)
+    args = parse(Args, argv, "python -m agents.cards", __doc__)
     for folder in sorted(path.parent for path in SHIPPED.glob(f"*/{SCORE}")):
         score, record = (
             parse_json((folder / name).read_text(encoding="utf-8")) for name in (SCORE, runs.RECORD)

@@ -10,6 +10,7 @@ from collections.abc import Callable
 from typing import NoReturn
 
 from hoof_env._output import bear_any_output, flush_or_drop
+from hoof_env.commands.options import parse as parse
 from hoof_env.errors import HoofEnvError, check_number
 from hoof_env.errors import parse_pairs as parse_pairs
 

@@ -7,7 +7,7 @@ A policy is what `hoof-env evaluate` takes. Episode k of each is reset with seed
 policy starts with, so that resetting `dataset.recover_environment()` likewise and taking the same actions
 gives the same numbers. Next to Minari's files lies manifest.json with the command, the versions, the licence,
 the returns of each policy and how its episodes start, and the SHA-256 of every file and of the files of
-trained policies. A dataset that is not whole is not kept: it is made in a folder of its own and moved.
+trained policies. A dataset is written in a folder of its own and moved when it is whole.
 
 Minari's metadata record the form of the actions: `load` and `check_actions` refuse a dataset with actions of
 another form, which may have the same shape.
@@ -33,7 +33,7 @@ from tyro.conf import Positional
 
 import hoof_env
 from agents import runs
-from agents.command import parse_pairs, run
+from agents.command import parse, parse_pairs, run
 from hoof_env.envs.policies import start_of
 from hoof_env.errors import DataFileError, MissingExtraError, OutputError, ParameterError, count
 from hoof_env.gait import GaitParameters
@@ -70,9 +70,7 @@ class Args:
 
 def main(argv: list[str] | None = None) -> None:
     """Write a dataset."""
-    import tyro
-
-    args = tyro.cli(Args, args=argv, prog="python -m agents.dataset", description=__doc__)
+    args = parse(Args, argv, "python -m agents.dataset", __doc__)
     print(f"written: {write(args)}")
 
 

@@ -17,7 +17,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from agents import runs, train
-from agents.command import run
+from agents.command import parse, run
 from agents.pages import draw_learning_curve
 from hoof_env._output import check_folder, staged
 from hoof_env.demo.demo import (
@@ -152,10 +152,8 @@ def draw_curve(scores: list[Score], stage: Path) -> Path:
 
 def main(argv: list[str] | None = None) -> None:
     """Make the report."""
-    import tyro
-
     started = time.monotonic()
-    report = demo(tyro.cli(Args, args=argv, prog="python -m agents.demo", description=__doc__))
+    report = demo(parse(Args, argv, "python -m agents.demo", __doc__))
     print(f"{time.monotonic() - started:.0f} s in all. Open {report}")
 
 

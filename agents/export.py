@@ -4,7 +4,7 @@
 
 The file maps observations of the environment, shape (batch, k), to deterministic actions, (batch, n), float32
 both: the normalisation of observations and the limits of actions are inside. It is kept only if it gives the
-actions of the model it was made from. Its metadata describe the environment and the actions
+actions of its model. Its metadata describe the environment and the actions
 (`hoof_env/policies/onnx_file.py`). A .zip is a pickle and can run any code when it is loaded: give only files
 that you trust. ONNX is data.
 """
@@ -26,7 +26,7 @@ import torch
 from tyro.conf import Positional
 
 from agents import runs
-from agents.command import run
+from agents.command import parse, run
 from hoof_env._output import check_new, new_file
 from hoof_env.errors import DataFileError, HoofEnvError, ParameterError
 from hoof_env.policies.onnx_file import INPUT, LISTS, OUTPUT, OnnxPolicy
@@ -60,8 +60,8 @@ def export(model: Path, out: Path, env_id: str | None = None, overwrite: bool = 
         The largest difference of an action, as in `TOLERANCE`.
 
     Raises:
-        ParameterError: another suffix, or no environment known; others as `write_policy`.
-        DataFileError: there is no such model; others as `write_policy`.
+        ParameterError: another suffix, or no environment known; also as `write_policy`.
+        DataFileError: there is no such model; also as `write_policy`.
         OutputError: the file exists already, or cannot be written.
     """
     check_place(out, [".onnx"])
@@ -142,7 +142,7 @@ class Deterministic(torch.nn.Module):
         if self.clip is not None:
             scaled = (observation.double() - self.mean) / self.scale
             observation = scaled.clamp(-self.clip, self.clip).float()
-        # From here on as `BasePolicy.predict`: squashed actions are scaled, others clipped
+        # From here on as `BasePolicy.predict`: squashed actions are scaled, all other ones clipped
         action = self.policy._predict(observation, deterministic=True)
         if self.policy.squash_output:  # in [-1, 1]: to the limits of the space
             return self.low + 0.5 * (action + 1.0) * (self.high - self.low)
@@ -233,9 +233,7 @@ def difference(trained: Any, predict: Any, observations: Any) -> float:
 
 def main(argv: list[str] | None = None) -> None:
     """Export, and print the difference."""
-    import tyro
-
-    args = tyro.cli(Args, args=argv, prog="python -m agents.export", description=__doc__)
+    args = parse(Args, argv, "python -m agents.export", __doc__)
     off = export(args.model, args.out, args.env_id, args.overwrite)
     print(
         f"written: {args.out} ({args.out.stat().st_size / 1000:.0f} kB); on {TRIED} random observations its "

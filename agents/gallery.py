@@ -2,7 +2,7 @@
 
     python -m agents.gallery
 
-Stills are cut out of the films of the policies. Returns are those of random actions, and of stock PPO where
+Stills are cut out of the films of the policies. Returns are of random actions, and of stock PPO where
 docs/evidence/stock has its curves, in the episodes of the published scores. Ids with curves also have
 the steps and seconds that the best stock learner takes to pass the best policy without feedback.
 """
@@ -20,10 +20,10 @@ import numpy as np
 
 from agents import runs
 from agents.cards import FILM, POLICIES
-from agents.command import run
-from agents.stock import OUT as CURVES
-from agents.stock_page import at
-from agents.stock_plan import TUNED, read_curves
+from agents.command import parse, run
+from agents.experiments.curves import PUBLISHED as CURVES
+from agents.experiments.curves import TUNED, read_curves
+from agents.experiments.stock_page import at
 from docs._manual.results import RETURNS, STILL
 from hoof_env.envs.policies import STANDS_FOR
 from hoof_env.envs.shipped import shipped_returns
@@ -123,9 +123,7 @@ def returns_of(env_id: str, random: float) -> dict[str, Any]:
 
 def main(argv: list[str] | None = None) -> None:
     """Write stills and returns."""
-    import tyro
-
-    args = tyro.cli(Args, args=argv, prog="python -m agents.gallery", description=__doc__)
+    args = parse(Args, argv, "python -m agents.gallery", __doc__)
     path = args.out / RETURNS
     returns = {}
     for folder in sorted(card.parent for card in args.out.glob("*/card.md")):

@@ -8,7 +8,7 @@ Every policy plays the episodes of the published scores, once with commands that
 speed that is commanded for the whole episode. The zero action plays the reference gait of the speed; at the
 highest command, the one next to its own speed, the gait `trot-like` plays as well. Horizontal forces are sums
 over the two legs of a pair, over the mass of the animal, from `SETTLED` on: positive ones propel. Intervals
-are those of the mean over the episodes of one policy and say nothing about other trainings.
+are for the mean over the episodes of one policy and do not cover other trainings.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ import numpy as np
 from tyro.conf import Positional
 
 from agents import runs
-from agents.command import run
+from agents.command import parse, run
 from agents.gait_figures import SETTLED
 from agents.horse_gaits import speed_of
 from agents.statistics import described
@@ -50,7 +50,7 @@ SUMMARY = (
     "cost_of_transport",
     "failed",
 )
-"""Figures of an episode that are kept besides the return."""
+"""Figures of an episode besides its return."""
 
 NET = tuple(f"net_{pair}" for pair in PAIRS)
 """Net horizontal forces of the pairs [N/kg]."""
@@ -65,7 +65,7 @@ class Args:
     policy: Positional[str] = "shipped"
     """name or path of the policy"""
     episodes: int = 100
-    """at each speed, the first of those of the published scores"""
+    """episodes at each speed, the first of the published scores"""
     out: Path = OUT
     """file of the figures"""
 
@@ -144,9 +144,7 @@ def tell(what: str, figures: Mapping[str, Mapping[str, float]]) -> None:
 
 def main(argv: list[str] | None = None) -> None:
     """Play and write."""
-    import tyro
-
-    args = tyro.cli(Args, args=argv, prog="python -m agents.horse_figures", description=__doc__)
+    args = parse(Args, argv, "python -m agents.horse_figures", __doc__)
     seeds = FINAL_SEEDS[: count("--episodes", args.episodes, most=len(FINAL_SEEDS))]
     envs = make_rows(ENV_ID, len(seeds))
     with runs.make_env(ENV_ID) as env:

@@ -23,7 +23,7 @@ from gymnasium.vector import AutoresetMode
 from numpy.typing import NDArray
 
 from agents import gait_figures, runs
-from agents.command import run
+from agents.command import parse, run
 from agents.evolution import generations, make_strategy, mean_costs, require
 from hoof_env.constants import GRAVITY
 from hoof_env.envs.policies import make_policy
@@ -122,7 +122,7 @@ class BatchRollout:
             **{"episode_seconds": SECONDS, **settings},
         )
         self.envs = envs
-        self.steps = int(envs.unwrapped.batch.steps_per_episode)
+        self.steps = round(envs.unwrapped.settings.episode_seconds / envs.unwrapped.dt)
 
     def play(
         self, gaits: Floats, seed: int, starts: int = STARTS
@@ -153,7 +153,7 @@ class BatchRollout:
             ended |= terminated | truncated
             if ended.all():
                 break
-            # Only stances in the gait itself count, not those of the start
+            # Only stances in the gait itself count, not the first ones
             if step > self.steps // 3:  # hooves have landed in the gait
                 m = infos["measured"]
                 lags += ~ended * landings(gaits, np.array([m[f"{leg}_stance_began"] for leg in LEGS]))
@@ -344,7 +344,7 @@ def trunk_series(gait: list[float], speed: float) -> list[list[float]]:
     course = BatchRollout(speed, 64, episode_seconds=2 * SECONDS)
     envs = course.envs
     numbers = np.array(gait)
-    body = envs.unwrapped.batch.body
+    body = runs.body_of(envs)
     stride = Stride(*numbers[-len(LIMITS) :][:2])
     envs.reset(seed=1, options={"gait": numbers})
     rows: list[list[Floats]] = []
@@ -391,7 +391,7 @@ def shipped(searches: dict[str, Any]) -> dict[str, Any]:
     def steps_of(family: str) -> list[dict[str, Any]]:
         """Return the upright steps of a family: the best start, and the ramps from it."""
         begins = [search["steps"][0] for name, search in searches.items() if name[:-1] == f"{family} "]
-        steps = sorted(begins, key=lambda step: float(step["return"]))[-1:]  # the others are another gait
+        steps = sorted(begins, key=lambda step: float(step["return"]))[-1:]  # the rest is another gait
         for way in ("faster", "slower"):
             steps += searches.get(f"{family}, {way}", {"steps": []})["steps"]
         return [step for step in steps if step["failed"] < STABLE]
@@ -423,9 +423,7 @@ def shipped(searches: dict[str, Any]) -> dict[str, Any]:
 
 def main(argv: list[str] | None = None) -> None:
     """Find gaits."""
-    import tyro
-
-    args = tyro.cli(Args, args=argv, prog="python -m agents.horse_gaits", description=__doc__)
+    args = parse(Args, argv, "python -m agents.horse_gaits", __doc__)
     finder = Finder(args)
     finder.family("free")
     finder.family("trot-like", TROT_FROUDE, LAG)

@@ -28,7 +28,7 @@ import numpy as np
 from tyro.conf import Positional
 
 from agents import runs
-from agents.command import run
+from agents.command import parse, parse_pairs, run
 from agents.gait_figures import SECONDS, mean_lag, play
 from agents.horse_gaits import speed_of
 from agents.judge_pictures import draw
@@ -281,11 +281,7 @@ def table_of(name: str, figures: list[dict[str, Any]]) -> str:
 
 def main(argv: list[str] | None = None) -> None:
     """Judge policies, and write tables and pictures."""
-    import tyro
-
-    from agents.command import parse_pairs
-
-    args = tyro.cli(Args, args=argv, prog="python -m agents.judge", description=__doc__)
+    args = parse(Args, argv, "python -m agents.judge", __doc__)
     if not args.policies:
         raise ParameterError("policies: expected at least one, got none")
     count("--episodes", args.episodes)
@@ -297,13 +293,13 @@ def main(argv: list[str] | None = None) -> None:
     figures: dict[str, list[dict[str, Any]]] = {}
     text = []
     assert envs is not None
-    if envs.batch.episode_seconds < SECONDS:
+    if envs.settings.episode_seconds < SECONDS:
         raise ParameterError(
             f"episode_seconds: expected {SECONDS:g} or more, for that long is judged, got"
-            f" {envs.batch.episode_seconds:g}"
+            f" {envs.settings.episode_seconds:g}"
         )
     # An animal of another size reaches a Froude number at another speed
-    pace = envs.batch.body.height / HIP_HEIGHT  # Froude numbers are of the animal's own hips
+    pace = runs.body_of(envs).height / HIP_HEIGHT  # Froude numbers are of the animal's own hips
     with runs.make_env(ENV_ID, **env_kwargs) as env:
         for name in args.policies:
             policy = find_policy(name, env, ENV_ID)

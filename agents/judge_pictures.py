@@ -1,4 +1,4 @@
-"""Pictures of the judges: force curves, footfall, and figures over speed, with those of horses."""
+"""Pictures of the judges: force curves, footfall, and figures over speed beside horses'."""
 
 from __future__ import annotations
 

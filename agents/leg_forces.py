@@ -6,8 +6,8 @@
 The suspension is the spring, the damper and the constant force that stand for the animal's other legs. Its
 force follows from the motion of the trunk and the settings of the environment; the test checks it against
 the momentum of all bodies. Forces are over the weight of trunk and leg, positive upward, and count from
-`SETTLED` on; the heat of the damper, the work of the drives and depths are those of the whole episode.
-Intervals are those of the mean over the episodes of one policy and say nothing about other trainings.
+`SETTLED` on; the heat of the damper, the work of the drives and depths are of the whole episode.
+Intervals are for the mean over the episodes of one policy and do not cover other trainings.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ from numpy.typing import NDArray
 from tyro.conf import Positional
 
 from agents import runs
-from agents.command import run
+from agents.command import parse, run
 from agents.gait_figures import SETTLED
 from agents.statistics import described
 from hoof_env.errors import ParameterError, count
@@ -46,7 +46,7 @@ COLUMNS = (
     "toe_penetration",
     "heel_penetration",
 )
-"""Columns of a record that are kept."""
+"""Columns of a record for the figures."""
 
 UNITS = {
     "return": "-",
@@ -77,7 +77,7 @@ class Args:
     policies: Positional[tuple[str, ...]] = ("run", "constant", "open-loop", "shipped")
     """names of gaits, and names or paths of trained policies"""
     episodes: int = 100
-    """of each policy, the first of those of the published scores"""
+    """episodes of each policy, the first of the published scores"""
     out: Path = OUT
     """file of the figures"""
 
@@ -117,7 +117,7 @@ def suspension(env: gym.Env[Any, Any], y: Floats, vy: Floats) -> tuple[Floats, F
             f'trunk: expected "suspended" with fixed parameters, got {settings.trunk!r} with'
             f" randomize={settings.randomize!r}"
         )
-    spring = -settings.trunk_stiffness * (y - leg.batch.body.height)
+    spring = -settings.trunk_stiffness * (y - runs.body_of(leg).height)
     damper = -settings.trunk_damping * vy
     return (1 - settings.trunk_share) * leg.weight + spring + damper, damper
 
@@ -166,9 +166,7 @@ def over_episodes(episodes: Sequence[Mapping[str, float]]) -> dict[str, dict[str
 
 def main(argv: list[str] | None = None) -> None:
     """Play and write."""
-    import tyro
-
-    args = tyro.cli(Args, args=argv, prog="python -m agents.leg_forces", description=__doc__)
+    args = parse(Args, argv, "python -m agents.leg_forces", __doc__)
     seeds = FINAL_SEEDS[: count("--episodes", args.episodes, most=len(FINAL_SEEDS))]
     policies = {}
     with runs.make_env(ENV_ID) as env:
@@ -186,7 +184,7 @@ def main(argv: list[str] | None = None) -> None:
             "from_seconds": SETTLED,
             "settings": {
                 "weight_n": float(leg.weight),
-                "height_m": float(leg.batch.body.height),
+                "height_m": float(runs.body_of(leg).height),
                 **{
                     name: getattr(leg.settings, name)
                     for name in ("trunk_share", "trunk_stiffness", "trunk_damping")

@@ -12,7 +12,7 @@ the crank's place.
 A search goes on until its last quarter gains less than a hundredth of what it gained over the zero action.
 Searches start in turn from random points, from a gait that is known, and from that gait through easier
 settings (`--easier`). The best of them is chosen by starts that none has met and scored with yet others, the
-starts of `hoof-env evaluate`. The file is written after every search; searches in it are not made again.
+starts of `hoof-env evaluate`. The file is written after every search; searches in it are not repeated.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from agents import runs
-from agents.command import parse_pairs, run
+from agents.command import parse, parse_pairs, run
 from agents.evolution import generations, make_strategy, mean_costs, require
 from hoof_env._output import check_folder
 from hoof_env.envs.open_loop import COMMAND, GAIT, gait_file, open_loop, open_loop_record
@@ -65,7 +65,7 @@ STALLED = 0.01
 TEST_SEED = 1000
 SEARCH_SEED = 10_000_000
 LOOK_SEED = 900_000_000
-"""First seeds of the final score, those of `hoof-env evaluate`, of the searches, and of the looks at them."""
+"""First seeds of the final score (as in `hoof-env evaluate`), of the searches, and of their progress."""
 
 TOLERANCES = {"tolx": 1e-4, "tolfun": 0, "tolfunhist": 0, "tolstagnation": 10**9}
 """Options of CMA-ES that end a search when its steps are small, and for no other reason."""
@@ -157,7 +157,7 @@ class Family(NamedTuple):
 
     def encode(self, parameters: dict[str, Any]) -> Floats:
         """Convert parameters of this family, or of a smaller one, to a point within the box; `ParameterError`
-        for those of another body."""
+        if they are of another body."""
         given = np.asarray(parameters.get("coefficients", parameters.get("constant")), float)
         given = given.reshape(1, 1, -1) if given.ndim == 1 else given
         if given.shape[-1] != len(self.half):
@@ -177,7 +177,7 @@ class Family(NamedTuple):
 
 def family_of(env: Any, family: str, harmonics: int | None = None) -> Family:
     """Return the layout of a family for an environment, single and unwrapped."""
-    body = env.batch.body
+    body = runs.body_of(env)
     is_leg = env.action_form == "rates"
     middle, half = (body.middle, body.half) if is_leg else (np.zeros(8), np.ones(8))
     if family == "constant":
@@ -209,7 +209,7 @@ class Objective:
     ) -> None:
         env: Any = runs.make_env(env_id, **env_kwargs).unwrapped
         self.env = env
-        # Before many are made, whose kernels would have to be compiled
+        # Before the batch, whose kernels would have to be compiled
         form = getattr(env, "action_form", None)
         if form is None or env.task.action_map:
             raise ParameterError(f"env_id: expected an id of this package with many at once, got {env_id!r}")
@@ -233,7 +233,7 @@ class Objective:
         """Return the mean return of the zero action, the gait in which an episode starts."""
         from hoof_env.envs.policies import Scripted
 
-        count = len(self.env.batch.action_names)
+        count = len(self.env.action_names)
         idle = Scripted(lambda observation, time: np.zeros(count, np.float32), self.env.dt)
         return float(np.mean([episode["return"] for episode in play_rows(self.envs, idle, seeds)]))
 
@@ -526,9 +526,7 @@ def place(args: Args) -> Path:
 
 def main(argv: list[str] | None = None) -> None:
     """Search, and print the searches and the score."""
-    import tyro
-
-    args = tyro.cli(Args, args=argv, prog="python -m agents.open_loop", description=__doc__)
+    args = parse(Args, argv, "python -m agents.open_loop", __doc__)
     content = optimise(args)
     for restart in content["restarts"]:
         end = "stalled" if restart["stalled"] else "most episodes spent"

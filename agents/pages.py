@@ -11,7 +11,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from agents import runs
-from agents.baselines_run import CURVE, read_curve
+from agents.experiments.training import CURVE, read_curve
 from hoof_env._plotting import BLUE, GREEN, GREY, ORANGE, STYLE
 from hoof_env.demo import report
 from hoof_env.evaluation.scores import Score

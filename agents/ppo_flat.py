@@ -9,7 +9,7 @@ policy and files are that library's. Networks and gradient are in agents/percept
 
 Three things differ. Rewards are scaled by all returns up to the end of the rollout, not of the step. Among
 the `locals` of a step a callback finds `new_obs`, `rewards`, `dones`, `infos` and `clipped_actions`, but no
-values. Of the losses those of policy and value are logged.
+values. The losses of policy and value are logged.
 """
 
 from __future__ import annotations

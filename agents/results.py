@@ -3,12 +3,13 @@
     python -m agents.results replay                      plays all rows again; or results/NAME.json ...
     python -m agents.results add results/mine.json       replays a row and takes it into results/
     python -m agents.results pages                       writes the tables of pages and package from the rows
-    python -m agents.results score HorseLeg-v0 zero      plays a policy and writes its row
+    python -m agents.results score zero                  plays a policy of HorseLeg-v0 and writes its row
 
 A row says which policy was played on which id, in which episodes, what came out, and which command, commit
-and versions made it. Its policy is a name (`hoof-env list --id ID`) or a folder or file of this repository,
-and the digest of its numbers is in the row. A row of a policy without feedback must pass `agents.blindness`.
-Stock learners keep no policy: their rows are read off learning curves, and again when they are replayed.
+and versions made it. Its policy is a name (`hoof-env list --env-id ID`) or a folder or file of this
+repository, and the digest of its numbers is in the row. A row of a policy without feedback must pass
+`agents.blindness`. Stock learners keep no policy: their rows are read off learning curves, and again when
+they are replayed.
 
 A page shows rows between two comments, `<!-- results: HorseLeg-v0 return speed_m_s -->` and
 `<!-- end of results -->`; `pages` rewrites what is between them.
@@ -27,15 +28,15 @@ from collections.abc import Iterable, Sequence
 from contextlib import suppress
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Any
 
 import numpy as np
-from tyro.conf import Positional, subcommand
+from tyro.conf import Positional
 
 from agents import runs
 from agents.blindness import prove
 from agents.cards import POLICIES
-from agents.command import run
+from agents.command import parse, run
 from agents.ship import shown_command, write_index
 from hoof_env._output import markdown_table
 from hoof_env.envs.open_loop import check_blind, gait_file, open_loop_record
@@ -396,7 +397,8 @@ def stock_row(env_id: str) -> Row:
     return Row(
         env_id, "stock", "", _sha(CURVES.read_bytes()), _FINAL,
         {"return": float(iqm(list(last.values()))[0])}, {"return": None}, last, {"steps": steps},
-        f"python -m agents.stock --env-id {env_id} --algo ppo", ", ".join(commits), {},
+        f"python -m agents.experiments --plan stock --only ppo-{env_id.rpartition('/')[2]}",
+        ", ".join(commits), {},
         "interquartile mean over seeds of the last return on the learning curves; no policy is kept",
     )  # fmt: skip
 
@@ -518,7 +520,7 @@ def head_kinds() -> tuple[str, ...]:
 
 
 def filled(text: str, folder: Path = RESULTS) -> str:
-    """Return the text of a page with its tables made again."""
+    """Return the text of a page with its tables written anew."""
 
     def again(found: re.Match[str]) -> str:
         opening, name, columns, closing = found.groups()
@@ -595,10 +597,10 @@ class Pages:
 class ScoreOne:
     """Play a policy and write its row."""
 
-    name: Positional[str]
-    """name of an id, such as HorseLeg-v0"""
     kind: Positional[str]
     """kind of the row"""
+    env_id: str = runs.DEFAULT_ENV
+    """id of hoof_env"""
     policy: str | None = None
     """name, file or folder of the policy, relative to the repository; otherwise the kind"""
     runs: Path | None = None
@@ -607,17 +609,13 @@ class ScoreOne:
     steps: int | None = None
     """environment steps of each training run"""
     among: int | None = None
-    """number of training runs of which the policy is the best, where their returns were not kept"""
+    """number of training runs of which the policy is the best, where their returns are gone"""
     note: str = ""
     """what a reader must know"""
 
 
-Command = (
-    Annotated[Replay, subcommand("replay")]
-    | Annotated[Add, subcommand("add")]
-    | Annotated[Pages, subcommand("pages")]
-    | Annotated[ScoreOne, subcommand("score")]
-)
+COMMANDS = {"replay": Replay, "add": Add, "pages": Pages, "score": ScoreOne}
+"""Arguments by sub-command."""
 
 
 def confirmed(files: Iterable[Path], are_new: bool) -> Iterable[Row]:
@@ -632,13 +630,11 @@ def confirmed(files: Iterable[Path], are_new: bool) -> Iterable[Row]:
 
 def main(argv: list[str] | None = None) -> None:
     """Run the command."""
-    import tyro
-
-    args: Any = tyro.cli(Command, args=argv, prog="python -m agents.results", description=__doc__)
+    args: Any = parse(COMMANDS, argv, "python -m agents.results", __doc__)
     if isinstance(args, ScoreOne):
-        if "/" in args.name:
-            raise ParameterError(f"name: expected an id of hoof_env without its namespace, got {args.name!r}")
-        env_id = f"hoof_env/{args.name}"
+        env_id = args.env_id
+        if not env_id.startswith("hoof_env/"):
+            raise ParameterError(f"env_id: expected an id of hoof_env, as {runs.DEFAULT_ENV}, got {env_id!r}")
         effort = {"steps": args.steps} if args.steps else {}
         effort |= {"runs": args.among} if args.among else {}
         training = returns_of_runs(args.runs, env_id) if args.runs else {}

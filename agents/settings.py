@@ -20,7 +20,7 @@ Algorithm = Literal["ppo", "ppo_flat", "sac", "td3", "tqc"]  # `ALGORITHMS` and 
 
 
 def algorithm_class(name: str) -> Any:
-    """Return the class of an algorithm: those of `saved.algorithm_class`, and `agents.ppo_flat`."""
+    """Return the class of an algorithm, that of `agents.ppo_flat` or one of `saved.algorithm_class`."""
     if name != "ppo_flat":
         return library_class(name)
     with paused():

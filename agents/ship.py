@@ -1,11 +1,11 @@
-"""Ship trained policies: a small folder for each id, everything in it made by one command.
+"""Ship trained policies: a small folder for each id, written by one command.
 
     python -m agents.ship runs/baselines                for each id the best of all runs beneath this folder
     python -m agents.ship runs/ppo-HorseLeg-v0-s0       this run
 
 The best of an id is that with the highest mean return in episodes on which nothing is reported. What plays is
-in the package, hoof_env/data/policies/NAME: its weights as plain data, how it was trained, its returns with
-those of gaits and how far other machines may be off. agents/policies/NAME has the exported policy, a model
+in the package, hoof_env/data/policies/NAME: its weights as plain data, how it was trained, its returns beside
+the gaits' and how far other machines may be off. agents/policies/NAME has the exported policy, a model
 card, a curve and a film, and agents/policies/README.md lists all. Each folder is written whole or not at all.
 After a change of the card's template `python -m agents.cards` writes the cards of all policies anew.
 """
@@ -28,7 +28,7 @@ from tyro.conf import Positional
 
 from agents import runs
 from agents.cards import CARD, FILM, POLICIES, SCORE, card
-from agents.command import run
+from agents.command import parse, run
 from agents.export import write_policy
 from agents.pages import draw_learning_curve, training_length
 from hoof_env._output import check_folder, markdown_table, staged
@@ -62,7 +62,7 @@ FILM_SECONDS = 4.0
 
 COPIED = (WEIGHTS, ABOUT, runs.CONFIG)
 PACKAGED = (WEIGHTS, ABOUT, runs.RECORD, SCORE)
-"""Files of the package; the others are looked at."""
+"""Files of the package; people read the rest."""
 
 
 @dataclass(frozen=True)
@@ -71,7 +71,7 @@ class Args:
 
     runs: Positional[Path]
     """a run folder of agents.train, or a folder with several beneath it"""
-    ids: tuple[str, ...] = ()
+    env_id: tuple[str, ...] = ()
     """only these ids"""
     out: Path = POLICIES
     """folder for the policies' folders; in another one than this they have all files"""
@@ -136,7 +136,7 @@ def ship(choice: Choice, env_id: str, out: Path) -> dict[str, Any]:
     """
     saved = choice.saved
     trained_on = own_id(choice.saved.record["env_id"])
-    # A vector reward has no score: the episodes are those of the id whose policy it shares
+    # A vector reward has no score: it plays the episodes of the id whose policy it shares
     played_on = trained_on if env_id in STANDS_FOR else env_id
     if not len(runs.read_episodes(saved.path.parent)):
         raise DataFileError(f"run {saved.path.parent}: expected a training in which episodes end, got none")
@@ -298,9 +298,7 @@ def write_index(folder: Path, scores: Path) -> None:
 
 def main(argv: list[str] | None = None) -> None:
     """Choose and ship the policy of each id."""
-    import tyro
-
-    args = tyro.cli(Args, args=argv, prog="python -m agents.ship", description=__doc__)
+    args = parse(Args, argv, "python -m agents.ship", __doc__)
     models = find_runs(args.runs)
     sources = {env_id: env_id for env_id in models}
     # An id without a training of its own may be played by another's policy
@@ -309,7 +307,7 @@ def main(argv: list[str] | None = None) -> None:
         for env_id, trained_on in STANDS_FOR.items()
         if env_id not in models and trained_on in models
     }
-    ids = [check_choice("ids", env_id, sources) for env_id in args.ids] or list(sources)
+    ids = [check_choice("env_id", env_id, sources) for env_id in args.env_id] or list(sources)
     check_folder(args.out)
     choices = {source: choose(models[source], source) for source in {sources[env_id] for env_id in ids}}
     for env_id in ids:
@@ -318,7 +316,9 @@ def main(argv: list[str] | None = None) -> None:
         write_index(args.out, SHIPPED if args.out == POLICIES else args.out)
         print(f"{env_id}: " + ", ".join(f"{name} {value:.2f}" for name, value in means.items()), flush=True)
     if args.out == POLICIES:
-        print("next: python -m agents.results score NAME shipped --runs RUNS, for each; then ... pages")
+        print(
+            "next: python -m agents.results score shipped --env-id ID --runs RUNS, for each; then ... pages"
+        )
 
 
 if __name__ == "__main__":

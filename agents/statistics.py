@@ -26,7 +26,7 @@ def described(values: Sequence[float]) -> dict[str, float]:
 
 
 def dominates(figures: Mapping[str, float], run: Mapping[str, float]) -> bool:
-    """True if means dominate those of the run: `LOWER`, a share of the weight between the run's and 1, a
+    """True if means dominate the run's: `LOWER`, a share of the weight between the run's and 1, a
     higher speed."""
     lower = all(figures[key] <= part * run[key] for key, part in LOWER.items())
     # Neither softer by bearing less, nor pulled down by the suspension

@@ -23,7 +23,7 @@ import numpy as np
 import yaml
 
 from agents import checkpoints, runs
-from agents.command import check_threads, parse_pairs, run
+from agents.command import check_threads, parse, parse_pairs, run
 from agents.settings import (
     FOLDER,
     TrainingArgs,
@@ -52,7 +52,7 @@ class Args(TrainingArgs):
     """go on with the run in --out, which the same command began; without one there, start it. Its checkpoints
     are pickles, which can run any code: resume only runs that you trust"""
     checkpoint_every: float = 30.0
-    """seconds between two checkpoints, which stand between two rollouts; the last two are kept; 0: none"""
+    """seconds between two checkpoints, which stand between two rollouts; the last two stay; 0: none"""
     max_minutes: float | None = None
     """stop after this time, counted from this start, even if steps are left"""
     device: str = "cpu"
@@ -333,9 +333,7 @@ def make_logger(folder: Path, hidden: int) -> Any:
 
 def main(argv: list[str] | None = None) -> int:
     """Train, and return the exit code."""
-    import tyro
-
-    trained = train(tyro.cli(Args, args=argv, prog="python -m agents.train", description=__doc__))
+    trained = train(parse(Args, argv, "python -m agents.train", __doc__))
     print(f"{'interrupted: ' if trained.stopped_by else ''}{trained}")
     return 128 + trained.stopped_by if trained.stopped_by else 0
 

@@ -4,7 +4,7 @@
     python -m agents.tune --trials 60 --steps 1500000          the same study goes on until it has 60
     optuna trials --storage sqlite:///runs/tune/ppo-HorseLeg-v0/study.db --study-name study
 
-A trial draws settings from agents/studies/spaces.yml, trains by agents.train with a seed of its own, and is
+A trial draws settings from agents/search_spaces.yml, trains by agents.train with a seed of its own, and is
 scored as it goes on 64 episodes with which no training starts; a bad one is pruned. Ctrl-C ends the trial in
 hand; the same command goes on, even after kill -9, when the trial that was killed is run again. One process
 works on a study. Its folder holds study.db (Optuna's), best.yml (for --hyperparams of agents.train) and
@@ -24,14 +24,14 @@ from typing import Any
 import yaml
 
 from agents import runs
-from agents.command import parse_pairs, run
+from agents.command import parse, parse_pairs, run
 from agents.settings import FOLDER, TrainingArgs, load_settings
 from agents.train import Args as TrainArgs
 from agents.train import checked, make_model, make_record, train
 from agents.watch import DivergedError, EndedError, Scorer
 from hoof_env.errors import DataFileError, ParameterError, check_number, parse_json
 
-SPACES = Path(__file__).parent / "studies" / "spaces.yml"
+SPACES = Path(__file__).with_name("search_spaces.yml")
 SEEDS = range(1000, 1064)  # scored episodes; trainings start theirs from other seeds
 
 
@@ -40,7 +40,7 @@ class Args(TrainingArgs):
     """Arguments of the command."""
 
     trials: int = 20
-    """that the study has in the end, those of earlier starts counted"""
+    """trials of the study in the end, with earlier starts counted"""
     scores: int = 10
     """how often a trial is scored, the last time at its end"""
     space: Path = SPACES
@@ -52,7 +52,7 @@ class Args(TrainingArgs):
 
 
 def load_space(path: Path, algo: str) -> dict[str, Any]:
-    """Return the ranges of `algo` in a file like agents/studies/spaces.yml: key to a list, or to a mapping
+    """Return the ranges of `algo` in a file like agents/search_spaces.yml: key to a list, or to a mapping
     with "uniform" or "log" [low, high] and perhaps "lin".
 
     Raises:
@@ -222,7 +222,7 @@ def finished(study: Any) -> list[Any]:
 
 
 def open_study(args: Args, folder: Path, about: dict[str, Any]) -> Any:
-    """Return the study in `folder`, made if need be; a trial that was killed is queued to be run again.
+    """Return the study in `folder`, or a new one; a trial that was killed is queued to run again.
 
     Raises:
         ParameterError: Optuna is missing, the settings do not fit the algorithm, or the study was begun with
@@ -291,9 +291,7 @@ def write_best(study: Any, folder: Path, env_id: str) -> None:
 
 def main(argv: list[str] | None = None) -> None:
     """Search, and print the number of trials."""
-    import tyro
-
-    args = tyro.cli(Args, args=argv, prog="python -m agents.tune", description=__doc__)
+    args = parse(Args, argv, "python -m agents.tune", __doc__)
     study = tune(args)
     print(f"{args.algo} on {args.env_id}: {len(finished(study))} trials")
 

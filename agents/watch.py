@@ -180,7 +180,7 @@ class Scorer(BaseCallback):
 
     @abstractmethod
     def keep(self, episodes: list[dict[str, float]]) -> None:
-        """Store or report a score; `episodes` are those of `play`."""
+        """Store or report a score; `episodes` are as `play` returns them."""
 
     def score(self) -> None:
         """Score the policy, with the clock stopped."""

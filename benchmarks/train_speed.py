@@ -3,7 +3,7 @@
     python -m benchmarks.train_speed      writes train_speed.json and .md, where `benchmarks.speed` does
 
 Each round trains every case, in a new order, for one rollout and its updates, with the settings of
-agents/hyperparams. `python -m agents.baselines --subset trainers` has the results of such trainings.
+agents/hyperparams. `python -m agents.experiments --plan trainers` has the results of such trainings.
 """
 
 from __future__ import annotations

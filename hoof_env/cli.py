@@ -18,6 +18,7 @@ from hoof_env._output import bear_any_output, flush_or_drop
 from hoof_env._version import __version__
 from hoof_env.commands.lab import average, compare
 from hoof_env.commands.manual import manual
+from hoof_env.commands.options import parse
 from hoof_env.commands.played import USUAL, Played
 from hoof_env.commands.policies import demo, evaluate, list_ids
 from hoof_env.commands.said import say as _say
@@ -76,7 +77,7 @@ def render(
     check_place(out, FFMPEG)
     with new_file(out, overwrite) as file:
         count = render_episode(
-            file, episode.policy, episode.id, episode.args, episode.seed, seconds, slow, fps, size
+            file, episode.policy, episode.env_id, episode.env_kwargs, episode.seed, seconds, slow, fps, size
         )
     _say(f"{out}: {count} frames, {count / fps:.1f} s, {_size(out)}{made}")
 
@@ -102,7 +103,7 @@ def view(
     """
     from hoof_env.view.server import view
 
-    view(episode.id, episode.args, episode.policy, episode.seed, address, port, open, out, host)
+    view(episode.env_id, episode.env_kwargs, episode.policy, episode.seed, address, port, open, out, host)
 
 
 def export(
@@ -140,8 +141,8 @@ def export(
         rows, weight = export_episode(
             file,
             episode.policy,
-            episode.id,
-            episode.args,
+            episode.env_id,
+            episode.env_kwargs,
             episode.seed,
             seconds,
             threshold,
@@ -237,19 +238,13 @@ def main(arguments: Sequence[str] | None = None) -> int:
     if options == ["--version"]:
         _say(f"hoof-env {__version__}")
         return 0
-    # For --id module:..., as `python -m hoof_env` has it; last, so that no file there hides another module.
+    # For --env-id module:..., as `python -m hoof_env` has it; last, so that no file there hides a module.
     if not {"", os.getcwd()} & set(sys.path):
         sys.path.append(os.getcwd())
     try:
-        import tyro
-
+        about = "A horse's leg, or a horse, on the ground. --version prints the version."
         with _warnings_of_one_line():
-            tyro.extras.subcommand_cli_from_dict(
-                COMMANDS,
-                prog="hoof-env",
-                description="A horse's leg, or a horse, on the ground. --version prints the version.",
-                args=options,
-            )
+            parse(COMMANDS, options, "hoof-env", about)
         sys.stdout.flush()
     except HoofEnvError as error:
         print(f"hoof-env: error: {error}", file=sys.stderr)

@@ -106,7 +106,7 @@ def parse_json(text: str | bytes) -> Any:
 def parse_pairs(option: str, items: Sequence[str]) -> dict[str, Any]:
     """Read `key=value` items, or JSON objects, into one mapping; a value that is not JSON is kept as text.
 
-    >>> parse_pairs("--args", ["trunk=rail", "restitution=0.5", '{"render_mode": null}'])
+    >>> parse_pairs("--env-kwargs", ["trunk=rail", "restitution=0.5", '{"render_mode": null}'])
     {'trunk': 'rail', 'restitution': 0.5, 'render_mode': None}
 
     Raises:

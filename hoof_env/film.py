@@ -239,7 +239,7 @@ def render_episode(
     check_number("slow", slow, low=1e-3, high=1e3)
     check_number("seed", seed, low=0)
     check_number("seconds", seconds, low=0, exclusive_low=True)
-    with records.make_env(env_id, parse_pairs("--args", arguments)) as env:
+    with records.make_env(env_id, parse_pairs("--env-kwargs", arguments)) as env:
         player = records.find_policy(policy, env, env_id, seed)
         renderer = Renderer(records.surroundings(env), size=size)
         played = records.episode(env, player, seed, seconds)

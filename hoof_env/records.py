@@ -341,7 +341,7 @@ def export_episode(
         )
     if reactions and suffix == ".c3d":
         raise ParameterError("reactions: expected a .csv, .parquet, .mot or .sto, got .c3d")
-    env_arguments = parse_pairs("--args", arguments)
+    env_arguments = parse_pairs("--env-kwargs", arguments)
     with make_env(env_id, env_arguments) as env:
         names = units_of(env, reactions)
         on = check_bodies(parse_pairs("--bodies", bodies), limbs_of(names))

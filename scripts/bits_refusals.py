@@ -314,11 +314,11 @@ def of_commands() -> Iterator[Case]:
 
     lines = (
         "export --out x.doc", "export --out x.c3d --reactions", "export --out x.csv --policy fly",
-        "export --out x.csv --id nothing/Here-v0", "export --out x.csv --args trunk_mass=-1",
+        "export --out x.csv --env-id nothing/Here-v0", "export --out x.csv --env-kwargs trunk_mass=-1",
         "export --out x.mot --units BW", "render --out x.avi", "render --out x.gif --seconds 0",
         "compare nothing.csv nothing.mot", "compare a.csv b.csv --align dance",
-        "manual --id hoof_env/Nothing-v0",
-        "average nothing.csv --out mean.txt", "fly", "export --out x.csv --args trunk_mas=1",
+        "manual --env-id hoof_env/Nothing-v0",
+        "average nothing.csv --out mean.txt", "fly", "export --out x.csv --env-kwargs trunk_mas=1",
     )  # fmt: skip
     for line in lines:
         yield f"hoof-env {line}", told(*line.split())

@@ -7,6 +7,7 @@ import sys
 import pytest
 
 from hoof_env import __version__, cli
+from hoof_env.commands.options import names_of
 
 HOOF_ENV = [sys.executable, "-m", "hoof_env.cli"]
 
@@ -143,7 +144,35 @@ def test_an_id_of_a_module_in_the_current_folder(tmp_path):
     bin = tmp_path / "bin"
     bin.mkdir()
     (bin / "hoof-env").write_text("import sys\nfrom hoof_env.cli import main\nsys.exit(main())\n")
-    command = [sys.executable, str(bin / "hoof-env"), "manual", "--id", "my_task:mine/X-v0"]
+    command = [sys.executable, str(bin / "hoof-env"), "manual", "--env-id", "my_task:mine/X-v0"]
     done = subprocess.run(command, capture_output=True, text=True, timeout=300, check=False, cwd=tmp_path)
     assert (done.returncode, done.stderr) == (0, "")
     assert done.stdout.startswith("mine/X-v0 (import my_task): ")
+
+
+@pytest.mark.parametrize(
+    ("words", "own", "other"),
+    [
+        (["export", "--out", "x.csv", "--idd", "3"], "--reactions", "--port"),
+        (["view", "--policy-id", "x"], "--port", "--reactions"),
+        (["render", "--out", "x.mp4", "--fps", "many"], "--slow", "--reactions"),
+        (["compare", "a.csv", "b.csv", "--mapa", "x"], "--units-b", "--points"),
+    ],
+)
+def test_a_wrong_option_shows_the_options_of_its_command(words, own, other, capsys):
+    with pytest.raises(SystemExit) as end:
+        cli.main(words)
+    assert end.value.code == 2
+    told = capsys.readouterr().err
+    assert told.splitlines()[-1].startswith(f"options of hoof-env {words[0]}: --")
+    assert own in told
+    assert other not in told
+
+
+@pytest.mark.parametrize("name", cli.COMMANDS)
+def test_an_environment_has_the_same_options_everywhere(name):
+    """As in commands of agents: `--env-id` and `--env-kwargs`."""
+    names = names_of(cli.COMMANDS[name])
+    assert not {"--id", "--args", "--env", "--kwargs"} & {*names}
+    assert ("--env-kwargs" in names) <= ("--env-id" in names)
+    assert ("--env-id" in names) == (name in ("render", "view", "export", "manual", "evaluate", "list"))

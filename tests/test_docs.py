@@ -13,9 +13,9 @@ from hoof_env.tasks.reward import check_weights
 from tests.test_rooms import FLOORS
 
 ROOT = Path(__file__).resolve().parent.parent
-FOLDERS = ("agents", "benchmarks", "docs", "examples", "hoof_env", "results", "scripts", "tests")
+FOLDERS = ("agents", "benchmarks", "docs", "examples", "hoof_env", "results", "scripts", "studies", "tests")
 PAGES = sorted([*ROOT.glob("*.md"), *(page for folder in FOLDERS for page in (ROOT / folder).rglob("*.md"))])
-LIVE = [page for page in PAGES if "evidence" not in page.parts]
+LIVE = [page for page in PAGES if not {"evidence", "studies"} & {*page.parts}]
 """Frozen pages name the commands of their commits."""
 HAND_WRITTEN = (
     "agents", "decisions", "elasticity", "engine", "help", "horse", "look_inside", "own_task", "paper",

@@ -107,7 +107,7 @@ DEEP = "[" * 30000 + "]" * 30000
 @pytest.mark.parametrize("item", [f"terrain={DEEP}", '{"a":' * 30000 + "1" + "}" * 30000])
 def test_what_is_nested_too_deep_is_refused_in_few_words(item):
     with pytest.raises(ParameterError, match="nested too deep") as refused:
-        parse_pairs("--args", [item])
+        parse_pairs("--env-kwargs", [item])
     assert len(str(refused.value)) < 500
 
 

@@ -146,7 +146,7 @@ def test_the_impulse_in_the_file_is_the_change_of_momentum(episode, tmp_path):
 def test_the_fixed_leg_is_recorded_too(solver, tmp_path):
     out = tmp_path / "walk.csv"
     assert cli.main(
-        ["export", "--out", str(out), "--id", "hoof_env/HorseLegFixed-v0", "--args", f"solver={solver}",
+        ["export", "--out", str(out), "--env-id", FIXED, "--env-kwargs", f"solver={solver}",
          "--policy", "walk", "--seconds", "0.1"]
     ) == 0  # fmt: skip
     table = np.genfromtxt(out, delimiter=",", names=True, deletechars="")
@@ -214,7 +214,7 @@ def test_the_policy_that_plays_if_none_is_named(env_id, given, name):
 def test_the_commands_start_in_the_gait_that_they_name(tmp_path, env_id, name):
     """And keep it, also where episodes start in another one: no gait is clipped."""
     out = tmp_path / "x.csv"
-    command = ["export", "--out", str(out), "--id", env_id, "--policy", name, "--seconds", "0.1"]
+    command = ["export", "--out", str(out), "--env-id", env_id, "--policy", name, "--seconds", "0.1"]
     assert cli.main(command) == 0
     table = np.genfromtxt(out, delimiter=",", names=True, deletechars="")
     for parameter, value in vars(load_gait(name)).items():
@@ -225,7 +225,7 @@ def test_the_commands_start_in_the_gait_that_they_name(tmp_path, env_id, name):
 def test_the_run_on_the_fixed_trunk_is_the_papers(tmp_path):
     """Peak and mean of the normal force, by the exact solver, over the stride that an episode lasts."""
     out = tmp_path / "run.csv"
-    assert cli.main(["export", "--out", str(out), "--id", FIXED, "--policy", "run"]) == 0
+    assert cli.main(["export", "--out", str(out), "--env-id", FIXED, "--policy", "run"]) == 0
     table = np.genfromtxt(out, delimiter=",", names=True, deletechars="")
     normal = column_of(table, "toe_normal") + column_of(table, "heel_normal")
     assert round(normal.max()) == 5697
@@ -275,7 +275,7 @@ def test_a_trained_model_without_its_library(tmp_path, capsys, monkeypatch):
 
 
 def test_arguments_are_pairs_or_objects():
-    assert parse_pairs("--args", ["trunk=rail", "dt=0.01", '{"preset": null}']) == {
+    assert parse_pairs("--env-kwargs", ["trunk=rail", "dt=0.01", '{"preset": null}']) == {
         "trunk": "rail", "dt": 0.01, "preset": None,
     }  # fmt: skip
 

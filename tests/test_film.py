@@ -32,8 +32,16 @@ SMALL = ["--size", "480", "270"]
         ("run.MP4", ["--seconds", "0.1", "--slow", "4", "--fps", "25"], 11),
         ("walk.gif", ["--seconds", "0.2", "--fps", "25", "--policy", "walk"], 6),
         ("fast.gif", ["--seconds", "0.2", "--slow", "0.5", "--policy", "random"], 6),
-        ("fixed.mp4", ["--seconds", "0.1", "--id", "hoof_env/HorseLegFixed-v0", "--args", "gait=run"], 6),
-        ("short.mp4", ["--seconds", "9", "--args", "episode_seconds=0.1", "--policy", "6,0.7,-0.2,-0.3"], 6),
+        (
+            "fixed.mp4",
+            ["--seconds", "0.1", "--env-id", "hoof_env/HorseLegFixed-v0", "--env-kwargs", "gait=run"],
+            6,
+        ),
+        (
+            "short.mp4",
+            ["--seconds", "9", "--env-kwargs", "episode_seconds=0.1", "--policy", "6,0.7,-0.2,-0.3"],
+            6,
+        ),
     ],
 )
 def test_a_film_has_its_frames(name, options, count, tmp_path, capsys):
@@ -110,7 +118,7 @@ def _is_begun(folder):
 @pytest.mark.skipif(sys.platform == "win32", reason="no SIGINT to another process")
 def test_an_interrupt_is_one_line_and_leaves_nothing_behind(tmp_path):
     command = [sys.executable, "-m", "hoof_env.cli", "render", "--out", str(tmp_path / "x.mp4")]
-    options = ["--seconds", "1000", "--args", "episode_seconds=1000"]
+    options = ["--seconds", "1000", "--env-kwargs", "episode_seconds=1000"]
     with subprocess.Popen([*command, *options], stderr=subprocess.PIPE, text=True) as process:
         while not _is_begun(tmp_path):
             assert process.poll() is None

@@ -15,7 +15,7 @@ from hoof_env.records import export_episode
 CSV = ("--out", "{}/x.csv")
 XML = ("--out", "{}/x.xml")
 MP4 = ("--out", "{}/x.mp4")
-PAIRS = "--args: expected a JSON .*key=value, got"
+PAIRS = "--env-kwargs: expected a JSON object or key=value, got"
 
 REQUESTS = {
     "reproduce": [
@@ -29,24 +29,27 @@ REQUESTS = {
         ([*CSV, "--policy", "99,0,0,0"], "expected crank_speed from 0 to 12.5664.* got 99"),
         ([*CSV, "--policy", "no.zip"], "model no.zip"),
         (
-            [*CSV, "--id", "hoof_env/Nobody-v0"],
-            "environment 'hoof_env/Nobody-v0' .*arguments: expected a registered id",
+            [*CSV, "--env-id", "hoof_env/Nobody-v0"],
+            "environment 'hoof_env/Nobody-v0' with no arguments: expected a registered id",
         ),
         *(
-            ([*CSV, "--id", given], r"did you mean hoof_env/HorseLegRail-v0\?")
+            ([*CSV, "--env-id", given], r"did you mean hoof_env/HorseLegRail-v0\?")
             for given in ("HorseLegRail", "horselegrail-v0", "hoof_env/HorseLegRial-v0")
         ),
-        ([*CSV, "--id", "nothing/Like-v0"], "with no arguments: expected a registered id (?!.*did you mean)"),
-        ([*CSV, "--id", "CartPole-v1"], "expected a single .*got CartPole"),
-        ([*CSV, "--args", "wings=2"], "unexpected keyword argument 'wings'(?!.*creator)"),
+        (
+            [*CSV, "--env-id", "nothing/Like-v0"],
+            "with no arguments: expected a registered id (?!.*did you mean)",
+        ),
+        ([*CSV, "--env-id", "CartPole-v1"], "expected a single one of this package .* got CartPole"),
+        ([*CSV, "--env-kwargs", "wings=2"], "unexpected keyword argument 'wings'(?!.*creator)"),
         *(
-            ([*CSV, "--args", given], f"{PAIRS} '{given.format()}'")
+            ([*CSV, "--env-kwargs", given], f"{PAIRS} '{given.format()}'")
             for given in ("trunk", "=3", "{{trunk: 1}}")
         ),
-        ([*CSV, "--args", "trunk=cloud"], "trunk: expected .*, got 'cloud'"),
-        ([*CSV, "--seconds", "0"], "seconds: expected .*got 0"),
-        ([*CSV, "--seed", "-1"], "seed: expected .*got -1"),
-        (["--out", "{}"], "expected .*, got"),
+        ([*CSV, "--env-kwargs", "trunk=cloud"], "trunk: expected one of .*, got 'cloud'"),
+        ([*CSV, "--seconds", "0"], "seconds: expected .* got 0"),
+        ([*CSV, "--seed", "-1"], "seed: expected .* got -1"),
+        (["--out", "{}"], "expected a file that ends in .*, got"),
         (["--out", "{}/taken/x.csv"], "cannot write to '.*taken'"),
         (["--out", "{}/folder.csv"], "cannot write to '.*folder.csv': expected .*got a folder"),
         ([*CSV, "--threshold", "-1"], "threshold: expected .*got -1"),
@@ -65,21 +68,21 @@ REQUESTS = {
         ),
         (["--out", "{}/x.mot", "--bodies", "tail=x"], "bodies: expected leg=BODY, got tail='x'"),
         (
-            [*CSV, "--policy", "idle", "--args", "episode_seconds=1e6"],
-            "GB of memory, and .*are free; expected a shorter .*--seconds",
+            [*CSV, "--policy", "idle", "--env-kwargs", "episode_seconds=1e6"],
+            "GB of memory, and .* are free; expected a shorter .*--seconds",
         ),
     ],
     "render": [
         (["--out", "{}/x.avi"], "expected .*.gif, .mp4, got"),
         (["--out", "{}/x.gif", "--fps", "60"], "fps: expected 50, 25.* got 60"),
-        ([*MP4, "--fps", "0"], "fps: expected .*got 0"),
-        ([*MP4, "--slow", "0"], "slow: expected .*got 0"),
-        ([*MP4, "--seconds", "-1"], "seconds: expected .*got -1"),
-        ([*MP4, "--seconds", "nan"], "seconds: expected .*got nan"),
-        ([*MP4, "--size", "10", "10"], "size: expected .*got"),
-        ([*MP4, "--policy", "gallop"], "policy: expected .*got 'gallop'"),
-        (["--out", "{}/a/b/x.mp4", "--policy", "gallop"], "policy: expected .*got 'gallop'"),
-        ([*MP4, "--args", "render_mode=human"], "render_mode: expected none, as"),
+        ([*MP4, "--fps", "0"], "fps: expected .* got 0"),
+        ([*MP4, "--slow", "0"], "slow: expected .* got 0"),
+        ([*MP4, "--seconds", "-1"], "seconds: expected .* got -1"),
+        ([*MP4, "--seconds", "nan"], "seconds: expected .* got nan"),
+        ([*MP4, "--size", "10", "10"], "size: expected .* got"),
+        ([*MP4, "--policy", "gallop"], "policy: expected .* got 'gallop'"),
+        (["--out", "{}/a/b/x.mp4", "--policy", "gallop"], "policy: expected .* got 'gallop'"),
+        ([*MP4, "--env-kwargs", "render_mode=human"], "render_mode: expected none, as"),
     ],
     "mjcf": [
         (["--out", "{}/x.urdf"], "expected .*.xml, got"),

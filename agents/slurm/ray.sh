@@ -3,7 +3,7 @@
 #
 #   sbatch --nodes=4 --cpus-per-task=16 agents/slurm/ray.sh --algo ppo_flat --seeds 64 --out /shared/hoof
 #
-# The arguments are those of `agents.distribute trials`; all nodes see --out. The trials of a node that is lost
+# The arguments are those of `agents.distribute`; all nodes see --out. The trials of a node that is lost
 # go on on the others, and the same command given again runs what is missing.
 #SBATCH --job-name=hoof-ray
 #SBATCH --output=%x-%j.log
@@ -23,7 +23,7 @@ result=$(mktemp) # of the trials; the step's own code is that of nodes which are
 srun --no-kill --wait=60 --cpus-per-task="${SLURM_CPUS_PER_TASK:-1}" \
   ray symmetric-run --address "$address:$((20000 + SLURM_JOB_ID % 10000))" \
   --min-nodes "$SLURM_JOB_NUM_NODES" --num-cpus "${SLURM_CPUS_PER_TASK:-1}" -- \
-  bash -c 'python -m agents.distribute trials --address auto "$@"; echo $? >"$0"' "$result" "$@"
+  bash -c 'python -m agents.distribute --address auto "$@"; echo $? >"$0"' "$result" "$@"
 code=$(<"$result")
 rm "$result"
 [ -n "$code" ] || echo 'Ray did not start; its messages are above' >&2

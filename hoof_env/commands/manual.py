@@ -9,20 +9,20 @@ from hoof_env._output import terminal_table
 from hoof_env.commands.said import say
 
 
-def manual(id: str = "hoof_env/HorseLeg-v0") -> None:
+def manual(env_id: str = "hoof_env/HorseLeg-v0") -> None:
     """Print the arguments, actions, observation and rewards of an environment, with units and meanings.
 
     Args:
-        id: id of the environment; one of your own may be module:id.
+        env_id: id of the environment; one of your own may be module:id.
     """
     from hoof_env.envs.manual import tables_of, task_of_id
     from hoof_env.envs.shipped import summaries
 
-    tables = tables_of(id)
-    task = task_of_id(id)
+    tables = tables_of(env_id)
+    task = task_of_id(env_id)
     width = shutil.get_terminal_size((110, 24)).columns
     module = f" (import {task.module})" if task.module else ""
-    say(f"{id.rpartition(':')[2]}{module}: {summaries().get(id, task.summary)}")
+    say(f"{env_id.rpartition(':')[2]}{module}: {summaries().get(env_id, task.summary)}")
     for title, table in tables.items():
         say(f"\n{title}\n")
         say(terminal_table(table.head, [[without_links(cell) for cell in row] for row in table.rows], width))

@@ -17,9 +17,9 @@ class Episode:
     random, bang-bang, drag or airborne; the .json of an open-loop gait, to which the policy goes, or
     open-loop for the best one of the package; or a trained model (only one that you trust: a model is code).
     The default is run, or the reference gait of a horse."""
-    id: str = "hoof_env/HorseLeg-v0"
+    env_id: str = "hoof_env/HorseLeg-v0"
     """id of the environment."""
-    args: tuple[str, ...] = ()
+    env_kwargs: tuple[str, ...] = ()
     """arguments of the environment: key=value ..., or one JSON object."""
     seed: int = 0
     """seed of the first episode and of "random"; others follow it."""

@@ -24,8 +24,8 @@ EXTRAS = {
 def evaluate(
     policies: tuple[str, ...],
     /,
-    id: str | None = None,
-    args: tuple[str, ...] = (),
+    env_id: str | None = None,
+    env_kwargs: tuple[str, ...] = (),
     episodes: int | None = None,
     seed: int | None = None,
     published: bool = False,
@@ -38,9 +38,10 @@ def evaluate(
         policies: policies as in `hoof-env render`: names, shipped, open-loop, paths of models (trusted ones
             only: a model is code) and gaits; or module:function, a function of observations, shape (n, k),
             that returns actions.
-        id: id of the environment; otherwise that of the first model or gait file, or hoof_env/HorseLeg-v0.
-        args: arguments of the environment: key=value ..., or one JSON object; otherwise those of the first
-            model or gait file.
+        env_id: id of the environment; otherwise that of the first model or gait file, or
+            hoof_env/HorseLeg-v0.
+        env_kwargs: arguments of the environment: key=value ..., or one JSON object; otherwise those of the
+            first model or gait file.
         episodes: number of episodes of each policy; 20 if left out.
         seed: seed of the first episode; 1000 if left out. The others follow it.
         published: play the 100 episodes of the published tables, print their lines in Markdown, and refuse
@@ -56,7 +57,9 @@ def evaluate(
     if out is not None:
         made = check_new(out, overwrite)
         check_place(out, scores.WRITERS)
-    found = scores.evaluate(policies, id, parse_pairs("--args", args) or None, episodes, seed, published)
+    found = scores.evaluate(
+        policies, env_id, parse_pairs("--env-kwargs", env_kwargs) or None, episodes, seed, published
+    )
     with_what = f" with {found.env_kwargs}" if found.env_kwargs else ""
     say(f"{found.env_id}{with_what}, episodes {found.seeds[0]:,} to {found.seeds[-1]:,}\n")
     say(scores.published_lines(found.scores) if published else scores.text_table(found.scores))
@@ -66,34 +69,36 @@ def evaluate(
         say(f"\n{out}: {size(out)}{made}")
 
 
-def list_ids(id: str | None = None) -> None:
+def list_ids(env_id: str | None = None) -> None:
     """List the environments, what returns are good in each, its policies, and the extras that are installed.
 
     Args:
-        id: only this environment, with the names of its scripted policies.
+        env_id: only this environment, with the names of its scripted policies.
     """
     from hoof_env.envs.shipped import good_returns, summaries
     from hoof_env.policies.find import names_of, shipped_policy
 
     known = summaries()
-    if id is not None and id not in known:
-        raise ParameterError(f"id: expected one of {', '.join(known)}, got {id!r}")
-    for name in known if id is None else [id]:
+    if env_id is not None and env_id not in known:
+        raise ParameterError(f"env_id: expected one of {', '.join(known)}, got {env_id!r}")
+    for name in known if env_id is None else [env_id]:
         ships = shipped_policy(name)
         sizes = f"{ships.action_space.shape[0]} actions, {ships.observation_space.shape[0]} observations"
         say(f"{name}: {known[name]}")
         say(f"    {sizes}; mean returns: {good_returns(name.removeprefix('hoof_env/'))}")
-    if id is None:
+    if env_id is None:
         installed = [extra for extra, module in EXTRAS.items() if find_spec(module)]
         missing = [extra for extra in EXTRAS if extra not in installed]
         say(f"\nextras that are installed: {', '.join(installed) or 'none'}")
         if missing:
             say(f'others: {", ".join(missing)} (pip install "hoof-env[{missing[0]}]")')
-        say("next: hoof-env evaluate shipped open-loop run, or hoof-env list --id ID for its policies")
+        say(
+            "next: hoof-env evaluate shipped open-loop run, or hoof-env list --env-id ENV_ID for its policies"
+        )
         return
     from hoof_env.envs.made import make_env
 
-    with make_env(id) as env:
+    with make_env(env_id) as env:
         say(f"    policies: {', '.join(names_of(env))}")
 
 

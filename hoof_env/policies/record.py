@@ -127,11 +127,12 @@ def environment_of(
     for name, asked in asks.items():
         if own_id(asked) not in gym.registry:
             module = "" if ":" in asked else "MODULE:"
-            option = f"--id {module}{asked}" if name == "env_id" else "--id, with the task as its argument"
+            option = (
+                f"--env-id {module}{asked}" if name == "env_id" else "--env-id, with the task as its argument"
+            )
             raise DataFileError(
                 f"{path}: expected the id of an environment that is registered here, got {name} {asked!r}; a"
-                f" file must not import a module. If you trust it, name it yourself: {option} (of agents:"
-                " --env-id)"
+                f" file must not import a module. If you trust it, name it yourself: {option}"
             )
     if "task" in asks:
         kwargs = kwargs | {"task": registered_task(asks["task"])}

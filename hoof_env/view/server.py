@@ -233,7 +233,7 @@ def view(
     """
     setup = {
         "env_id": env_id,
-        "arguments": parse_pairs("--args", arguments),
+        "arguments": parse_pairs("--env-kwargs", arguments),
         "policy": policy,
         "seed": seed,
     }

@@ -75,11 +75,13 @@ def test_blind_groups_are_all_that_depend_on_no_force():
 
 
 def test_a_bar_that_sees_the_ground_is_refused(tmp_path):
-    args = ["--ids", "HorseLeg-v0", "--observation", "crank", "gait", "trunk", "--out", str(tmp_path)]
+    args = ["--env-id", LEG, "--observation", "crank", "gait", "trunk", "--out", str(tmp_path)]
     with pytest.raises(ParameterError, match=r"depend on no force, of crank, gait.* got trunk"):
         bar.main(args)
-    with pytest.raises(ParameterError, match=r"ids: expected one of .*HorseLeg-v0.*got 'HorseLegs-v0'"):
-        bar.main(["--ids", "HorseLegs-v0"])
+    with pytest.raises(
+        ParameterError, match=r"env_id: expected one of .*HorseLeg-v0.*got 'hoof_env/HorseLegs-v0'"
+    ):
+        bar.main(["--env-id", "hoof_env/HorseLegs-v0"])
     for seeds in ("0", "-1"):
         with pytest.raises(ParameterError, match=f"seeds: .*got {seeds}"):
             bar.main(["--seeds", seeds])
@@ -100,7 +102,7 @@ def small(monkeypatch):
 
 def test_one_command_finds_a_bar_and_goes_on_where_it_ended(small, tmp_path, monkeypatch):
     name = "HorseLegFixed-v0"
-    args = ["--ids", name, "--seeds", "2", "--steps", "2048", "--episodes", "192"]
+    args = ["--env-id", f"hoof_env/{name}", "--seeds", "2", "--steps", "2048", "--episodes", "192"]
     args += ["--runs", str(tmp_path / "runs"), "--out", str(tmp_path / "rows")]
     bar.main(args)
     rows = {

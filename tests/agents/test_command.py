@@ -4,8 +4,12 @@ cores; and tables."""
 import os
 import subprocess
 import sys
+from importlib import import_module
+from pathlib import Path
 
 import pytest
+
+ROOT = Path(__file__).parents[2]
 
 
 @pytest.mark.parametrize(
@@ -20,3 +24,30 @@ def test_commands_take_one_thread_and_let_others_work_unless_the_user_says_so(gi
     ours = {k: v for k, v in os.environ.items() if not k.startswith(("OMP_", "MKL_", "KMP_", "GOMP_"))}
     said = subprocess.check_output([sys.executable, "-c", code], env=ours | given, text=True, timeout=120)
     assert said.strip() == expected
+
+
+COMMANDS = sorted(path.stem for path in ROOT.glob("agents/*.py") if "\n    run(" in path.read_text())
+
+
+FIRST = {"results": ("score",)}
+"""Sub-commands."""
+
+WITH_ENV = {
+    "bar", "dataset", "distribute", "experiments.training", "export", "open_loop", "results", "ship", "train",
+    "tune",
+}  # fmt: skip
+"""Commands that take any environment; the rest has its own."""
+
+
+@pytest.mark.parametrize("name", [*COMMANDS, "experiments", "experiments.training"])
+def test_an_environment_has_the_same_options_everywhere(name, monkeypatch, capsys):
+    """As in `hoof-env`; and a wrong option shows those of its command."""
+    module = f"agents.{name}" + (".__main__" if name == "experiments" else "")
+    with pytest.raises(SystemExit) as end:
+        import_module(module).main([*FIRST.get(name, ()), "--no-such-option"])
+    assert end.value.code == 2
+    told = capsys.readouterr().err.splitlines()[-1]
+    assert told.startswith(f"options of python -m agents.{name}")
+    names = set(told.partition(": ")[2].split(", "))
+    assert not {"--id", "--ids", "--args", "--env", "--kwargs"} & names
+    assert ("--env-id" in names) == (name in WITH_ENV)

@@ -1,15 +1,8 @@
 """Distributed trainings, as far as they go without Ray; tests/ecosystem/check_distribute.py has the rest."""
 
-import runpy
-import sys
-from pathlib import Path
-from types import SimpleNamespace
-
 import pytest
 
-from agents.distribute import Trials, main, prepare
-
-ROOT = Path(__file__).parents[2]
+from agents.distribute import Trials, prepare, reason
 
 
 def test_plan():
@@ -17,12 +10,6 @@ def test_plan():
     assert plan["seed"] == [0, 1, 2]
     assert plan["train"]["steps"] == 1000
     assert (plan["gamma"], plan["env.trunk"]) == ([0.9], ["rail"])
-
-
-def test_another_word_than_trials_is_refused(capsys):
-    with pytest.raises(SystemExit):
-        main(["rllib"])
-    assert "trials" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize(
@@ -37,8 +24,6 @@ def test_another_word_than_trials_is_refused(capsys):
         ("The actor died unexpectedly.\n\tclass_name: ImplicitFunc", "The actor died unexpectedly."),
     ],
 )
-def test_reason(monkeypatch, error, said):
-    monkeypatch.setitem(sys.modules, "ray", SimpleNamespace(tune=SimpleNamespace(Callback=object)))
-    report = runpy.run_path(str(ROOT / "agents" / "distribute_trial.py"))
+def test_reason(error, said):
     told = f"Failure # 1 (occurred at noon)\nold\nFailure # 2 (occurred at one)\n{error}\n"
-    assert report["reason"](told) == said
+    assert reason(told) == said

@@ -5,9 +5,12 @@ import json
 import pytest
 
 from agents import gallery
-from agents.stock_plan import COLUMNS, LEG, RAIL, TUNED, read_curves
+from agents.experiments.curves import COLUMNS, TUNED, read_curves
+from agents.experiments.plans import LEG
 from docs._manual.results import RETURNS, learning
 from hoof_env.envs.shipped import shipped_returns
+
+RAIL = "hoof_env/HorseLegRail-v0"
 
 
 def curve(algo, seed, returns, seconds=1.0):

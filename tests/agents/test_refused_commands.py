@@ -12,24 +12,18 @@ import pytest
 import torch
 
 from agents import (
-    baselines,
-    baselines_run,
-    carry_over,
-    command,
     dataset,
-    demo,
     distribute,
-    falls,
     judge,
-    legs,
     open_loop,
-    ship,
-    stock,
     train,
     tune,
 )
 from agents.cards import POLICIES
-from agents.settings import ALGORITHMS, algorithm_class, load_settings, model_arguments
+from agents.experiments import __main__ as experiments
+from agents.experiments import plans as plan_files
+from agents.experiments.outcomes import read_rows
+from agents.settings import ALGORITHMS, algorithm_class, load_settings
 from hoof_env.errors import DataFileError, HoofEnvError, MissingExtraError, OutputError, ParameterError
 from hoof_env.evaluation import scores
 from hoof_env.evaluation.episodes import score_vector
@@ -165,155 +159,36 @@ CASES = [
     optimises("many .*got 'Pendulum-v1'", env_id="Pendulum-v1", env_kwargs=()),
     optimises("expected 'phase' .*horse, got 'constant'", env_id="hoof_env/Horse-v0", family="constant"),
     optimises("'gait' among the observed groups", env_kwargs=('observation=["crank"]',)),
-    # stock learners and baselines
+    # experiments
     *(
-        case(lambda _, wrong=wrong: stock.jobs(stock.Args(**wrong)), words)
+        case(lambda _, wrong=wrong: experiments.train_planned(experiments.Args("stock", **wrong)), words)
         for wrong, words in (
-            ({"algo": "a2c"}, "algo: expected .*ppo.*got 'a2c'"),
-            (
-                {"env_id": "hoof_env/Cow-v0"},
-                "expected .*ppo on .*HorseLeg-v0.*got None on hoof_env/Cow-v0",
-            ),
-            (
-                {"env_id": "hoof_env/Horse-v0", "algo": "td3"},
-                "expected .*got td3 on hoof_env/Horse-v0",
-            ),
-            ({"seeds": 0}, "seeds: expected .*got 0"),
-            ({"steps": -1}, "steps: expected .*got -1"),
-            ({"workers": 0}, "workers: expected .*got 0"),
-            ({"preset": "identified"}, "preset: expected .*fourbar, jansen, klann, got 'identified'"),
-            ({"preset": "klann", "algo": "td3"}, "expected .*ppo on .*got td3"),
+            ({"only": ("gallop",)}, r"only: expected a part of .*ppo-HorseLeg-v0, .*got \('gallop',\)"),
+            ({"seeds": 0}, "seeds: expected .* got 0"),
+            ({"steps": -1}, "steps: expected .* got -1"),
+            ({"workers": 0}, "workers: expected .* got 0"),
         )
     ),
     case(
-        lambda folder: stock.stock(stock.Args(draw=True, out=folder)),
+        lambda folder: experiments.write_page(experiments.Args("stock", out=folder)),
         r"curves.csv: expected columns env_id, algo",
         DataFileError,
         **{"curves.csv": "env_id,algo\nx,ppo\n"},
     ),
-    case(lambda folder: baselines.train_all(baselines.Args(only=("gallop",), out=folder)), "gallop"),
-    case(lambda folder: baselines_run.read_results([], folder), "found none", DataFileError),
+    case(
+        lambda folder: experiments.write_page(experiments.Args("stock", out=folder)),
+        r"curves.csv: expected learning curves, found none",
+        DataFileError,
+    ),
+    case(lambda folder: read_rows([], folder), "found none", DataFileError),
     *(
         case(
-            lambda _: baselines_run.load_plan("full"),
-            r"full\.yml: expected .*entries",
+            lambda _: plan_files.load_plan("full"),
+            r"full\.yml: expected a list of entries",
             DataFileError,
             **{"full.yml": text},
         )
         for text in ("- {algo: ppo}", "3", "- {")
-    ),
-    # distribute
-    *(
-        case(lambda _, item=item: distribute.parse_space([item]), "--space: expected key=.* got")
-        for item in (
-            "gamma", "gamma=", "gamma=0.9", "gamma=[]", "=[1]", "gamma=uniform(0,1)", "gamma=[1", "gamma={}",
-        )
-    ),
-    plans("'horsepower'", space=("horsepower=[1]",)),
-    plans("'seed'", space=("seed=[1]",)),
-    plans("wheels", space=("env.wheels=[4]",)),
-    plans("flying", space=('env.trunk=["flying"]',)),
-    plans("--space: expected each key once, got gamma twice", space=("gamma=[0.9]", "gamma=[0.8]")),
-    plans("seeds: expected .*got 0", seeds=0),
-    plans("report_every: expected .*got 0", report_every=0),
-    plans("steps: expected .*got 0", steps=0),
-    plans("prayer", algo="prayer"),
-    plans("Cow", env_id="hoof_env/Cow-v0"),
-    plans("wheels", env_kwargs=("wheels=4",)),
-    # tune
-    tunes("trials: expected .*got 0", trials=0),
-    *(
-        case(
-            lambda folder: tune.load_space(folder / "space.yml", "ppo"),
-            "search space",
-            DataFileError,
-            **{"space.yml": text},
-        )
-        for text in (
-            "ppo: {gamma: []}", "ppo: {gamma: {uniform: [1, 0]}}", "ppo: {gamma: {log: [0, 1]}}", "sac: {}",
-            "ppo: 3",
-        )
-    ),
-    tunes("one number for a reward", env_id="hoof_env/HorseLegMO-v0"),
-    tunes("'gama'", params=("gama=1",)),
-    tunes("n_envs: expected .*got 0", params=("n_envs=0",)),
-    tunes("'gama'", space="ppo: {gama: {uniform: [0.9, 1]}}"),
-    tunes("'net_arc'", space="ppo: {policy_kwargs.net_arc: [1]}"),
-    case(
-        lambda folder: tune.tune(tune.Args(trials=1, steps=256, env_kwargs=SHORT, out=folder)),
-        r"study\.db: expected the database .*study.* database$",
-        DataFileError,
-        **{"study.db": "no database"},
-    ),
-    # judge, falls, datasets, shipping, demo
-    judges("policies: expected .*one"),
-    judges("policy: expected", "canter", "--episodes", "2", error=HoofEnvError),
-    judges(
-        "--episodes: expected .*1 .*got 0", "reference", "--episodes", "0"
-    ),
-    judges(
-        r"--froude: expected .*\(0, inf\], got -1", "reference", "--froude", "-1"
-    ),
-    case(lambda _: falls.main(["--strengths", "11"]), "--strengths: expected .*got 11"),
-    case(lambda folder: carry_over.main(["--strengths", "0", "--out", str(folder)]), "--strengths"),
-    case(
-        lambda folder: carry_over.main([AGENT, "--out", str(folder)]),
-        "expected the columns",
-        DataFileError,
-        **{carry_over.TABLE: "a,b\n1,2\n"},
-    ),
-    case(
-        lambda folder: legs.read_gaits(folder / "gaits.json"),
-        r"gaits.json: expected the gaits of agents.legs --search",
-        DataFileError,
-        **{"gaits.json": '{"jansen": {}}'},
-    ),
-    *(
-        collects("dataset_id: expected NAMESPACE/NAME-vK", "run", "--dataset-id", name)
-        for name in ("foo", "x/foo-v0", "a b-v0", "ab/../foo-v0", "/foo-v0", "ab/foo-v")
-    ),
-    collects("policies: expected .*one"),
-    collects("policies: expected .*got run 2 times", "run", "walk", "run"),
-    collects("episodes: expected .*number", "run", "--episodes", "0"),
-    *([collects("hoof_env/Cow-v0", "run", "--env-id", "hoof_env/Cow-v0")] if MINARI else []),
-    case(
-        lambda folder: dataset.main(["run", "--dataset-id", "ab/foo-v0", "--out", str(folder)]),
-        "ab/foo-v0: expected no dataset there",
-        OutputError,
-        **{"ab/foo-v0/data": ""},
-    ),
-    case(
-        lambda folder: ship.main([str(folder), "--out", str(folder / "out")]),
-        "expected a run of agents.train, .*got none",
-        DataFileError,
-    ),
-    case(
-        lambda folder: demo.demo(demo.Args(out=folder / "file" / "demo", quick=True)),
-        "cannot write to .*file",
-        OutputError,
-        file="",
-    ),
-    # settings and threads
-    case(lambda _: algorithm_class("dqn"), "expected .*got 'dqn'"),
-    *(
-        case(lambda _, given=given: model_arguments(given), next(iter(given)), DataFileError)
-        for given in (
-            *({"policy_kwargs": text} for text in CODE),
-            *({"learning_rate": value} for value in ("lin_", "exp_1", "0.001x", "lin_1_2")),
-            {"noise_type": "pink"},
-            {"noise_type": "normal", "noise_std": -1},
-        )
-    ),
-    *(
-        reads_settings(content)
-        for content in (None, "a: [", "[1, 2]", "Pendulum-v1: {n_envs: 1}", "other: {}", b"\xff\xfe")
-    ),
-    *(
-        case(
-            lambda _, threads=threads: command.check_threads(threads),
-            rf"torch_threads: expected .*\[1, 2\], got {threads}",
-        )
-        for threads in (0, 3)
     ),
 ]  # fmt: skip
 """Files, call with their folder, class and words of the error."""
@@ -332,7 +207,7 @@ def test_commands(files, call, error, words, tmp_path, monkeypatch):
     for module, name in ((scores, "play"), (dataset, "_collect")):
         monkeypatch.setattr(module, name, lambda *_, **__: pytest.fail("was played"))
     if "full.yml" in files:
-        monkeypatch.setattr(baselines_run, "PLANS", tmp_path)
+        monkeypatch.setattr(plan_files, "PLANS", tmp_path)
     if "check_threads" in call.__code__.co_names:
         monkeypatch.setattr(os, "sched_getaffinity", lambda pid: {3, 5}, raising=False)
     for name, text in files.items():
@@ -360,7 +235,7 @@ MISSING = [
         r'pip install "hoof-env\[minari\]"',
     ),
     without_ray(lambda _: distribute.start(distribute.Trials())),
-    without_ray(lambda _: distribute.main(["trials", "--seeds", "2", "--steps", "99"])),
+    without_ray(lambda _: distribute.main(["--seeds", "2", "--steps", "99"])),
 ]
 """Package, call with a folder, words."""
 

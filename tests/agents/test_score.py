@@ -94,13 +94,13 @@ def test_each_policy_gets_the_line_of_the_table(capsys, tmp_path, monkeypatch, t
     monkeypatch.setattr(scores, "FINAL_SEEDS", range(1_000_000, 1_000_005))
     other = shutil.copytree(trained.folder, tmp_path / "other")
     given = ["run", f"{__name__}:act", str(trained.folder), str(other)]
-    options = ["--published", "--out", str(tmp_path / "all.csv"), "--args", *SHORT]
+    options = ["--published", "--out", str(tmp_path / "all.csv"), "--env-kwargs", *SHORT]
     assert cli.main(["evaluate", *given, *options]) == 0
     where, _, head, _, *table = capsys.readouterr().out.splitlines()
     assert where == f"{ENV_ID} with {KWARGS}, episodes 1,000,000 to 1,000,004"
     assert [cell.strip() for cell in head.split("|")[1:4]] == ["policy", "return", "speed m/s"]
     assert [line.split("|")[1].strip() for line in table[:5]] == [*given[:4], "IQM of 2"]
-    assert cli.main(["evaluate", *given[:3], "--published", "--args", *SHORT]) == 0
+    assert cli.main(["evaluate", *given[:3], "--published", "--env-kwargs", *SHORT]) == 0
     assert "IQM" not in capsys.readouterr().out
     episodes = score_vector("run", ENV_ID, range(1_000_000, 1_000_005), **KWARGS)
     mean = np.mean([one["return"] for one in episodes])

@@ -158,8 +158,8 @@ def test_a_run_is_shipped_by_one_command(tmp_path, monkeypatch, capsys):
         train_tiny(tmp_path / "runs" / f"s{seed}", env_kwargs=(), steps=2048, seed=seed)
     (tmp_path / "runs" / "unfinished").mkdir()
     (tmp_path / "runs" / "unfinished" / "run.json").write_text("{}")
-    command = [str(tmp_path / "runs"), "--out", str(tmp_path / "out"), "--ids"]
-    with pytest.raises(ParameterError, match="ids"):
+    command = [str(tmp_path / "runs"), "--out", str(tmp_path / "out"), "--env-id"]
+    with pytest.raises(ParameterError, match="env_id"):
         ship.main([*command, "hoof_env/HorseLegRail-v0"])
     ship.main([*command, "hoof_env/HorseLeg-v0", "hoof_env/HorseLegMO-v0"])
     folders = sorted((tmp_path / "out").glob("HorseLeg*"))

@@ -24,13 +24,13 @@ def test_every_id_has_its_lines_with_the_returns_of_its_policies(capsys):
 
 
 def test_one_id_has_the_names_of_its_policies(capsys):
-    assert cli.main(["list", "--id", "hoof_env/HorseLegRail-v0"]) == 0
+    assert cli.main(["list", "--env-id", "hoof_env/HorseLegRail-v0"]) == 0
     head, _, policies = capsys.readouterr().out.splitlines()
     assert head.startswith("hoof_env/HorseLegRail-v0: ")
     assert {"run", "walk", "open-loop", "shipped"} <= set(
         policies.strip().removeprefix("policies: ").split(", ")
     )
-    assert cli.main(["list", "--id", "hoof_env/Horse-v0"]) == 0
+    assert cli.main(["list", "--env-id", "hoof_env/Horse-v0"]) == 0
     names = capsys.readouterr().out.splitlines()[2].strip().removeprefix("policies: ").split(", ")
     assert {"reference", "zero", "open-loop", "shipped"} <= set(names)
     assert "constant" not in names
@@ -39,12 +39,12 @@ def test_one_id_has_the_names_of_its_policies(capsys):
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
-        (["list", "--id", "Horse"], "id: expected one of hoof_env/HorseLeg-v0, .*, got 'Horse'"),
+        (["list", "--env-id", "Horse"], "env_id: expected one of hoof_env/HorseLeg-v0, .*, got 'Horse'"),
         (["evaluate"], "policy: expected a name or the path of a trained model, got none"),
         (["evaluate", "run", "--episodes", "0"], "episodes: expected a whole number, 1 or more, got 0"),
         (["evaluate", "run", "--episodes", "9999999"], r"episodes: expected at most 1e\+06, got 9999999"),
         (["evaluate", "run", "--seed", "-1"], "seed: expected a whole number, 0 or more, got -1"),
-        (["evaluate", "run", "--id", ""], "environment '' with no arguments: expected a registered id"),
+        (["evaluate", "run", "--env-id", ""], "environment '' with no arguments: expected a registered id"),
         (["evaluate", ""], "expected a name .* got ''"),
         (["evaluate", "run", "--published", "--seed", "3"], "neither episodes nor seed with it"),
         (["evaluate", "run", "--out", "scores.txt"], r"ends in \.csv, \.json, got 'scores\.txt'"),

@@ -24,7 +24,7 @@ from agents.train import Args, train
 
 ROOT = Path(__file__).parents[2]
 TINY = ("n_envs=8", "n_steps=64", "batch_size=256", "n_epochs=1", '{"policy_kwargs": {"net_arch": [8]}}')
-TRIALS = ("trials", "--cpus", "2", "--env-kwargs", "episode_seconds=1", "--params", *TINY)
+TRIALS = ("--cpus", "2", "--env-kwargs", "episode_seconds=1", "--params", *TINY)
 SLOW = ("--seeds", "3", "--steps", "60000", "--report-every", "10000")
 """Some seconds for each trial, so that there is a middle."""
 

@@ -12,7 +12,8 @@ from family import HORSE, actions, make, same, steps
 from hoof_env import Sb3VecEnv
 from hoof_env.errors import FixedSettingError, ParameterError
 from hoof_env.simd import threads
-from hoof_env.tasks.disturbances import check_pushes
+from hoof_env.tasks.disturbances import ROUGH_PUSH, ROUGH_SLOPE, ROUGHNESS, check_pushes, rough_ground
+from hoof_env.tasks.parameters import make_terrain
 
 LEG, RAIL, FIXED = (f"hoof_env/HorseLeg{name}-v0" for name in ("", "Rail", "Fixed"))
 
@@ -415,3 +416,19 @@ def test_an_option_without_pushes_leaves_drawn_ones_out():
     assert not np.array_equal(env.step(taken[0])[0], env.step(taken[0])[0])
     ends = [(env.step(action)[0], plain.step(action)[0]) for action in taken]
     assert any(not np.array_equal(pushed, unpushed) for pushed, unpushed in ends)
+
+
+@pytest.mark.parametrize("strength", [0.5, 1.0, 2.0])
+def test_strengths_are_in_units(strength):
+    """Slopes and bumps of the ground, and pushes over the mass, are those that the constants say."""
+    settings = rough_ground(strength, 100.0)
+    terrain = make_terrain(settings["terrain"])
+    smooth = make_terrain({**settings["terrain"], "roughness": 0.0})
+    bumps = [a - b for a, b in zip(terrain.height, smooth.height, strict=True)]
+    assert 0.9 * ROUGHNESS * strength < max(map(abs, bumps)) <= ROUGHNESS * strength + 1e-12
+    steps = [abs(b - a) / smooth.spacing for a, b in zip(smooth.height, smooth.height[1:], strict=False)]
+    # The last piece of a hill is rounded to whole knots.
+    assert 0.9 * ROUGH_SLOPE * strength < sorted(steps)[-20] <= 1.2 * ROUGH_SLOPE * strength
+    low, high = settings["push_impulse"]
+    assert settings["strength"] * high / 100.0 == pytest.approx(ROUGH_PUSH * strength)
+    assert low == -high

@@ -65,7 +65,7 @@ def test_tables_fit_the_terminal(capsys, monkeypatch):
 
 
 def test_unknown_ids_are_one_line(capsys):
-    assert cli.main(["manual", "--id", "HorseLeg"]) == 2
+    assert cli.main(["manual", "--env-id", "HorseLeg"]) == 2
     assert capsys.readouterr().err.startswith("hoof-env: error: id: ")
     with pytest.raises(ParameterError, match="HorseLegRail-v0"):
         manual.tables_of("hoof_env/Trot-v0")

@@ -125,7 +125,7 @@ def test_its_tables_have_its_rows(own, capsys):
     assert tables == tables_of(own.MODULE_ID)
     assert ("friction", "0.5", "1/kJ", "power of friction") in tables["Rewards"].rows
     assert ("load angle", "/ pi", "rad", "feel") in [row[1:] for row in tables["Observation"].rows]
-    assert main(["manual", "--id", own.MODULE_ID]) == 0
+    assert main(["manual", "--env-id", own.MODULE_ID]) == 0
     printed = capsys.readouterr().out
     assert printed.startswith(f"{own.ID} (import own_functions): ")
     assert re.search(r"^comfort ", printed, re.MULTILINE)

@@ -1,10 +1,12 @@
 """Presets are files: a leg that is written and read is the same, by name, path and content."""
 
 import json
+from pathlib import Path
 
 import numpy as np
+import pytest
 
-from hoof_env.gait import load_gait
+from hoof_env.gait import GaitParameters, load_gait
 from hoof_env.ground.contact import Ground, load_ground
 from hoof_env.leg.geometry import Geometry, load_geometry
 from hoof_env.leg.presets import preset_names, read_preset
@@ -56,3 +58,12 @@ def test_a_geometry_goes_through_a_dictionary_and_a_file(tmp_path):
     assert load_ground(path) == Ground(exponent=1.25)
     own.save(path)
     assert set(read_preset(path)) == {"provenance", "units", "geometry"}
+
+
+@pytest.mark.parametrize("preset", ["fourbar", "jansen", "klann"])
+def test_gaits_of_other_legs_are_those_of_their_study(preset):
+    path = Path(__file__).parents[2] / "docs/evidence/legs/gaits.json"
+    found = json.loads(path.read_text(encoding="utf-8"))[preset]
+    assert {name: load_gait(name, preset) for name in ("walk", "run")} == {
+        name: GaitParameters(**values) for name, values in found.items()
+    }

@@ -186,7 +186,7 @@ def change(path, **metadata):
         ({"batch": 8}, {}, r"mine\.onnx takes at once, got 1"),
         ({}, {"env_kwargs": '{"wings": 2}'}, r"mine\.onnx: its record has arguments .* argument 'wings'"),
         ({}, {"env_kwargs": '{"friction": "x"}'}, r"mine\.onnx: its record has arguments .* got 'x'"),
-        ({}, {"env_id": "my/Leg-v0"}, "must not import a module.* --id MODULE:my/Leg-v0"),
+        ({}, {"env_id": "my/Leg-v0"}, "must not import a module.* --env-id MODULE:my/Leg-v0"),
     ],
 )  # fmt: skip
 def test_what_a_file_does_in_an_evaluation_is_told_with_its_name(env, tmp_path, arguments, metadata, words):

@@ -32,7 +32,7 @@ def test_a_port_that_is_taken_is_told():
 
 
 @pytest.mark.parametrize(
-    "options", [["--id", "CartPole-v1"], ["--port", "99999"], ["--policy", "gallop"], ["--seed", "-1"]]
+    "options", [["--env-id", "CartPole-v1"], ["--port", "99999"], ["--policy", "gallop"], ["--seed", "-1"]]
 )
 def test_the_command_refuses_before_it_serves(options, capsys):
     assert cli.main(["view", "--no-open", *options]) == 2

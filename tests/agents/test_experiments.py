@@ -1,8 +1,9 @@
-"""The baselines: the plan is what is asked, trainings go on where they stopped, the page says so."""
+"""Experiments: plans are what is asked, trainings go on where they stopped, the page says so."""
 
 import csv
 import json
 import os
+import signal
 import subprocess
 import sys
 import time
@@ -13,27 +14,18 @@ import gymnasium as gym
 import numpy as np
 import pytest
 import yaml
+from stable_baselines3 import PPO
 
 import hoof_env  # noqa: F401  registers the ids
-from agents import baselines, baselines_report, baselines_run
-from agents.baselines_report import following, settled_speeds
-from agents.baselines_run import (
-    CURVE,
-    FINAL,
-    LEG,
-    PLANS,
-    Args,
-    Entry,
-    Run,
-    expected_settings,
-    load_plan,
-    read_curve,
-    read_results,
-    runs_of,
-    seconds_to,
-    train_one,
-)
-from agents.settings import FOLDER, load_settings
+from agents import runs
+from agents.experiments import __main__ as command
+from agents.experiments import baselines_page, runner, training
+from agents.experiments.baselines_page import following, settled_speeds
+from agents.experiments.curves import CURVES, read_curves
+from agents.experiments.outcomes import Outcome, Row, read_rows, seconds_to
+from agents.experiments.plans import LEG, PLANS, Entry, Run, load_plan, runs_of
+from agents.experiments.training import CURVE, FINAL, Args, read_curve, train_one
+from agents.settings import FOLDER
 from agents.statistics import LOWER, compare, dominates, dominates_with_confidence
 from hoof_env.envs.open_loop import open_loop
 from hoof_env.errors import DataFileError
@@ -41,6 +33,9 @@ from hoof_env.evaluation import statistics
 from hoof_env.evaluation.episodes import CURVE_SEEDS, FINAL_SEEDS, score_vector
 from hoof_env.evaluation.statistics import Interval, Scored, iqm, mean_figures, over_episodes
 from tests.agents.conftest import SHORT, TINY
+
+ROOT = Path(__file__).parents[2]
+RAIL = "hoof_env/HorseLegRail-v0"
 
 # The plan
 
@@ -62,7 +57,7 @@ def test_no_training_starts_from_a_scored_seed_or_shares_a_folder(plan):
     every = list(runs_of(plan))
     assert len({one.name for one in every}) == len(every) == sum(entry.seeds for entry in plan)
     for one in every:
-        rows = load_settings(FOLDER / f"{one.entry.algo}.yml", one.entry.env_id)["n_envs"]
+        rows = one.entry.settings["n_envs"]
         assert one.seed + rows <= CURVE_SEEDS.start < CURVE_SEEDS.stop <= FINAL_SEEDS.start
 
 
@@ -77,13 +72,13 @@ def test_a_variant_has_a_name_and_hyperparameters_of_its_own():
     entry = Entry("ppo_flat", LEG, 1, params={"n_epochs": 2}, variant="2 epochs")
     assert (entry.title, Run(entry, 0).name) == ("PPO_FLAT 2 epochs", "ppo_flat-2-epochs-HorseLeg-v0-s0")
     assert Run(entry, 0).command()[-2:] == ["--params", "n_epochs=2"]
-    assert expected_settings(entry)["n_epochs"] == 2
+    assert entry.settings["n_epochs"] == 2
 
 
 def test_the_time_to_a_return_is_that_of_the_first_crossing(tmp_path):
     rows = [(0.0, -5.0), (10.0, 10.0), (20.0, 30.0), (30.0, 5.0), (40.0, 90.0)]
     (tmp_path / CURVE).write_text("wall_s,return\n" + "".join(f"{t},{r}\n" for t, r in rows))
-    one = baselines_run.Result(tmp_path, {})
+    one = Outcome(tmp_path, {})
     assert seconds_to(20.0, one) == pytest.approx(15.0)
     assert seconds_to(60.0, one) == pytest.approx(30.0 + 10 * 55 / 85)
     assert seconds_to(91.0, one) == np.inf
@@ -124,7 +119,7 @@ def test_a_training_leaves_its_curve_and_its_score(done):
 
 
 def test_what_is_done_is_not_done_again(done, monkeypatch):
-    monkeypatch.setattr(baselines_run, "train", lambda *_: pytest.fail("was trained"))
+    monkeypatch.setattr(training, "train", lambda *_: pytest.fail("was trained"))
     assert train_one(tiny(done))
 
 
@@ -146,6 +141,24 @@ def test_an_orphan_stops_and_goes_on_to_the_same_curve(done, tmp_path, monkeypat
     )
 
 
+def test_a_stock_learner_is_the_one_that_its_library_makes(tmp_path):
+    """And it is scored at its very steps: before the first, within a rollout, and at the end."""
+    stock = FOLDER / "stock.yml"
+    assert train_one(
+        Args(env_id=RAIL, env_kwargs=SHORT, steps=2048, every=1500, hyperparams=stock, out=tmp_path / "one")
+    )
+    model = PPO("MlpPolicy", gym.make(RAIL, episode_seconds=0.4), seed=0, device="cpu")
+    model.learn(2048)
+    ours = PPO.load(tmp_path / "one" / "model.zip").policy.state_dict()
+    assert all((ours[name] == value).all() for name, value in model.policy.state_dict().items())
+    curve = read_curve(tmp_path / "one" / CURVE)
+    assert [row["steps"] for row in curve] == [0, 1500, 2048]
+    # The policy of a rollout does not change within it
+    assert curve[0]["return"] == curve[1]["return"] == curve[2]["return"]
+    final = json.loads((tmp_path / "one" / FINAL).read_text())
+    assert mean_figures(final["episodes"])["return"] != curve[2]["return"]
+
+
 # Many trainings
 
 PLAN = [Run(Entry("ppo", LEG, 3), seed) for seed in range(3)]
@@ -163,7 +176,7 @@ def pretend(monkeypatch, program):
         counts.append(len(alive))
         return alive[-1]
 
-    monkeypatch.setattr(baselines, "start", start)
+    monkeypatch.setattr(runner, "start", start)
     return counts, alive
 
 
@@ -174,25 +187,67 @@ FINISH = (
 
 def test_all_are_trained_once_and_failures_are_told(tmp_path, monkeypatch, capsys):
     counts, _ = pretend(monkeypatch, FINISH)
-    assert baselines.work_off(PLAN, tmp_path, workers=2) == [PLAN[1]]
+    assert runner.train_all(PLAN, tmp_path, workers=2) == [PLAN[1]]
     assert len(counts) == 3
     assert max(counts) <= 2
     assert f"{PLAN[1].name} failed: it was odd" in capsys.readouterr().out
-    assert baselines.work_off(PLAN, tmp_path, workers=1) == [PLAN[1]]  # the failed one alone is tried again
+    assert runner.train_all(PLAN, tmp_path, workers=1) == [PLAN[1]]  # the failed one alone is tried again
     assert len(counts) == 4
 
 
 def test_an_interrupt_ends_what_runs(tmp_path, monkeypatch):
     _, alive = pretend(monkeypatch, "import time; time.sleep(60)")
     monkeypatch.setattr(
-        baselines.tqdm, "set_postfix_str", lambda *_, **__: (_ for _ in ()).throw(KeyboardInterrupt)
+        runner.tqdm, "set_postfix_str", lambda *_, **__: (_ for _ in ()).throw(KeyboardInterrupt)
     )
     began = time.monotonic()
     with pytest.raises(KeyboardInterrupt):
-        baselines.work_off(PLAN, tmp_path, workers=2)
+        runner.train_all(PLAN, tmp_path, workers=2)
     assert time.monotonic() - began < 30
     assert len(alive) == 2
     assert all(process.poll() is not None for process in alive)
+
+
+def run_command(*options, until=None):
+    """Run `agents.experiments`; Ctrl-C once the file `until` exists; return the exit code."""
+    command = [sys.executable, "-m", "agents.experiments", *map(str, options)]
+    process = subprocess.Popen(command, cwd=ROOT, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+    while until and not until.exists() and process.poll() is None:
+        time.sleep(0.1)
+    if until:
+        process.send_signal(signal.SIGINT)
+    return process.wait(300)
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(os.name == "nt", reason="SIGINT of another process")
+def test_an_interrupted_command_goes_on_to_the_same_curves(tmp_path):
+    """A real one, of a stock learner: interrupted after its first score, between two rollouts it stops."""
+    training = ("--plan", "stock", "--only", "ppo-HorseLegFixed-v0-s0", "--steps", "4096", "--no-page")
+    name = "ppo-HorseLegFixed-v0-s0"
+    one = tmp_path / "one"
+    assert run_command(*training, "--out", one, until=one / name / CURVE) == 130
+    assert not (one / name / FINAL).exists()
+    assert [path.name for path in (one / name / "checkpoints").iterdir()] == ["2048"]
+    assert not (one / CURVES).exists()
+    assert run_command(*training, "--out", one) == 0
+    assert runs.read_record(one / name)["resumed"] == [2048]
+    stock = FOLDER / "stock.yml"
+    whole = tmp_path / "whole"
+    assert train_one(
+        Args(env_id="hoof_env/HorseLegFixed-v0", steps=4096, every=20_480, hyperparams=stock, out=whole)
+    )
+    again = {row["steps"]: row["return"] for row in read_curves(one)}
+    assert again == {row["steps"]: round(row["return"], 2) for row in read_curve(whole / CURVE)}
+    assert list(again) == [0, 4096]
+
+
+def test_a_training_that_is_done_with_other_settings_is_refused(done, tmp_path):
+    """Before any other is trained."""
+    pretend_results(tmp_path, done)
+    args = command.Args("nightly", only=("ppo-HorseLeg-v0",), steps=4096, out=tmp_path)
+    with pytest.raises(DataFileError, match=r"s0: expected a training with .*4096.*remove the folder"):
+        command.train_planned(args)
 
 
 # Statistics
@@ -300,24 +355,21 @@ def test_intervals_must_lie_apart():
 
 def test_who_follows_half_of_a_command(monkeypatch, tmp_path):
     """And results without a policy, as of an archive, are passed over."""
-    monkeypatch.setattr(baselines_report, "settled_speed", lambda policy, command: 1.0 + 0.5 * command)
+    monkeypatch.setattr(baselines_page, "settled_speed", lambda policy, command: 1.0 + 0.5 * command)
     for name in ("one", "two"):
         (tmp_path / name).mkdir()
         (tmp_path / name / "policy.json").touch()
-    results = [
-        baselines_run.Result(tmp_path / name, {"seed": seed})
-        for seed, name in enumerate(("one", "gone", "two"))
-    ]
-    speeds = settled_speeds(baselines_run.Row(SMALL[0], tuple(results)))
+    results = [Outcome(tmp_path / name, {"seed": seed}) for seed, name in enumerate(("one", "gone", "two"))]
+    speeds = settled_speeds(Row(SMALL[0], tuple(results)))
     assert list(speeds) == [0, 2]
     assert following("PPO", speeds).intervals["follows"].mean == pytest.approx(0.5)
 
 
 def test_the_settled_speed_is_that_behind_the_start():
     """A constant gait: its speed after four seconds, from the environment's own account."""
-    env = gym.make(baselines_report.SPEED, target_speed=2.0)
+    env = gym.make(baselines_page.SPEED, target_speed=2.0)
     held = open_loop({"constant": env.unwrapped.gaits["run"].to_array()}, env)
-    speed = baselines_report.settled_speed(held, 2.0)
+    speed = baselines_page.settled_speed(held, 2.0)
     each = []
     for seed in FINAL_SEEDS[:10]:
         (seen, _), x = env.reset(seed=seed), []
@@ -341,7 +393,7 @@ def pretend_results(folder, done):
         here.mkdir(parents=True)
         for name in ("run.json", CURVE):
             (here / name).write_text((done / name).read_text())
-        (here / "config.yml").write_text(yaml.safe_dump({one.entry.env_id: expected_settings(one.entry)}))
+        (here / "config.yml").write_text(yaml.safe_dump({one.entry.env_id: one.entry.settings}))
         level = 40.0 + one.seed if one.entry.algo == "ppo" else 1.0
         episodes = [{**episode, "return": level} for episode in final["episodes"]]
         (here / FINAL).write_text(
@@ -356,11 +408,9 @@ def page(done, tmp_path, monkeypatch):
         ("return", 6.0), ("speed_m_s", 2.0), ("highest_grf_n", 4e3), ("stance_peak_n", 3500.0),
         ("loading_rate_n_s", 1e5), ("cost_of_transport", 1.3), ("weight_share", 0.7))}  # fmt: skip
     known = {name: Scored(name, point) for name in ("run", "walk", "open-loop")}
-    monkeypatch.setattr(baselines_report, "references", lambda env_id: known)
+    monkeypatch.setattr(baselines_page, "references", lambda env_id: known)
     monkeypatch.setattr(statistics, "REPS", 100)
-    monkeypatch.setattr(baselines_report, "load_plan", lambda name: SMALL)
-    args = baselines_report.Args("nightly", tmp_path / "runs")
-    return baselines_report.report(args)
+    return baselines_page.write("the small plan", SMALL, tmp_path / "runs")
 
 
 def test_the_page_says_what_the_runs_say(page, tmp_path):
@@ -370,7 +420,7 @@ def test_the_page_says_what_the_runs_say(page, tmp_path):
     assert "| 41.0 [40" in line  # the IQM of 40, 41 and 42
     assert "| 40.0 to 42.0 | 3/3 | 3/3 |" in line
     assert "| SAC | 2 |" in text
-    assert "python -m agents.baselines_run --algo sac" in text
+    assert "python -m agents.experiments.training --algo sac" in text
     with (page.with_suffix("") / "curves.csv").open() as file:
         assert len(list(csv.DictReader(file))) == 5 * 5
     with (page.with_suffix("") / "episodes.csv").open() as file:
@@ -382,13 +432,13 @@ def test_the_page_says_what_the_runs_say(page, tmp_path):
 
 def test_what_the_plan_does_not_ask_for_is_not_shown(page, tmp_path):
     folder = tmp_path / "runs" / "ppo-HorseLeg-v0-s1"
-    asked, steps = (folder / "config.yml").read_text(), expected_settings(SMALL[0])["n_timesteps"]
+    asked, steps = (folder / "config.yml").read_text(), SMALL[0].settings["n_timesteps"]
     (folder / "config.yml").write_text(asked.replace(f"n_timesteps: {steps}", "n_timesteps: 64000"))
     wanted = rf"-s1: expected .*'n_timesteps': {steps}.*got .*64000"
     with pytest.raises(DataFileError, match=wanted):
-        read_results(SMALL, tmp_path / "runs")
+        read_rows(SMALL, tmp_path / "runs")
     (folder / "config.yml").write_text(asked)
     final = json.loads((folder / FINAL).read_text())
     (folder / FINAL).write_text(json.dumps({**final, "env_kwargs": {"friction": 0.1}}))
     with pytest.raises(DataFileError, match=r"-s1: expected .*'friction': None.*got .*0.1"):
-        read_results(SMALL, tmp_path / "runs")
+        read_rows(SMALL, tmp_path / "runs")

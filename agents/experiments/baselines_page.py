@@ -1,7 +1,4 @@
-"""The page of the baselines, report.md, from what `agents.baselines` left: tables, curves as CSV and
-pictures.
-
-    python -m agents.baselines_report           writes it again, from whatever is done
+"""The page of the baselines, report.md: tables, curves as CSV and pictures.
 
 An agent of HorseLegSpeed-v0 follows its command by the slope of its speed over constant commands.
 """
@@ -11,7 +8,6 @@ from __future__ import annotations
 import json
 import warnings
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
 from itertools import cycle
 from pathlib import Path
 from typing import Any
@@ -22,18 +18,9 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import EngFormatter, NullFormatter
 
 from agents import runs
-from agents.baselines_run import (
-    COLUMNS,
-    FOLDERS,
-    LEG,
-    Plan,
-    Row,
-    load_plan,
-    read_results,
-    seconds_to,
-    versions_of,
-)
-from agents.command import run
+from agents.experiments.outcomes import Row, read_rows, seconds_to, versions_of
+from agents.experiments.plans import LEG, Entry
+from agents.experiments.training import COLUMNS
 from agents.settings import load_settings
 from agents.statistics import compare
 from hoof_env._output import markdown_table
@@ -65,16 +52,6 @@ SOON = 0.4  # bar: share of the first row's time to the open-loop gait's return
 References = Mapping[str, Mapping[str, Scored]]  # policies without learning, by id and name
 
 
-@dataclass(frozen=True)
-class Args:
-    """Arguments of the command."""
-
-    subset: Plan = "full"
-    """which plan"""
-    runs: Path | None = None
-    """folder of the trainings, and of report.md; otherwise runs/baselines, or the plan's own"""
-
-
 # Policies without learning, and how commands are followed
 
 
@@ -103,10 +80,10 @@ def settled_speeds(row: Row) -> dict[int, list[float]]:
     speeds_of = {}
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", UserWarning)  # they were trained with other commands, which is meant
-        for result in row.results:
-            if (result.folder / ABOUT).is_file():
-                speeds = [settled_speed(str(result.folder), command) for command in following_commands()]
-                speeds_of[result.final["seed"]] = speeds
+        for outcome in row.outcomes:
+            if (outcome.folder / ABOUT).is_file():
+                speeds = [settled_speed(str(outcome.folder), command) for command in following_commands()]
+                speeds_of[outcome.final["seed"]] = speeds
     return speeds_of
 
 
@@ -172,11 +149,11 @@ def results_table(rows: Sequence[Row], gaits: References) -> str:
 
 def row_cells(row: Row, known: Mapping[str, Scored]) -> list[str]:
     """Return the cells of an agent in the table of returns; `known` are the policies without learning."""
-    count = len(row.results)
-    returns = np.array([result.figures["return"] for result in row.results])
+    count = len(row.outcomes)
+    returns = np.array([outcome.figures["return"] for outcome in row.outcomes])
 
     def median(key: str) -> str:
-        return f"{np.median([result.final[key] for result in row.results]):,.0f}"
+        return f"{np.median([outcome.final[key] for outcome in row.outcomes]):,.0f}"
 
     def above(name: str) -> str:
         if name not in known:
@@ -213,9 +190,9 @@ def pace_table(rows: Sequence[Row], known: Mapping[str, Scored]) -> str:
     rates = []
     times = []
     for row in rows:
-        ends = [result.final for result in row.results]
+        ends = [outcome.final for outcome in row.outcomes]
         rates.append({end["seed"]: end["steps"] / end["wall_s"] for end in ends})
-        times.append({result.final["seed"]: seconds_to(level, result) for result in row.results})
+        times.append({outcome.final["seed"]: seconds_to(level, outcome) for outcome in row.outcomes})
     lines = []
     for row, rate, time in zip(rows, rates, times, strict=True):
         # Only seeds that both rows have are paired
@@ -269,7 +246,7 @@ def draw_frontier(rows: Sequence[Row], known: Mapping[str, Scored], path: Path) 
         figure = Figure(figsize=(8, 3.6), layout="constrained")
         axes = figure.subplots()
         for row, marker in zip(rows, cycle("osD^vP*X")):
-            rate = np.median([result.final["steps"] / result.final["wall_s"] for result in row.results])
+            rate = np.median([outcome.final["steps"] / outcome.final["wall_s"] for outcome in row.outcomes])
             returns = row.scored.intervals["return"]
             # A single seed has no interval
             bars = np.nan_to_num([[returns.mean - returns.low], [returns.high - returns.mean]])
@@ -280,7 +257,7 @@ def draw_frontier(rows: Sequence[Row], known: Mapping[str, Scored], path: Path) 
                 fmt=marker,
                 capsize=3,
                 color=BLUE if row.entry.algo == "ppo_flat" else ORANGE,
-                label=f"{row.title}, {len(row.results)} seeds",
+                label=f"{row.title}, {len(row.outcomes)} seeds",
             )
         axes.axhline(known[OPEN_LOOP].intervals["return"].mean, color=GREY, lw=1.2, ls="--", label=OPEN_LOOP)
         axes.set(xlabel="environment steps a second of training", ylabel="return: IQM, 95 % interval")
@@ -325,14 +302,14 @@ def write_data(rows: Sequence[Row], folder: Path) -> None:
     ends = []
     episodes = []
     for row in rows:
-        for result in row.results:
-            about = {"policy": row.title, "env_id": row.entry.env_id, "seed": result.final["seed"]}
-            curves += [about | line for line in result.curve]
-            played = zip(FINAL_SEEDS, result.final["episodes"], strict=True)
+        for outcome in row.outcomes:
+            about = {"policy": row.title, "env_id": row.entry.env_id, "seed": outcome.final["seed"]}
+            curves += [about | line for line in outcome.curve]
+            played = zip(FINAL_SEEDS, outcome.final["episodes"], strict=True)
             episodes += [about | {"episode": seed} | short(episode) for seed, episode in played]
-            clock = {key: result.final[key] for key in ("steps", "wall_s", "cpu_s")}
-            numbers = {key: round(value, 4) for key, value in (clock | result.figures).items()}
-            settings = load_settings(result.folder / runs.CONFIG, row.entry.env_id)
+            clock = {key: outcome.final[key] for key in ("steps", "wall_s", "cpu_s")}
+            numbers = {key: round(value, 4) for key, value in (clock | outcome.figures).items()}
+            settings = load_settings(outcome.folder / runs.CONFIG, row.entry.env_id)
             ends.append(about | numbers | {"config": json.dumps(settings)})
     columns = ("policy", "env_id", "seed", *COLUMNS)
     runs.write_csv(folder / "curves.csv", columns, curves)
@@ -349,7 +326,7 @@ def over_time(row: Row, key: str) -> tuple[Floats, Floats]:
     """Return steps or seconds, shape (`POINTS`,), and IQM and interval of the return there, shape (3,
     `POINTS`), from the first score of a trained policy to the last that all seeds have; `key` is "steps" or
     "wall_s"."""
-    curves = [result.curve for result in row.results]
+    curves = [outcome.curve for outcome in row.outcomes]
     last = min(curve[-1][key] for curve in curves)
     # From the second score on: the first is of the untrained policy, at 0, which no logarithm shows
     first = min(max(curve[1][key] for curve in curves), last)
@@ -380,7 +357,7 @@ def draw_curves(rows: Sequence[Row], known: Mapping[str, Scored], path: Path) ->
                 x, (mean, low, high) = over_time(row, key)
                 lowest = min(lowest, float(mean.min()))
                 axes.fill_between(x, low, high, color=colour, alpha=0.2, lw=0)
-                axes.plot(x, mean, color=colour, lw=1.5, label=f"{row.title}, {len(row.results)} seeds")
+                axes.plot(x, mean, color=colour, lw=1.5, label=f"{row.title}, {len(row.outcomes)} seeds")
             for name, style in ((OPEN_LOOP, "--"), ("run", ":")):
                 if name in known:
                     level = known[name].intervals["return"].mean
@@ -399,19 +376,18 @@ def draw_curves(rows: Sequence[Row], known: Mapping[str, Scored], path: Path) ->
         figure.savefig(path, dpi=130)
 
 
-def report(args: Args) -> Path:
-    """Write page, pictures and CSV files, and return the path of the page.
+def write(title: str, plan: Sequence[Entry], folder: Path) -> Path:
+    """Write page, pictures and CSV files of the trainings in `folder`, and return the path of the page.
 
     Raises:
-        DataFileError: nothing is done, or a result cannot be read.
+        DataFileError: nothing is done, or an outcome cannot be read.
     """
-    folder = args.runs or FOLDERS[args.subset]
-    rows = read_results(load_plan(args.subset), folder)
+    rows = read_rows(plan, folder)
     page = folder / "report.md"
     pictures = folder / "report"
     pictures.mkdir(parents=True, exist_ok=True)
     gaits = {row.entry.env_id: references(row.entry.env_id) for row in rows}
-    parts = [f"# Baselines: the {args.subset} plan", "## Returns", results_table(rows, gaits)]
+    parts = [f"# Baselines: {title}", "## Returns", results_table(rows, gaits)]
     for env_id, known in gaits.items():
         name = env_id.rpartition("/")[2]
         draw_curves(of_id(rows, env_id), known, pictures / f"{name}.png")
@@ -419,7 +395,7 @@ def report(args: Args) -> Path:
     write_data(rows, pictures)
     parts += ["## What the gaits are like", figures_table(rows, gaits)]
     if LEG in gaits:
-        # The run is what the others are compared with
+        # All are compared with the run
         others = [policy for name, policy in gaits[LEG].items() if name != "run"]
         agents = others + [row.scored for row in of_id(rows, LEG)]
         parts += ["## Beside the paper's run", compare(agents, gaits[LEG]["run"])]
@@ -434,15 +410,3 @@ def report(args: Args) -> Path:
     parts += ["## How it was made", made_text(rows)]
     runs.write_text(page, "\n\n".join(parts) + "\n")
     return page
-
-
-def main(argv: list[str] | None = None) -> None:
-    """Write the page."""
-    import tyro
-
-    args = tyro.cli(Args, args=argv, prog="python -m agents.baselines_report", description=__doc__)
-    print(f"written: {report(args)}")
-
-
-if __name__ == "__main__":
-    run(main)

@@ -1,5 +1,5 @@
-"""Page of `agents.stock`: learning curves as tables and as a picture, and the returns of policies that need
-no learning."""
+"""The page of stock learners: learning curves as tables and as a picture, and the returns of policies that
+need no learning."""
 
 from __future__ import annotations
 
@@ -11,9 +11,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from agents import runs
+from agents.experiments.curves import CURVES, TUNED
+from agents.experiments.plans import LEG, Entry
 from agents.results import best_blind, rows_of
-from agents.stock_plan import LEG, OTHERS, PLAN, TUNED
 from hoof_env._output import markdown_table, staged
+from hoof_env.errors import DataFileError
 from hoof_env.evaluation.episodes import FINAL_SEEDS, make_rows, play_rows
 from hoof_env.evaluation.statistics import iqm
 from hoof_env.policies.find import find_policy
@@ -66,12 +68,14 @@ def at(rows: Sequence[dict[str, Any]], steps: int) -> list[float]:
     return [row["return"] for row in latest.values()]
 
 
-def table(rows: Sequence[dict[str, Any]], references: dict[str, dict[str, float]]) -> str:
-    """Return a line for each algorithm and id: interquartile mean, lowest and highest seed in the middle and
+def table(
+    rows: Sequence[dict[str, Any]], references: dict[str, dict[str, float]], plan: Sequence[Entry]
+) -> str:
+    """Return a line for each row of the plan: interquartile mean, lowest and highest seed in the middle and
     at the end, and the returns of policies that need no learning."""
     lines = []
-    for curves in PLAN:
-        own_rows = [row for row in rows if (row["env_id"], row["algo"]) == (curves.env_id, curves.algo)]
+    for entry in plan:
+        own_rows = [row for row in rows if (row["env_id"], row["algo"]) == (entry.env_id, entry.algo)]
         if not own_rows:
             continue
         last = max(row["steps"] for row in own_rows)
@@ -80,15 +84,15 @@ def table(rows: Sequence[dict[str, Any]], references: dict[str, dict[str, float]
             values = at(own_rows, steps)
             cells.append(f"{float(iqm(values)[0]):.1f} ({min(values):.1f} to {max(values):.1f})")
         seconds = _seconds([row for row in own_rows if row["steps"] == last], usual_processor(rows))
-        known = references[curves.env_id]
+        known = references[entry.env_id]
         reference_cells = [f"{known[name]:.1f}" if name in known else "" for name in ANCHORS]
         above = ""
         if BEST in known:
             finals = at(own_rows, last)
             above = f"{sum(value > known[BEST] for value in finals)} of {len(finals)}"
         seeds = str(len({row["seed"] for row in own_rows}))
-        name = curves.env_id.rpartition("/")[2].removesuffix("-v0")
-        own_cells = [name, curves.algo.upper(), seeds, *cells, f"{last:,}", seconds]
+        name = entry.env_id.rpartition("/")[2].removesuffix("-v0")
+        own_cells = [name, entry.algo.upper(), seeds, *cells, f"{last:,}", seconds]
         lines.append([*own_cells, *reference_cells, above])
     head = (
         "id",
@@ -112,19 +116,21 @@ def usual_processor(rows: Sequence[dict[str, Any]]) -> str:
 
 
 def _seconds(ends: Sequence[dict[str, Any]], processor: str) -> str:
-    """Return the median of the seconds of trainings on a processor; with a star those of others, if none was
-    trained on it."""
+    """Return the median of the seconds of trainings on a processor; with a star the median of all, if
+    none ran on it."""
     timed = [row["train_seconds"] for row in ends if row["processor"] == processor]
     if timed:
         return f"{np.median(timed):.0f}"
     return f"{np.median([row['train_seconds'] for row in ends]):.0f}*"
 
 
-def compared(rows: Sequence[dict[str, Any]], column: str, places: Sequence[float]) -> str:
+def compared(
+    rows: Sequence[dict[str, Any]], column: str, places: Sequence[float], plan: Sequence[Entry]
+) -> str:
     """Return a line for each learner of HorseLeg-v0: the interquartile mean of its last returns up to each
     place of `column`, steps or seconds of learning; an empty cell if its trainings do not go so far."""
     lines = []
-    for algo in dict.fromkeys(curves.algo for curves in PLAN if curves.env_id == LEG):
+    for algo in dict.fromkeys(entry.algo for entry in plan if entry.env_id == LEG):
         own_rows = [row for row in rows if (row["env_id"], row["algo"]) == (LEG, algo)]
         if not own_rows:
             continue
@@ -161,8 +167,7 @@ def draw(rows: Sequence[dict[str, Any]], references: dict[str, dict[str, float]]
 
     colours = {"ppo": BLUE, "sac": ORANGE, "td3": GREEN, "tqc": PURPLE}
     styles = dict(zip(ANCHORS, (":", "--", "-"), strict=True))
-    trained_on = {row["env_id"] for row in rows}
-    ids = [env_id for env_id in (LEG, *OTHERS) if env_id in trained_on]
+    ids = list(references)
     with matplotlib.rc_context(STYLE):
         across = min(3, len(ids))
         down = -(-len(ids) // across)
@@ -199,14 +204,16 @@ def draw(rows: Sequence[dict[str, Any]], references: dict[str, dict[str, float]]
         save_png(figure, path, dpi=150)
 
 
+PAGE_FILE = "README.md"
+
 PAGE = """# Stock learners
 
 Learning curves of Stable-Baselines3's PPO, SAC and TD3 and of sb3-contrib's TQC with their library's own
-defaults: one environment, no wrapper. Written by `python -m agents.stock`, which trains what is missing in
-[curves.csv](curves.csv). Returns are those of the policy without its noise on {starts} starts that no
-training meets: the interquartile mean over seeds, and the lowest and highest seed. Seconds are processor time
-of learning on one thread{processors}; other work on the machine makes them longer. Trained by
-the code of {commits}.
+defaults: one environment, no wrapper. Written by `python -m agents.experiments --plan stock`,
+which trains what is missing in [curves.csv](curves.csv). Returns are those of the policy without its noise on
+{starts} starts that no training meets: the interquartile mean over seeds, and the lowest and highest seed.
+Seconds are processor time of learning on one thread{processors};
+other work on the machine makes them longer. Trained by the code of {commits}.
 
 ![Return against environment steps](stock.png)
 
@@ -227,21 +234,27 @@ Returns after so many seconds of the processor, on one thread:
 """
 
 
-def write(out: Path, rows: Sequence[dict[str, Any]]) -> None:
-    """Write table and picture of the curves that are there."""
+def write(out: Path, rows: Sequence[dict[str, Any]], plan: Sequence[Entry]) -> Path:
+    """Write table and picture of learning curves, and return the path of the page; `DataFileError` if there
+    are none."""
+    if not rows:
+        raise DataFileError(f"{out / CURVES}: expected learning curves, found none")
     usual = usual_processor(rows)
     timed = [row for row in rows if row["processor"] == usual]
     rest = sorted({row["processor"] for row in rows} - {usual})
     others = f" of one kind of processor (with a star: of {', '.join(rest)})" if rest else ""
-    references = {env_id: anchors(env_id) for env_id in dict.fromkeys(row["env_id"] for row in rows)}
+    trained_on = {row["env_id"] for row in rows}
+    ids = dict.fromkeys(entry.env_id for entry in plan if entry.env_id in trained_on)
+    references = {env_id: anchors(env_id) for env_id in ids}
     with staged(out) as stage:
         draw(rows, references, stage / "stock.png")
         text = PAGE.format(
             starts=len(FINAL_SEEDS),
             commits=", ".join(sorted({f"`{row['commit'] or 'unknown'}`" for row in rows})),
-            table=table([row for row in rows if row["algo"] != TUNED], references),
-            by_steps=compared(rows, "steps", AT_STEPS),
-            by_seconds=compared(timed, "train_seconds", AT_SECONDS),
+            table=table([row for row in rows if row["algo"] != TUNED], references, plan),
+            by_steps=compared(rows, "steps", AT_STEPS, plan),
+            by_seconds=compared(timed, "train_seconds", AT_SECONDS, plan),
             processors=others,
         )
-        (stage / "README.md").write_text(text, encoding="utf-8")
+        (stage / PAGE_FILE).write_text(text, encoding="utf-8")
+    return out / PAGE_FILE
