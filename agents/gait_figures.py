@@ -18,7 +18,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from agents import runs
 from hoof_env.constants import GRAVITY
 from hoof_env.dynamics.layout import Features, stride_sums
 from hoof_env.dynamics.memory import LIFT_OFF
@@ -132,7 +131,7 @@ def watch(envs: Any, policy: Any, speed: float, gait: Floats | None = None) -> P
     seen, _ = envs.reset(seed=seeds, options={**start_of(policy), "target_speed": speed, **around})
     n = envs.num_envs
     dt = envs.dt
-    features = Features(runs.body_of(envs).harmonics, envs.settings.hoof_stiffness is not None, True)
+    features = Features(envs.body.harmonics, envs.settings.hoof_stiffness is not None, True)
     sums = {name: np.zeros((4, n)) for name in stride_sums(features)}
     start = np.ones(n, bool)
     upright = np.ones(n, bool)
@@ -169,7 +168,7 @@ def play(envs: Any, policy: Any, speed: float, gait: Floats | None = None) -> di
     """Play episodes at one commanded speed [m/s] and return their figures: of each pair of legs, as means
     over the episodes that did not end early, and stances of watched ones."""
     played = watch(envs, policy, speed, gait)
-    height = runs.body_of(envs).height
+    height = envs.body.height
     kilograms = float(envs.weight[0]) / GRAVITY
     result: dict[str, Any] = {
         "speed": speed,

@@ -344,7 +344,7 @@ def trunk_series(gait: list[float], speed: float) -> list[list[float]]:
     course = BatchRollout(speed, 64, episode_seconds=2 * SECONDS)
     envs = course.envs
     numbers = np.array(gait)
-    body = runs.body_of(envs)
+    body = envs.unwrapped.body
     stride = Stride(*numbers[-len(LIMITS) :][:2])
     envs.reset(seed=1, options={"gait": numbers})
     rows: list[list[Floats]] = []

@@ -299,7 +299,7 @@ def main(argv: list[str] | None = None) -> None:
             f" {envs.settings.episode_seconds:g}"
         )
     # An animal of another size reaches a Froude number at another speed
-    pace = runs.body_of(envs).height / HIP_HEIGHT  # Froude numbers are of the animal's own hips
+    pace = envs.body.height / HIP_HEIGHT  # Froude numbers are of the animal's own hips
     with runs.make_env(ENV_ID, **env_kwargs) as env:
         for name in args.policies:
             policy = find_policy(name, env, ENV_ID)

@@ -117,7 +117,7 @@ def suspension(env: gym.Env[Any, Any], y: Floats, vy: Floats) -> tuple[Floats, F
             f'trunk: expected "suspended" with fixed parameters, got {settings.trunk!r} with'
             f" randomize={settings.randomize!r}"
         )
-    spring = -settings.trunk_stiffness * (y - runs.body_of(leg).height)
+    spring = -settings.trunk_stiffness * (y - leg.body.height)
     damper = -settings.trunk_damping * vy
     return (1 - settings.trunk_share) * leg.weight + spring + damper, damper
 
@@ -184,7 +184,7 @@ def main(argv: list[str] | None = None) -> None:
             "from_seconds": SETTLED,
             "settings": {
                 "weight_n": float(leg.weight),
-                "height_m": float(runs.body_of(leg).height),
+                "height_m": float(leg.body.height),
                 **{
                     name: getattr(leg.settings, name)
                     for name in ("trunk_share", "trunk_stiffness", "trunk_damping")

@@ -177,7 +177,7 @@ class Family(NamedTuple):
 
 def family_of(env: Any, family: str, harmonics: int | None = None) -> Family:
     """Return the layout of a family for an environment, single and unwrapped."""
-    body = runs.body_of(env)
+    body = env.unwrapped.body
     is_leg = env.action_form == "rates"
     middle, half = (body.middle, body.half) if is_leg else (np.zeros(8), np.ones(8))
     if family == "constant":

@@ -105,11 +105,6 @@ def make_vec_env(env_id: str, n_envs: int, num_threads: int = 1, **kwargs: Any) 
     return DummyVecEnv([lambda: make_env(env_id, disable_env_checker=True, **kwargs)] * n_envs)
 
 
-def body_of(env: Any) -> Any:
-    """Return what carries the legs in an environment of this package, single or many."""
-    return env.unwrapped.batch.body
-
-
 def warm_up(env: gym.Env[Any, Any]) -> None:
     """Compile or load the kernels by one step."""
     env.reset(seed=0)

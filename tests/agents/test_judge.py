@@ -255,7 +255,7 @@ class Toy:
 
     dt = DT
     settings = SimpleNamespace(hoof_stiffness=1.0)
-    batch = SimpleNamespace(body=SimpleNamespace(harmonics=2, height=1.4))
+    body = SimpleNamespace(harmonics=2, height=1.4)
     unwrapped = property(lambda self: self)
     names = stride_sums(Features(2, True, True))
     legs = ("left_fore", "right_fore", "left_hind", "right_hind")

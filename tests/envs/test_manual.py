@@ -47,7 +47,7 @@ def observed(task):
 
 @pytest.mark.parametrize("id", sorted(name for name in gym.registry if name.startswith("hoof_env/")))
 def test_the_command_prints_the_tables_of_every_id(id, capsys):
-    assert cli.main(["manual", "--id", id]) == 0
+    assert cli.main(["manual", "--env-id", id]) == 0
     printed = capsys.readouterr().out
     assert printed.startswith(f"{id}: ")
     titles = re.findall(r"^(\w+)$", printed, re.MULTILINE)
@@ -185,7 +185,7 @@ def test_rewards_are_those_of_the_environment(task):
     _, info = env.reset(seed=0)
     weights = {row[0]: float(row[1]) for row in manual.rewards(TASKS[task]).rows}
     assert [f"reward_{name}" for name in weights] == [name for name in info if name.startswith("reward_")]
-    assert weights == dict(env.unwrapped.batch.weights)
+    assert weights == dict(env.unwrapped.weights)
 
 
 CHANGED = OTHER | {
