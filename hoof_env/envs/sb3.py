@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 import gymnasium as gym
@@ -14,18 +14,87 @@ from stable_baselines3.common.vec_env import VecEnv
 from hoof_env.envs.arguments import Sb3Arguments, takes
 from hoof_env.envs.base import fixed_setting
 from hoof_env.envs.vector import PER_ENV, HorseLegVectorEnv
-from hoof_env.episodes.infos import row_of
+from hoof_env.episodes.infos import NamedArray, name_columns, row_of
 from hoof_env.errors import ParameterError
 from hoof_env.tasks.settings import SETTINGS
+
+ENDINGS = ("episode_summary", "end", "is_success", "final_obs", "final_info")
+"""Entries of the vector environment's infos that are of ends of episodes alone."""
+
+
+class RowInfo(dict[str, Any]):
+    """Info of one environment after a step.
+
+    It is a dictionary of what an episode's end adds. What every step measures is read from the arrays of all
+    environments when it is asked for: as dictionaries it would cost more than the simulation.
+
+    Args:
+        arrays: infos of the vector environment.
+        env: index of the environment.
+        ended: entries of the end of its episode.
+    """
+
+    __slots__ = ("_arrays", "_env")
+
+    def __init__(self, arrays: Mapping[str, Any], env: int, ended: Mapping[str, Any] | None = None) -> None:
+        super().__init__(ended or {})
+        self._arrays = arrays
+        self._env = env
+
+    def __missing__(self, key: str) -> Any:
+        if not self._is_measured(key):
+            raise KeyError(key)
+        values = self._arrays[key]
+        row = values[self._env]
+        return name_columns(row.copy(), values.names) if isinstance(values, NamedArray) else row
+
+    def _is_measured(self, key: Any) -> bool:
+        return key in self._arrays and not key.startswith("_") and key not in ENDINGS
+
+    def __contains__(self, key: object) -> bool:
+        return super().__contains__(key) or self._is_measured(key)
+
+    def get(self, key: str, default: Any = None) -> Any:
+        """Return an entry, or `default` if there is none."""
+        return self[key] if key in self else default  # noqa: SIM401
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self.keys())
+
+    def __len__(self) -> int:
+        return len(self.keys())
+
+    def keys(self) -> Any:
+        """Return the names of all entries."""
+        return dict.fromkeys([*filter(self._is_measured, self._arrays), *super().keys()]).keys()
+
+    def values(self) -> Any:
+        """Return the values of all entries."""
+        return self.copy().values()
+
+    def items(self) -> Any:
+        """Return names and values of all entries."""
+        return self.copy().items()
+
+    def copy(self) -> dict[str, Any]:
+        """Return an ordinary dictionary with all entries."""
+        return {key: self[key] for key in self.keys()}
+
+    def __eq__(self, other: object) -> bool:
+        return self.copy() == (other.copy() if isinstance(other, RowInfo) else other)
+
+    __hash__ = None
+
+    def __reduce__(self) -> Any:
+        return dict, (self.copy(),)
 
 
 class Sb3VecEnv(VecEnv):
     """`num_envs` environments of an id for Stable-Baselines3, all stepped in one call.
 
     Wrap it in `VecMonitor` for episode returns. When an episode ends its info has "terminal_observation",
-    "TimeLimit.truncated", "episode_summary", "end" and "is_success". Infos contain nothing else, because a
-    dictionary for each environment and step costs more than the simulation: `terms` and `measured` are those
-    of the last step.
+    "TimeLimit.truncated", "episode_summary", "end" and "is_success". The other entries of an info are read
+    from arrays when they are asked for (`RowInfo`); `terms` and `measured` are the arrays of the last step.
     `reset_infos` contains the info of the reset of each environment's present episode, drawn parameters
     included.
 
@@ -118,30 +187,32 @@ class Sb3VecEnv(VecEnv):
         self._actions = actions
 
     def step_wait(self) -> Any:
-        """Take a control step; return observations, rewards, ends of episodes, and infos of these only."""
+        """Take a control step; return observations, rewards, ends of episodes, and infos."""
         observations, rewards, terminated, truncated, infos = self.envs.step(self._actions)  # type: ignore[arg-type]
         self.terms = {name: infos[name] for name in self.terms}
         self.measured = infos["measured"]
         dones = terminated | truncated
-        each: list[dict[str, Any]] = [{} for _ in range(self.num_envs)]
+        # With SAME_STEP `infos` are already of the next episode where one ended.
+        of_step = infos.get("final_info", infos)
+        each: list[dict[str, Any]] = [RowInfo(of_step, env) for env in range(self.num_envs)]
         if dones.any():
             final = infos["final_info"]
             figures = infos["final_info"]["episode_summary"]
             names = [name for name in figures if not name.startswith("_")]
             reasons = [reason for reason in final["end"] if not reason.startswith("_")]
-            # With SAME_STEP `infos` are already of the next episode.
             for name in self.terms:
                 self.terms[name] = np.where(dones, final[name], infos[name])
             started = {key: values for key, values in infos.items() if key in self.reset_infos[0]}
             for env in np.flatnonzero(dones):
                 self.reset_infos[env] = row_of(started, int(env))
-                each[env] = {
+                ended = {
                     "terminal_observation": infos["final_obs"][env],
                     "TimeLimit.truncated": bool(truncated[env]),
                     "episode_summary": {name: float(figures[name][env]) for name in names},
                     "end": {reason: True for reason in reasons if final["end"][reason][env]},
                     "is_success": bool(final["is_success"][env]),
                 }
+                each[env] = RowInfo(of_step, int(env), ended)
         return observations, rewards.astype(np.float32), dones, each
 
     def close(self) -> None:
