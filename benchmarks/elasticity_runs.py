@@ -19,7 +19,7 @@ from hoof_env.dynamics.parts import Limb, Prescribed, Trunk, broken
 from hoof_env.dynamics.step_length import StepWarning
 from hoof_env.gait import load_gait
 from hoof_env.ground.contact import Ground, load_ground
-from hoof_env.ground.laws import FACTORS, REGULAR_LAWS, SMALLEST_RESTITUTION, restitution_of_factor
+from hoof_env.ground.laws import FACTORS, MIN_RESTITUTION, REGULAR_LAWS, restitution_of_factor
 from hoof_env.leg.geometry import load_geometry
 from hoof_env.leg.presets import DEFAULT_PRESET
 from hoof_env.tasks.settings import Settings
@@ -90,7 +90,7 @@ MASSES = (10.0, 50.0, 100.0, 300.0, 1000.0, 10000.0)
 
 def nominal(law: str, restitution: float) -> float:
     """Return the restitution, or the smallest that the law takes."""
-    return restitution if law in REGULAR_LAWS else max(restitution, SMALLEST_RESTITUTION)
+    return restitution if law in REGULAR_LAWS else max(restitution, MIN_RESTITUTION)
 
 
 def ground_of(law: str, restitution: float, floor: float = PAPER_FLOOR) -> Ground:

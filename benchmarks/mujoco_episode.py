@@ -25,7 +25,7 @@ from hoof_env.leg.kinematics import FrameMotion, pose
 from hoof_env.leg.link_tree import CRANK_LINK, link_tree
 from hoof_env.leg.mjcf import SWING_DAMPING, SWING_STIFFNESS
 from hoof_env.tasks.observation import HALF_RANGE, MIDDLE
-from hoof_env.tasks.reward import BEARING, LONGEST_STRIDE, STEPPING
+from hoof_env.tasks.reward import BEARING, MAX_STRIDE, STEPPING
 
 Floats = NDArray[np.float64]
 
@@ -118,7 +118,7 @@ class MujocoEpisode:
         self._set_speeds(geometry, names, theta, state, report)
         self.weight = GRAVITY * (self.trunk.mass + geometry.mass)
         self.stance = StanceCounter(LIFT_OFF * self.weight)
-        self.allowance = BEARING * LONGEST_STRIDE
+        self.allowance = BEARING * MAX_STRIDE
         self.time = 0.0
         self.peaks = 0.0
         mujoco.mj_forward(self.model, self.data)
@@ -257,7 +257,7 @@ class MujocoEpisode:
         w = self.env.weights
         dt = self.env.dt
         asked = float(self.env.batch.plan.commands.speeds[0]) * dt
-        allowance = min(self.allowance + BEARING * dt, BEARING * LONGEST_STRIDE)
+        allowance = min(self.allowance + BEARING * dt, BEARING * MAX_STRIDE)
         impulse = sums.impulse / self.weight
         borne = min(impulse, allowance)
         self.allowance = allowance - borne

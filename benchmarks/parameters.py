@@ -30,7 +30,7 @@ from hoof_env.dynamics.engine import TrunkEngine
 from hoof_env.dynamics.parts import Limb, Prescribed, broken
 from hoof_env.gait import load_gait
 from hoof_env.ground.contact import Ground, load_ground
-from hoof_env.ground.laws import FACTORS, SMALLEST_RESTITUTION, restitution_of_factor
+from hoof_env.ground.laws import FACTORS, MIN_RESTITUTION, restitution_of_factor
 from hoof_env.leg.presets import DEFAULT_PRESET
 from hoof_env.paper.rows import load_published
 
@@ -50,7 +50,7 @@ STIFFNESSES = (0.25, 0.5, 1.0, 2.0, 4.0, 16.0)
 
 EXPONENTS = (1.0, 1.375, 1.5, 2.0)
 FLOORS = (1e-4, 0.01, 0.03, 0.1, 0.3, 1.0)
-NOMINAL = (0.0, SMALLEST_RESTITUTION, 0.1, 0.3, 0.5, 0.7, 0.9)
+NOMINAL = (0.0, MIN_RESTITUTION, 0.1, 0.3, 0.5, 0.7, 0.9)
 RESTITUTIONS = (1.0, 0.75, 0.5, 0.25, 0.0)
 DAMPED = (1.0, 0.5, 0.0)
 """Restitutions in the tables of energy, and of the suspended trunk."""

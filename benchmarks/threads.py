@@ -141,7 +141,7 @@ def call_cost(calls: int) -> float:
     def nothing(x: Whole) -> None:
         """Do nothing."""
 
-    kernel = Kernel(nothing, [int], threads=True)
+    kernel = Kernel(nothing, [int], is_threaded=True)
 
     def timed(count: int) -> float:
         begin = time.perf_counter()

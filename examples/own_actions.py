@@ -86,7 +86,7 @@ hoof_env.register(
             "minus what the highest force rises above `free`",
             impact,
             constants=[FREE],
-            keeps=[hoof_env.Kept("highest", 0.0, "N", "highest force of the episode")],
+            state=[hoof_env.TermState("highest", 0.0, "N", "highest force of the episode")],
         )
     ],
     entries=[

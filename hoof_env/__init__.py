@@ -48,11 +48,11 @@ if TYPE_CHECKING:
     from hoof_env.tasks.horse_gaits import HorseGait as HorseGait
     from hoof_env.tasks.observation import Entry as Entry
     from hoof_env.tasks.observation import Scale as Scale
-    from hoof_env.tasks.own_parts import ActionMap as ActionMap
-    from hoof_env.tasks.own_parts import Constant as Constant
-    from hoof_env.tasks.own_parts import Kept as Kept
     from hoof_env.tasks.registry import register as register
     from hoof_env.tasks.reward import Term as Term
+    from hoof_env.tasks.user_parts import ActionMap as ActionMap
+    from hoof_env.tasks.user_parts import Constant as Constant
+    from hoof_env.tasks.user_parts import TermState as TermState
 
 _MODULES = {
     "paper_solver.solver": "ConstrainedLeg",
@@ -65,7 +65,7 @@ _MODULES = {
     "policies.find": "load_policy",
     "policies.onnx_file": "stamp_onnx",
     "tasks.horse_gaits": "HorseGait",
-    "tasks.own_parts": "ActionMap Constant Kept",
+    "tasks.user_parts": "ActionMap Constant TermState",
     "tasks.reward": "Term",
     "envs.sb3": "Sb3VecEnv",
     "tasks.registry": "register",

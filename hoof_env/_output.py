@@ -148,18 +148,18 @@ def free_memory() -> float:
     return max(min(bounds), 0.0)
 
 
-LEAST_COLUMNS = 40
+MIN_COLUMNS = 40
 """Least width of help: in a narrower terminal the tables of tyro and rich never end."""
 
 
 def bear_any_output() -> None:
     """Make a command replace characters that the encoding of its output lacks, and lay out help for a
-    terminal of at least `LEAST_COLUMNS`."""
+    terminal of at least `MIN_COLUMNS`."""
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, io.TextIOWrapper):
             stream.reconfigure(errors="replace")
-    if shutil.get_terminal_size().columns < LEAST_COLUMNS:
-        os.environ["COLUMNS"] = str(LEAST_COLUMNS)
+    if shutil.get_terminal_size().columns < MIN_COLUMNS:
+        os.environ["COLUMNS"] = str(MIN_COLUMNS)
 
 
 def flush_or_drop() -> None:

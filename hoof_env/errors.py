@@ -50,7 +50,7 @@ class OutputError(HoofEnvError, OSError):
     """Output file or folder that cannot be written."""
 
 
-LEAST = 1e-12
+MIN_POSITIVE = 1e-12
 """Smallest value of positive settings, in any unit."""
 
 
@@ -73,7 +73,7 @@ def check_number(
 
     Raises:
         ParameterError: it is not a finite number within [low, high]; or, with `exclusive_low`, it is `low`
-            or, for a `low` of 0, less than `LEAST`, so that quotients stay finite.
+            or, for a `low` of 0, less than `MIN_POSITIVE`, so that quotients stay finite.
     """
     try:
         number = float(value) if is_number(value) else np.nan
@@ -82,8 +82,8 @@ def check_number(
     if not (math.isfinite(number) and low <= number <= high) or (exclusive_low and number == low):
         bounds = f"{'(' if exclusive_low else '['}{low:g}, {high:g}]"
         raise ParameterError(f"{name}: expected a finite number in {bounds}, got {value!r}")
-    if exclusive_low and low == 0 and number < LEAST:
-        raise ParameterError(f"{name}: expected {LEAST:g} or more, got {value!r}")
+    if exclusive_low and low == 0 and number < MIN_POSITIVE:
+        raise ParameterError(f"{name}: expected {MIN_POSITIVE:g} or more, got {value!r}")
     return number
 
 
@@ -140,7 +140,7 @@ def parse_pairs(option: str, items: Sequence[str]) -> dict[str, Any]:
 
 Floats = NDArray[np.float64]
 Kind = TypeVar("Kind")
-LARGEST = float(np.finfo(np.float64).max)
+MAX_FLOAT = float(np.finfo(np.float64).max)
 """Largest finite number."""
 
 
@@ -178,7 +178,7 @@ def finite(name: str, value: Any, most: float = np.inf) -> Floats:
     except (TypeError, ValueError, OverflowError):
         numbers = np.array(np.nan)
     # one pass for both checks, NaN included: every reset of an episode calls this function
-    if (np.abs(numbers) <= min(most, LARGEST)).all():
+    if (np.abs(numbers) <= min(most, MAX_FLOAT)).all():
         return numbers
     if not np.isfinite(numbers).all():
         raise ParameterError(f"{name}: expected finite numbers, got {value!r}")

@@ -28,7 +28,7 @@ LIMITS = MappingProxyType(
     }
 )
 """Lowest and highest value of each gait parameter of the published leg [rad/s, rad, rad, rad]; `limits_of`
-has those of others. Both gaits of the paper lie inside, and so do the best gaits that were learned:
+scales them to other legs. Both gaits of the paper lie inside, and so do the best learned gaits:
 docs/evidence/actions.md has the sweep."""
 
 FASTEST_CRANK = 1000.0
@@ -47,8 +47,8 @@ def speed_scale_of(geometry: Geometry) -> float:
 
 
 def limits_of(geometry: Geometry) -> dict[str, tuple[float, float]]:
-    """Return the `LIMITS` of a leg: angles are those of the published leg, and at one Froude number the
-    crank turns faster by the root of how much smaller the leg is."""
+    """Return the `LIMITS` of a leg: the angles of the published leg, and at one Froude number crank speeds
+    scaled by the root of the inverse ratio of the sizes."""
     low, high = LIMITS["crank_speed"]
     speed_scale = speed_scale_of(geometry)
     return {**LIMITS, "crank_speed": (low / speed_scale, high / speed_scale)}
@@ -114,7 +114,7 @@ class GaitParameters:
 PARAMETERS = tuple(item.name for item in fields(GaitParameters))
 """Names of the gait parameters, in the order used by actions and filters."""
 
-MOST_HARMONICS = 3
+MAX_HARMONICS = 3
 """Largest number of harmonics of a swing law."""
 
 WIDEST = MappingProxyType(
@@ -338,7 +338,7 @@ class FilterSettings:
 
     @property
     def longest_step(self) -> float:
-        """Longest time step [s] at which the filters still keep their bounds and do not overshoot."""
+        """Longest time step [s] at which the filters respect their bounds and do not overshoot."""
         return 1.0 / (INNER * self.gain)
 
     def to_array(self) -> NDArray[np.float64]:
@@ -360,7 +360,7 @@ def command_filters(
     `settings` are rows of `FilterSettings.to_array`.
     """
     for one, wanted, (gain, rate_bound, acc_bound) in zip(filters, command, settings, strict=True):
-        # a cascade: the outer loop asks for a rate, the inner one, `INNER` times as fast, follows it
+        # a cascade: the outer loop sets a rate, the inner loop, `INNER` times as fast, follows it
         wanted_rate = _clip(gain * (wanted - one.value), rate_bound)
         one.acc = _clip(INNER * gain * (wanted_rate - one.rate), acc_bound)
 

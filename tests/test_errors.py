@@ -9,7 +9,7 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from hoof_env.errors import (
-    LEAST,
+    MIN_POSITIVE,
     DataFileError,
     GeometryError,
     HoofEnvError,
@@ -30,8 +30,8 @@ numbers = st.floats(allow_nan=True, allow_infinity=True) | st.integers()
 def test_a_number_is_returned_or_named(value, bounds, exclusive):
     low, high = sorted(bounds)
     fits = -1e300 < value < 1e300 and low <= value <= high and not (exclusive and value == low)
-    if fits and exclusive and low == 0 and value < LEAST:
-        with pytest.raises(ParameterError, match=f"^x: expected {LEAST:g} or more, got {value!r}$"):
+    if fits and exclusive and low == 0 and value < MIN_POSITIVE:
+        with pytest.raises(ParameterError, match=f"^x: expected {MIN_POSITIVE:g} or more, got {value!r}$"):
             check_number("x", value, low=low, high=high, exclusive_low=exclusive)
     elif fits:
         result = check_number("x", value, low=low, high=high, exclusive_low=exclusive)

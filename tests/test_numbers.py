@@ -26,7 +26,7 @@ from hoof_env.ground.laws import FACTORS, restitution_of_factor
 from hoof_env.paper.rows import EXACT, OURS, PRINTED, PROBABLE, UNDETERMINED
 from hoof_env.tasks.horse import MASS
 from hoof_env.tasks.horse_terms import HORSE_TERMS
-from hoof_env.tasks.reward import BEARING, LONGEST_STRIDE, check_weights
+from hoof_env.tasks.reward import BEARING, MAX_STRIDE, check_weights
 
 ROOT = Path(__file__).parents[1]
 PAGES = (
@@ -150,7 +150,7 @@ def setting(name: str, key: str) -> float:
 
 def allowance() -> float:
     """The largest bearing allowance [s]."""
-    return BEARING * LONGEST_STRIDE
+    return BEARING * MAX_STRIDE
 
 
 def measured_count(name: str) -> float:

@@ -26,7 +26,7 @@ ENV_ID = DEFAULT_ENV
 FIXED_ID = "hoof_env/HorseLegFixed-v0"
 AGENT = "shipped agent"
 SCRIPTED = ("zero", "walk", "run", "constant", OPEN_LOOP, "idle", "random", "bang-bang")
-FIRST_SEED = 1000  # first of the scored episodes; no training starts its own from it
+FIRST_SEED = 1000  # first of the scored episodes; no training uses it
 PAGE = "report.html"
 SLOW = 4  # factor of the slow motion in which the films of the fixed trunk play
 SIZE = (640, 360)  # of the films [pixels]
@@ -47,9 +47,10 @@ def demo(out: Path, quick: bool = False, say: Say = print, overwrite: bool = Tru
 
     Args:
         out: folder of the report; an older one there is replaced when the new one is complete.
-        quick: tiny numbers, which show that everything works.
+        quick: tiny numbers, as a test of all parts.
         say: function that prints a line.
-        overwrite: False: another report that is there at the end stays, and the new one is kept next to it.
+        overwrite: if False, a report that exists at the end is not replaced; the new one is stored next to
+            it.
 
     Raises:
         OutputError: the folder cannot be written, or there is another report.
@@ -87,7 +88,7 @@ def check_extras() -> None:
 
 
 class Steps:
-    """The steps of a demonstration, which are printed as they begin and end.
+    """Steps of a demonstration, printed at their start and end.
 
     Args:
         count: number of steps.

@@ -60,7 +60,7 @@ class Report:
         first_seed: seed of the first episode.
         command: command that writes the report.
         versions: versions of the packages that matter.
-        learning: training of the agent; None for one that ships.
+        learning: training of the agent; None for a shipped agent.
         quick: True if the numbers are tiny.
     """
 
@@ -114,7 +114,7 @@ class Report:
 
 
 def worse(agent: Score, run: Score) -> list[str]:
-    """Return the figures of an agent that are worse than those of a gait, both in words."""
+    """Return the figures of an agent that are worse than a gait's, as text."""
     found = []
     for key, sense in BETTER.items():
         if key in agent.estimates and key in run.estimates:

@@ -2,11 +2,11 @@
 
 `Advance` is the engine inside a kernel. It advances one leg alone, four lanes that are the legs of one trunk,
 or `LANES` environments side by side with any number of legs: the `Arrangement`s. It works on copies on the
-stack, of which LLVM keeps in registers what fits.
+stack, which LLVM keeps in registers as far as they fit.
 
-An engine's memory is one matrix `data`, a column for each environment: the rows of the trunk, then those of
-each leg, fields as in `layout.TrunkMemory` and `LegMemory`. Each kind of engine (`EngineKind`) has kernels of
-its own.
+An engine's memory is one matrix `data`, a column for each environment: the rows of the trunk, then the rows
+of each leg, fields as in `layout.TrunkMemory` and `LegMemory`. Each kind of engine (`EngineKind`) has its own
+kernels.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from dataclasses import dataclass
 from functools import lru_cache, partial
 from typing import Any
 
-from hoof_env.dynamics.hoof import level_ground, lift_heel, remember_contacts
+from hoof_env.dynamics.hoof import disable_heel, level_ground, remember_contacts
 from hoof_env.dynamics.layout import (
     EngineLayout,
     Features,
@@ -92,7 +92,7 @@ def read_leg(leg: LegRows, memory: LegMemory, form: EngineLayout) -> None:
         leg.inverse_damping[k] = 1.0 / leg.settings.hoof_damping[k]
     level_ground(leg)
     if form.feet == 1:
-        lift_heel(leg, form.springs)
+        disable_heel(leg, form.springs)
 
 
 def find_result(
@@ -164,7 +164,7 @@ SIDE_BY_SIDE = Arrangement("batch", LANES)
 
 @dataclass(frozen=True)
 class EngineKind:
-    """All that the code of an engine's kernels follows from.
+    """Everything that determines the code of an engine's kernels.
 
     Attributes:
         features: features of the engine.
@@ -197,7 +197,7 @@ class Advance:
     """Engine inside a kernel: memory on the stack, and settings, of the environments that are advanced.
 
     Args:
-        given: arrays of the kernel, with those of `ARRAYS`.
+        given: arrays of the kernel, `ARRAYS` among them.
         kind: kind of the engine.
         arrangement: environments that are advanced at once.
         is_start: True for a kernel that starts the environments with the result `RESET_REQUESTED`.
@@ -254,7 +254,7 @@ class Advance:
             if self.is_start:
                 self._start(starts)
             self._run(h, steps, keeps_account)
-            result, good = self._judge(before)
+            result, good = self._step_results(before)
             memory.result = result
             self._store_trunk(memory, good, keeps_account)
             self._store_legs(leg_memory, good)
@@ -290,13 +290,13 @@ class Advance:
             when(turn < steps * model.stages)(partial(self._move, stage, elapsed, h, keeps_account))
 
     def _look(self, turn: Whole, h: Lanes | float, steps: Whole) -> None:
-        """Do what belongs to a whole step: remember contacts, count strides, find reactions, check limits."""
+        """Finish a whole step: remember contacts, count strides, find reactions, check limits."""
         trunk, model = self.trunk, self.model
         structure = self.kind.features.structure
         for i in loop(self.leg_count):
             leg = block_at(self.legs, i)
             remember_contacts(leg)
-            if model.strides:
+            if model.counts_strides:
                 when(turn > 0)(partial(count_stride, trunk, leg, model.form, h))
             if self.kind.reacts:
                 constants, forces = block_at(self.constants, i), block_at(self.forces, i)
@@ -331,7 +331,7 @@ class Advance:
 
         cond(stage.value < model.stages, lambda: next_stage(*bodies, elapsed.value), end)
 
-    def _judge(self, before: Lanes) -> tuple[Lanes, Truth]:
+    def _step_results(self, before: Lanes) -> tuple[Lanes, Truth]:
         """Return the results of the environments, and where the rows of the kernel are to be stored."""
         result = find_result(
             self.trunk, self.legs, self.leg_count, self.arrangement.lanes_are_legs, self.form
@@ -340,13 +340,13 @@ class Advance:
         if self.form.has_limits:
             good = good | (result >= FIRST_LIMIT)  # a motion beyond a limit is a motion
         if self.is_start:
-            # only what starts is written, even where the start is infeasible
+            # only environments that start are written, even if the start is infeasible
             good = before == RESET_REQUESTED
             result = where(good, result, before)
         return result, good
 
     def _store_trunk(self, memory: TrunkMemory, good: Truth, keeps_account: Truth) -> None:
-        """Store the report, and where `good` holds what changes of the trunk."""
+        """Store the report and, where `good` holds, the trunk's state."""
         report_trunk(self.trunk, memory.report)
         store(memory.state, self.trunk.state, self.form.trunk_state, good)
 
@@ -358,7 +358,7 @@ class Advance:
             store(memory.account, account, size, good)
 
     def _store_legs(self, leg_memory: Callable[[Whole], LegMemory], good: Truth) -> None:
-        """Store reports, and where `good` holds what changes of the legs."""
+        """Store the reports and, where `good` holds, the legs' states."""
         form = self.form
         for i in loop(self.leg_count):
             leg = block_at(self.legs, i)
@@ -384,8 +384,8 @@ class Advance:
 def new_kernel(kind: EngineKind, arrangement: Arrangement, is_start: bool = False) -> Kernel:
     """Return a kernel of an engine.
 
-    Its arguments are the arrays, the substep [s], the number of substeps, and 1 for a kernel that keeps the
-    account. It advances the columns of the arrays or, if `is_start`, starts those of them whose result is
+    Its arguments are the arrays, the substep [s], the number of substeps, and 1 for a kernel that updates
+    the account. It advances the columns of the arrays or, if `is_start`, starts the columns whose result is
     `RESET_REQUESTED`.
     """
 
@@ -405,8 +405,8 @@ def _own_kernel(kind: EngineKind, arrangement: Arrangement, is_start: bool) -> K
 
 
 def engine_kernel(kind: EngineKind, arrangement: Arrangement, is_start: bool = False) -> Kernel:
-    """Return the kernel of an engine, `new_kernel`. Engines of one kind share it, unless a function from
-    outside is part of it, whose helpers may have changed since."""
+    """Return the kernel of an engine, `new_kernel`. Engines of one kind share it, except with a
+    user's function, whose helpers may have changed since."""
     if kind.contact_law is None:
         return _own_kernel(kind, arrangement, is_start)
     return new_kernel(kind, arrangement, is_start)

@@ -3,7 +3,7 @@
 Only what can move freely is integrated: the trunk, as momentum and centre of mass of all bodies together,
 and the crank of every leg that has a motor. Everything inside a leg follows from its crank angle in closed
 form, so the loops of the linkage are closed to round-off at every step. `mechanics` has the equations,
-`advance` runs them; this module checks arguments and keeps the state. Results have the same bits alone and in
+`advance` runs them; this module checks arguments and holds the state. Results have the same bits alone and in
 a batch of any size.
 """
 
@@ -27,7 +27,7 @@ from hoof_env.dynamics.layout import engine_layout
 from hoof_env.dynamics.limits import CHECK_EVERY
 from hoof_env.dynamics.model import static_of
 from hoof_env.dynamics.parts import (
-    MOST_IMPULSE,
+    MAX_IMPULSE,
     Drive,
     Limb,
     Limits,
@@ -54,7 +54,7 @@ from hoof_env.errors import (
     one_of,
     spread,
 )
-from hoof_env.gait import MOST_HARMONICS, FilterSettings, GaitParameters
+from hoof_env.gait import MAX_HARMONICS, FilterSettings, GaitParameters
 from hoof_env.ground.contact import Ground
 from hoof_env.ground.terrain import Terrain
 from hoof_env.leg.profile import LegProfile, leg_profile
@@ -69,17 +69,17 @@ MAX_SCALAR_ENVS = 6
 """Largest number of environments of one leg or of four that are run one by one: eight lanes would be mostly
 empty."""
 
-MOST_LEGS = 32
+MAX_LEGS = 32
 """Largest number of legs: kernels work on the stack, where a leg takes 15 kB with eight lanes."""
 
-MOST_STEPS = 10**12
+MAX_STEPS = 10**12
 """Largest number of substeps of a call: they are counted in 64 bits."""
 
 PART = 2_000_000
-"""Number of substeps, those of all legs added up, that a long call runs in machine code at a time: at most
-about a second. Ctrl-C takes effect between two parts. Sums have other last digits than in one part."""
+"""Number of substeps, summed over all legs, that a long call runs in machine code at a time: at most about a
+second. Ctrl-C takes effect between two parts. The last digits of sums depend on the parts."""
 
-LEAST_PART = 1000
+MIN_PART = 1000
 """Least number of substeps of each environment in such a part."""
 
 
@@ -87,31 +87,31 @@ class TrunkEngine:
     """Legs on a trunk over the ground; see the module docstring.
 
     Args:
-        limbs: the legs in their places, at most `MOST_LEGS`; arrays have them in this order.
+        limbs: the legs in their places, at most `MAX_LEGS`; arrays have them in this order.
         trunk: trunk that holds the legs. Its height is that of its centre of mass.
         ground: laws of contact. Its exponent must be a multiple of 1/8, so that square roots are enough.
         terrain: heights, and where the ground is softer or more slippery; level if None.
         sim_dt: length of a step [s], after which results can be read.
         integrator: one of `stepping.SCHEMES`.
-        substeps: number of substeps of `sim_dt`; contacts are remembered after each. None chooses as many as
-            ground, motors and support need, up to `step_length.MOST_SUBSTEPS`.
-        step_error: error of the state after a contact [-] for which that choice is made.
+        substeps: number of substeps of `sim_dt`; contacts are remembered after each. By default as many as
+            ground, motors and support need, up to `step_length.MAX_SUBSTEPS`.
+        step_error: error of the state after a contact [-] on which that choice is based.
         num_envs: number of environments side by side, which share all of the above.
         num_threads: number of threads that share the environments; it changes no bit.
-        harmonics: order of the swing law, 1 to `gait.MOST_HARMONICS`: gaits and commands have 2 + 2 harmonics
+        harmonics: order of the swing law, 1 to `gait.MAX_HARMONICS`: gaits and commands have 2 + 2 harmonics
             numbers.
         filters: bounds of the command filters; `gait.QUICK` where the crank's speed changes within a stride.
-        reactions: true to compute the joint reactions of every step; `reactions()` has those of the last.
+        reactions: true to compute the joint reactions of every step; `reactions()` returns the last.
         strides: true to count stances, peak forces and work; `strides` has them.
-        limits: where the motion should end, see `parts.Result`. An engine with limits, if only `Limits()`,
-            takes legs of other sizes in `vary`, and its `strides` have horizontal impulses.
+        limits: where the motion should end, see `parts.Result`. An engine with limits, even `Limits()`,
+            accepts legs of other sizes in `vary`, and its `strides` have horizontal impulses.
         contact_law: law of the normal force instead of the ground's, see `hoof.contact_force`.
 
     Attributes:
         runs_scalar: true if environments are run one by one in one thread, not side by side.
-        blocks: columns of the memory that each thread works on.
-        mechanics: legs, trunk, ground and scheme. Mechanics that share the features of these may take their
-            place between two calls.
+        blocks: columns of the memory for each thread.
+        mechanics: legs, trunk, ground and scheme. It may be replaced between two calls by mechanics
+            with the same features.
 
     Raises:
         ParameterError: a value is out of range or of the wrong type; or, at the first reset, the contact law
@@ -119,7 +119,7 @@ class TrunkEngine:
         GeometryError: a leg has no place for its links at any crank angle.
 
     Warns:
-        StepWarning: `substeps` is given and too small, or more would be needed than are chosen.
+        StepWarning: `substeps` is given and too small, or more would be needed than `MAX_SUBSTEPS`.
     """
 
     def __init__(
@@ -146,15 +146,15 @@ class TrunkEngine:
             check_function("contact_law", contact_law, 4)
         self.contact_law = contact_law
         legs = all_of("limbs", limbs, Limb)
-        if len(legs) > MOST_LEGS:
-            raise ParameterError(f"limbs: expected at most {MOST_LEGS}, got {len(legs)}")
+        if len(legs) > MAX_LEGS:
+            raise ParameterError(f"limbs: expected at most {MAX_LEGS}, got {len(legs)}")
         trunk = one_of("trunk", trunk, Trunk)
         limits = None if limits is None else one_of("limits", limits, Limits)
-        order = count("harmonics", harmonics, most=MOST_HARMONICS)
+        order = count("harmonics", harmonics, most=MAX_HARMONICS)
         self.reacts = flag("reactions", reactions)
         features = memory.features_of(legs, order, limits is not None, self.reacts)
-        memory.check_limbs(trunk, legs, features.springs)
-        if contact_law is not None and features.springs:
+        memory.check_limbs(trunk, legs, features.has_springs)
+        if contact_law is not None and features.has_springs:
             raise ParameterError(
                 "contact_law: expected none beside springs of the hoofs, whose speed follows from a law that "
                 f"is linear in it, got {contact_law!r}"
@@ -168,26 +168,15 @@ class TrunkEngine:
         self.num_threads = check_threads(num_threads)
         profiles = [leg_profile(limb.geometry) for limb in legs]
         step_error = check_number("step_error", step_error, low=0, high=1, exclusive_low=True)
-        length = StepLength(
+        mechanics = Mechanics(
             legs, profiles, trunk, ground, terrain, integrator, features, limits, step_error=step_error
         )
-        asked = None if substeps is None else count("substeps", substeps, most=MOST_STEPS)
+        length = StepLength(mechanics)
+        asked = None if substeps is None else count("substeps", substeps, most=MAX_STEPS)
         chosen = length.choose(self.sim_dt, asked)
         self.counts_strides = flag("strides", strides)
-        self.mechanics = Mechanics(
-            legs,
-            profiles,
-            trunk,
-            ground,
-            terrain,
-            integrator,
-            features,
-            limits,
-            step_error,
-            chosen,
-            length.limits,
-            memory.new_model(length, self.filters, self.counts_strides),
-        )
+        model = memory.new_model(mechanics, self.filters, self.counts_strides)
+        self.mechanics = replace(mechanics, substeps=chosen, step_limits=length.limits, model=model)
         self._allocate()
 
     def _allocate(self) -> None:
@@ -206,7 +195,7 @@ class TrunkEngine:
         return f"<TrunkEngine {self.trunk.kind}, {legs}, {masses}, {self.num_envs} environments>"
 
     def __getstate__(self) -> dict[str, Any]:
-        """Return the attributes of a copy, which has memory of its own even if it is shallow."""
+        """Return the attributes of a copy, with separate memory even if the copy is shallow."""
         m = self._memory
         # kernels are left out: the copy finds them, perhaps in another process
         parts = {**vars(self), "_calls": None}
@@ -222,10 +211,10 @@ class TrunkEngine:
         self.num_threads = limit_threads(self.num_threads)
 
     def __deepcopy__(self, memo: Any) -> TrunkEngine:
-        """Return a copy that shares what never changes, such as the legs' tables."""
+        """Return a copy that shares constant parts, such as the legs' tables."""
         return copy.copy(self)
 
-    # Mechanics, memory and arguments of the kernels, for callers with kernels of their own
+    # Mechanics, memory and arguments of the kernels, for callers with their own kernels
 
     @property
     def limbs(self) -> Sequence[Limb]:
@@ -300,8 +289,8 @@ class TrunkEngine:
 
     @property
     def arrays(self) -> tuple[NDArray[Any], ...]:
-        """First arguments of the kernels of `advance`; their memory stays in place, but a copy has its
-        own."""
+        """First arguments of the kernels of `advance`; their memory stays in place; a copy has separate
+        memory."""
         return self.arrays_of(self.mechanics)
 
     def arrays_of(self, mechanics: Mechanics) -> tuple[NDArray[Any], ...]:
@@ -320,8 +309,8 @@ class TrunkEngine:
         return self._memory.result.astype(np.int64)
 
     def alone(self, *, reactions: bool | None = None) -> TrunkEngine:
-        """Return a new engine like this one for one environment; `reactions` says whether it computes joint
-        reactions, None that it does where this one does."""
+        """Return a new engine like this one for one environment; `reactions` selects whether it computes
+        joint reactions; by default as this engine does."""
         return TrunkEngine(
             self.limbs,
             self.trunk,
@@ -427,13 +416,13 @@ class TrunkEngine:
                 mass [m, rad, s], shape () or (n,); a `y` of None is the trunk's height.
             crank_angle_rate: speeds of motor-driven cranks [rad/s], shaped as `crank_angle`; None is the
                 commanded speed.
-            envs: environments that start, as indices or as a mask of shape (num_envs,); None is all.
+            envs: environments that start, as indices or as a mask of shape (num_envs,); None for all.
 
         Raises:
             ParameterError: a value is not finite, of the wrong shape or forbidden by the trunk's kind, an
                 angle, place or rate is beyond `layout.MAX_STATE`, or a leg's links have no place there.
         """
-        where = memory.which(envs, self.num_envs)
+        where = memory.env_indices(envs, self.num_envs)
         m = self._memory
         n = where.size
         values = memory.gaits_of(gaits, len(self.limbs), n, self.features.harmonics)
@@ -455,13 +444,13 @@ class TrunkEngine:
         Args:
             command: gait parameters, P = 2 + 2 harmonics of them, of shape (P,), (legs, P) or (legs, P, n),
                 where n is the number of environments that are commanded.
-            envs: environments that are commanded, as indices or as a mask of shape (num_envs,); None is all.
+            envs: environments that are commanded, as indices or as a mask of shape (num_envs,); None for all.
 
         Raises:
             ParameterError: the command has a wrong shape or is not finite, or there are no such environments.
         """
         gaits = finite("command", command)
-        where = memory.which(envs, self.num_envs)
+        where = memory.env_indices(envs, self.num_envs)
         legs = len(self.limbs)
         size = self.features.gait_size
         if gaits.shape == (size,) or gaits.shape == (legs, size):
@@ -484,20 +473,20 @@ class TrunkEngine:
         """Advance by `steps` of `sim_dt` under a command.
 
         Args:
-            command: gait parameters as `command` takes them, for all environments; None keeps the last.
+            command: gait parameters as for `command`, for all environments; None for the last command.
             steps: number of steps; 0 evaluates forces and accelerations at the present state.
             account: true to update `account`.
 
         Returns:
             Results of the environments, values of `parts.Result`, shape (num_envs,). An environment that
-            could not be simulated has its state and its report from before this call.
+            could not be simulated has the state and report from before this call.
 
         Raises:
             ParameterError: the command has a wrong shape or is not finite.
             NotStartedError: no environment was ever reset.
             KeyboardInterrupt: Ctrl-C during a long call, which then ends after a part of the steps.
         """
-        steps = count("steps", steps, 0, MOST_STEPS // self.substeps)
+        steps = count("steps", steps, 0, MAX_STEPS // self.substeps)
         if command is not None:
             self.command(command)
         self._go_on(steps, account)
@@ -561,12 +550,12 @@ class TrunkEngine:
     def _go_on(self, steps: int, account: bool) -> None:
         """Advance as `_go`, a long call in parts, so that Ctrl-C takes effect."""
         left = steps * self.substeps
-        part = max(PART // (self.columns * len(self.limbs)), LEAST_PART) // CHECK_EVERY * CHECK_EVERY
+        part = max(PART // (self.columns * len(self.limbs)), MIN_PART) // CHECK_EVERY * CHECK_EVERY
         if left <= part:
             self._go(steps, account)
             return
         m = self._memory
-        kept = self._copy((*state_parts.STATE, "stride_sums", "result"))
+        before = self._copy((*state_parts.STATE, "stride_sums", "result"))
         first = np.zeros(self.num_envs)
         sums = np.zeros_like(m.stride_sums)
         are_peaks = np.array(layout.stride_peaks(self.features))
@@ -583,7 +572,7 @@ class TrunkEngine:
         lost = broken(first)
         m.stride_sums[:] = sums
         # an environment that fails has its state from before the call, not from before the part
-        for name, values in kept.items():
+        for name, values in before.items():
             getattr(m, name)[..., lost] = values[..., lost]
         m.result[:] = first
 
@@ -610,7 +599,7 @@ class TrunkEngine:
             raise user_error("contact_law", error) from None
 
     def _present_calls(self) -> EngineCalls:
-        """Return kernels and arguments for the present model, which other conditions may have replaced."""
+        """Return kernels and arguments for the present model, which another plan may have replaced."""
         if self._calls is None or self._calls.model is not self.mechanics.model:
             kind = EngineKind(
                 self.features, self.contact_law, static_of(self.mechanics.model[0]), self.reacts
@@ -625,19 +614,19 @@ class TrunkEngine:
 
         Args:
             forward, upward: impulses [N s], one number, or one for each environment that is pushed.
-            envs: environments that are pushed, as indices or as a mask of shape (num_envs,); None is all.
+            envs: environments that are pushed, as indices or as a mask of shape (num_envs,); None for all.
 
         Raises:
-            ParameterError: an impulse beyond `MOST_IMPULSE` or of wrong shape, bad `envs`, or a fixed trunk.
+            ParameterError: an impulse beyond `MAX_IMPULSE` or of wrong shape, bad `envs`, or a fixed trunk.
             NotStartedError: no environment was ever reset.
         """
-        where = memory.each_once(envs, self.num_envs)
+        where = memory.unique_env_indices(envs, self.num_envs)
         if np.isnan(self._memory.trunk).all():
             raise NotStartedError("the engine was asked to push before reset(): expected reset() first")
         if self.trunk.kind == "fixed":
             raise ParameterError("push: expected a trunk that moves, got a fixed one")
         pushed = {"forward": forward, "upward": upward}
-        push = np.array([spread(name, given, where.shape, MOST_IMPULSE) for name, given in pushed.items()])
+        push = np.array([spread(name, given, where.shape, MAX_IMPULSE) for name, given in pushed.items()])
         m = self._memory
         moving = views(layout.Moving, m.trunk[layout.TrunkState.rows("moving")])
         place = views(layout.TrunkReport, m.trunk_report).place[:, where]
@@ -651,7 +640,7 @@ class TrunkEngine:
         moving.momentum[:, where] += push
         if self.trunk.kind == "free":
             off = place - moving.centre[:, where]
-            moving.spin[where] += off[0] * push[1] - off[1] * push[0]
+            moving.angular_momentum[where] += off[0] * push[1] - off[1] * push[0]
 
     def vary(
         self,
@@ -661,17 +650,17 @@ class TrunkEngine:
         drive: Drive | None = None,
         limbs: Sequence[Limb] | None = None,
     ) -> None:
-        """Give one environment its own masses, springs, ground, motors or legs; it must be reset afterwards.
+        """Set masses, springs, ground, motors or legs of one environment; it must be reset afterwards.
 
         Args:
             env: index of the environment.
-            trunk, ground, drive: those of this environment, with the kinds, exponent and laws of the
-                engine's; None is the engine's own. `total_mass`, `weight` and `step_limits` stay
-                those of the engine.
+            trunk, ground, drive: parts of this environment, with the kinds, exponent and laws of the
+                engine's parts; None for the engine's. `total_mass`, `weight` and `step_limits` do not
+                change.
             limbs: legs of this environment, in other places, with other springs of the hooves or, in an
                 engine with `limits`, of other sizes, similar to the engine's (`Geometry.scaled`); their trunk
-                needs another height, too. None is the engine's own. Joint reactions are not computed for legs
-                of another size. The step stays the one that the engine's own legs and springs need.
+                needs another height, too. None for the engine's. Joint reactions are not computed for legs of
+                another size. The step is not adapted to these legs and springs.
 
         Raises:
             ParameterError: a setting that environments share differs, or there is no such environment.
@@ -717,7 +706,7 @@ class TrunkEngine:
     @property
     def strides(self) -> dict[str, Floats]:
         """Open stance and sums of the last call by name, `layout.STRIDES` and `stride_sums`, shape (legs,
-        num_envs); see `observables`. Zeros unless the engine was made with `strides=True`."""
+        num_envs); see `observables`. Zeros for an engine without `strides=True`."""
         m = self._memory
         whole = np.concatenate([m.strides, m.stride_sums], axis=1)
         return {
@@ -729,7 +718,7 @@ class TrunkEngine:
         the moments, shape (legs, num_envs).
 
         Raises:
-            ParameterError: the engine was not made with `reactions=True`.
+            ParameterError: the engine is without `reactions=True`.
         """
         if not self.reacts:
             raise ParameterError("reactions: expected an engine made with reactions=True, got one without")
@@ -757,7 +746,7 @@ class TrunkEngine:
         return self._copy(state_parts.STATE) | {"layout": dict(self._layout)}
 
     def set_state(self, state: Mapping[str, Any]) -> None:
-        """Restore what `get_state` returned, and evaluate forces and accelerations there.
+        """Restore a state from `get_state`, and evaluate forces and accelerations there.
 
         Raises:
             ParameterError: the state belongs to an engine that would continue differently, lacks a part, or
@@ -791,16 +780,16 @@ class TrunkEngine:
 
     def observe(self) -> None:
         """Evaluate forces and accelerations at the present state; change only `report` and `reactions`."""
-        kept = self._copy((*state_parts.STATE, "stride_sums", "result"))
+        before = self._copy((*state_parts.STATE, "stride_sums", "result"))
         self._go(0)
-        self._put(kept)
+        self._put(before)
 
     def column(self, env: int) -> Floats:
         """Return a copy of all memory of one environment: state, settings, command, report; shape (rows,)."""
         return self._memory.data[:, self._env(env)].copy()
 
     def set_column(self, env: int, column: Floats) -> None:
-        """Restore what `column` returned, of an engine like this one.
+        """Restore a column from `column`, of an engine like this one.
 
         Raises:
             ParameterError: another shape, or numbers that are not finite or beyond `layout.MAX_STATE` in an

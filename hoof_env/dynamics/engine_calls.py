@@ -18,7 +18,7 @@ class EngineCalls:
     Args:
         kind: kind of the engine.
         arrangement: environments that are advanced at once.
-        model: arrays of the model, by which calls are known to be those of the present conditions.
+        model: arrays of the model; calls are reused as long as these are the engine's.
         arrays: all arrays, `TrunkEngine.arrays`.
         blocks: columns of each call.
         num_threads: number of calls at once.

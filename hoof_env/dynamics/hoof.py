@@ -30,8 +30,7 @@ from hoof_env.simd.user_functions import foreign, function_name, inputs
 
 
 def level_ground(leg: LegRows) -> None:
-    """Set what is constant on ground that is level and the same everywhere: normal and scales of the
-    terrain."""
+    """Set the constants of level, uniform ground: normal and scales of the terrain."""
     upward = vector(full_like(leg, 0.0), 1.0)
     for point in (leg.toe, leg.heel):
         point.ground_normal = upward
@@ -39,8 +38,8 @@ def level_ground(leg: LegRows) -> None:
         point.friction_scale = 1.0
 
 
-def lift_heel(leg: LegRows, springs: int) -> None:
-    """Set the contact of a heel that is not there, of a hoof with one point, to nothing; it stays so."""
+def disable_heel(leg: LegRows, springs: int) -> None:
+    """Set the contact of the missing heel of a hoof with one point to zero; it stays zero."""
     heel = leg.heel
     heel.penetration = 0.0
     heel.penetration_rate = 0.0
@@ -55,7 +54,7 @@ def lift_heel(leg: LegRows, springs: int) -> None:
         heel.mean_deflection_rate[k] = 0.0
 
 
-def meet_ground(trunk: TrunkRows, leg: LegRows, model: Model) -> None:
+def ground_forces(trunk: TrunkRows, leg: LegRows, model: Model) -> None:
     """Compute the forces of the ground on toe and heel, and their generalised forces on crank and frame."""
     hip = leg.hip
     pitch_rate = trunk.rates.pitch_rate
@@ -63,11 +62,11 @@ def meet_ground(trunk: TrunkRows, leg: LegRows, model: Model) -> None:
     leg.beta_rate = pitch_rate + leg.beta_by_theta * w + leg.swing_rate
     place = trunk.place + hip
     velocity = trunk.velocity + pitch_rate * perpendicular(hip)
-    toe_force, toe_theta, toe_beta = meet_point(
+    toe_force, toe_theta, toe_beta = contact_point(
         trunk, leg, leg.toe, leg.state.toe, leg.functions.toe, leg.slopes.toe, place, velocity, model
     )
     if model.form.feet == 2:
-        force, theta, beta = meet_point(
+        force, theta, beta = contact_point(
             trunk, leg, leg.heel, leg.state.heel, leg.functions.heel, leg.slopes.heel, place, velocity, model
         )
         leg.ground_force = toe_force + force
@@ -79,7 +78,7 @@ def meet_ground(trunk: TrunkRows, leg: LegRows, model: Model) -> None:
         leg.ground_moment_beta = toe_beta
 
 
-def meet_point(
+def contact_point(
     trunk: TrunkRows,
     leg: LegRows,
     point: Contact,
@@ -115,9 +114,9 @@ def meet_point(
     point.slide = sliding_speed
 
     if model.form.springs:
-        press_through_spring(trunk, leg, point, memory, model)
+        spring_contact(trunk, leg, point, memory, model)
     else:
-        press_rigidly(trunk, point, memory, penetration, rate, sliding_speed, model)
+        rigid_contact(trunk, point, memory, penetration, rate, sliding_speed, model)
     force = force_of(point) if model.is_terrain else vector(point.friction, point.normal)
     return force, dot(force, by_theta), cross(arm, force)
 
@@ -127,7 +126,7 @@ def force_of(point: Contact) -> Plane:
     return point.normal * point.ground_normal - point.friction * perpendicular(point.ground_normal)
 
 
-def press_rigidly(
+def rigid_contact(
     trunk: TrunkRows,
     point: Contact,
     memory: ContactMemory,
@@ -137,7 +136,7 @@ def press_rigidly(
     model: Model,
 ) -> None:
     """Compute the forces on a point of a rigid hoof, which is the sole itself."""
-    nothing = 0.0 * absolute(penetration)  # 0, but NaN where the penetration is NaN
+    zero = 0.0 * absolute(penetration)  # 0, but NaN where the penetration is NaN
     inverse_speed = memory.inverse_approach_speed
     inside = penetration > 0.0
 
@@ -150,32 +149,30 @@ def press_rigidly(
         )
         grip = laws.friction * point.friction_scale * part * pushed  # Eq. 15
         return (
-            where(inside, pushed, nothing),
-            where(inside, stored, nothing),
-            where(inside, where(sliding_speed > 0.0, -grip, grip), nothing),
+            where(inside, pushed, zero),
+            where(inside, stored, zero),
+            where(inside, where(sliding_speed > 0.0, -grip, grip), zero),
             latched,
         )
 
     # branches on all lanes together, to save time in the air; `where` chooses in each lane
-    force, spring, friction, inverse_speed = cond(
-        any_lane(inside), meets, (nothing, nothing, nothing, inverse_speed)
-    )
+    force, spring, friction, inverse_speed = cond(any_lane(inside), meets, (zero, zero, zero, inverse_speed))
     point.spring_force = spring
     point.inverse_approach_speed = inverse_speed
     point.normal = force
     point.friction = friction
 
 
-def press_through_spring(
+def spring_contact(
     trunk: TrunkRows, leg: LegRows, point: Contact, memory: ContactMemory, model: Model
 ) -> None:
     """Compute the forces on a point of a compliant hoof. Its sole has no mass: spring and damper carry the
     force of the ground.
 
     The leg's point is `depth` in the ground, the sole s less. With b = chi S / v0 + c of the ground, S + b
-    (depth' - s') = k s + d s' gives s'. Where that asks the ground to pull, the spring returns freely. Along
+    (depth' - s') = k s + d s' gives s'. Where the ground would have to pull, the spring returns freely. Along
     the ground u is the displacement of the leg ahead of the sole: k u + d u' is friction, and u' is the leg's
-    speed while the sole stands.
+    speed while the sole sticks.
     """
     laws = trunk.settings
     stiffness = leg.settings.hoof_stiffness
@@ -186,8 +183,8 @@ def press_through_spring(
     depth_rate = point.penetration_rate
     elastic = rounded(stiffness[0] * deflection)
     penetration = point.penetration - deflection
-    free_return_rate = rounded(-elastic * leg.inverse_damping[0])  # of a spring that nothing presses
-    nothing = 0.0 * absolute(penetration)
+    free_return_rate = rounded(-elastic * leg.inverse_damping[0])  # of an unloaded spring
+    zero = 0.0 * absolute(penetration)
     inverse_speed = memory.inverse_approach_speed
     inside = penetration > 0.0
 
@@ -195,16 +192,16 @@ def press_through_spring(
         approach = depth_rate - free_return_rate
         latched = latch(trunk, memory, inside, inverse_speed, penetration, approach, model)
         pushed = ground_spring(laws, point.stiffness_scale, maximum(penetration, 0.0), model.eighths)
-        spring = where(inside, pushed, nothing)
-        return spring, where(inside, laws.chi * spring * latched + laws.dashpot, nothing), latched
+        spring = where(inside, pushed, zero)
+        return spring, where(inside, laws.chi * spring * latched + laws.dashpot, zero), latched
 
-    spring, resistance, inverse_speed = cond(any_lane(inside), meets, (nothing, nothing, inverse_speed))
+    spring, resistance, inverse_speed = cond(any_lane(inside), meets, (zero, zero, inverse_speed))
     # the balance of the docstring, with Eq. 14 for the ground, solved for s'
     rate = (spring + resistance * depth_rate - elastic) / (damping[0] + resistance)
     pushes = inside & (rate > free_return_rate)
     rate = maximum(rate, free_return_rate)
-    force = where(pushes, maximum(elastic + damping[0] * rate, 0.0), nothing)
-    # Coulomb's law instead of Eq. 15: the sole slides only where it would need more than the grip to stand
+    force = where(pushes, maximum(elastic + damping[0] * rate, 0.0), zero)
+    # Coulomb's law instead of Eq. 15: the sole slides only where sticking would need more than the grip
     sticking = stiffness[1] * along + damping[1] * speed
     grip = laws.friction * point.friction_scale * force
     held = clip(sticking, grip)
@@ -229,7 +226,7 @@ def latch(
     rate: Lanes,
     model: Model,
 ) -> Lanes:
-    """Return 1 / v0 [s/m] of points that are in the ground, kept from when they entered it."""
+    """Return 1 / v0 [s/m] of points in the ground, latched at their touch-down."""
 
     def entered() -> Lanes:
         entering = inverse_entry_speed(trunk, memory, penetration, rate, model)
@@ -249,7 +246,7 @@ def inverse_entry_speed(
     floor = trunk.settings.approach_floor
     span = full_like(memory, 1.0)
     entry = rate
-    if model.interpolated:
+    if model.is_interpolated:
         crossed = before < 0.0
         span = where(crossed, penetration - before, span)
         entry = where(crossed, rate_before * span - before * (rate - rate_before), rate)

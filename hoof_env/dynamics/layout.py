@@ -1,10 +1,10 @@
-"""Names of all rows of memory: those of trunk and legs on the kernels' stack and in the engine's array.
+"""Names of all rows of memory, of trunk and legs on the kernels' stack and in the engine's array.
 
 SI units and radians. beta = pitch + side phi is the world angle of a leg's frame. 'All' means trunk and legs
 together; a 'fixed' frame does not swing while the crank turns.
 
-Blocks that only some engines have (`Features`) are of size 0 in the others. They do not change the memory,
-the speed and the bits of these.
+Blocks that only some engines have (`Features`) are of size 0 in all other engines, whose memory, speed and
+bits they do not change.
 """
 
 from __future__ import annotations
@@ -21,13 +21,13 @@ MAX_STATE = 1e9
 """Largest angle [rad] and place [m] of a state, where rounding is 6e-7 (6e-10 at 1e6); also the largest rate
 of a start, because its square must stay finite."""
 
-# sizes of the blocks that depend on `Features`, with those of `PLAIN` as defaults
+# sizes of the blocks that depend on `Features`, with the sizes for `PLAIN` as defaults
 GAIT = Size("gait", 4)
 SPRING = Size("spring", 0)
 LIMITED = Size("limited", 0)
 LIMITS = Size("limits", 0)
 
-# and with those of the paper's structure
+# and with the sizes for the paper's structure
 JOINT_ROWS = Size("joint_rows", 2 * len(PAPER_STRUCTURE.mechanism.joints))
 WELDS = Size("welds", len(PAPER_STRUCTURE.mechanism.welds))
 
@@ -37,17 +37,17 @@ class Features(NamedTuple):
     off costs neither time nor memory.
 
     Attributes:
-        harmonics: order of the swing law, 1 to `gait.MOST_HARMONICS`.
-        springs: true for springs in series with the ground at each hoof point, see `parts.HoofSpring`.
+        harmonics: order of the swing law, 1 to `gait.MAX_HARMONICS`.
+        has_springs: true for springs in series with the ground at each hoof point, see `parts.HoofSpring`.
         has_limits: true for limits of the motion, legs of other sizes in some environments, and horizontal
             impulses.
-        structure: of the legs, where kernels find their joints: for limits and joint reactions. Without
-            these it is that of the paper, so that all legs share kernels.
+        structure: structure of the legs, from which kernels find joints for limits and joint reactions;
+            without these features it is the paper's, so that all legs share kernels.
         feet: number of points of a hoof, 1 or 2.
     """
 
     harmonics: int = 1
-    springs: bool = False
+    has_springs: bool = False
     has_limits: bool = False
     structure: Structure = PAPER_STRUCTURE
     feet: int = 2
@@ -62,7 +62,7 @@ class Features(NamedTuple):
         # springs: normal and tangential; limits: lowest and highest pitch and height, and the clearance
         sized: type[AnyLayout] = layout.sized(
             gait=self.gait_size,
-            spring=2 * self.springs,
+            spring=2 * self.has_springs,
             limited=int(self.has_limits),
             limits=5 * self.has_limits,
         )
@@ -70,7 +70,7 @@ class Features(NamedTuple):
 
 
 PLAIN = Features()
-"""Features of the paper's leg: none."""
+"""The paper's leg, without features."""
 
 
 # The trunk
@@ -83,7 +83,7 @@ class Moving(Layout):
     centre: Vector  # centre of mass of all [m]
     momentum: Vector  # of all [kg m/s]
     pitch: Row  # of the trunk [rad]
-    spin: Row  # angular momentum of all about `centre` [kg m^2/s]
+    angular_momentum: Row  # of all bodies about `centre` [kg m^2/s]
 
 
 class Rates(Layout):
@@ -180,7 +180,7 @@ class TrunkReport(Layout):
 
 
 class TrunkMemory(Layout):
-    """A trunk in the engine's array. What infos measure stands together, see `episodes.infos`."""
+    """A trunk in the engine's array. The quantities in infos are contiguous, see `episodes.infos`."""
 
     settings: TrunkSettings
     account: Account
@@ -238,12 +238,12 @@ class Quantity(NamedTuple):
 
 
 class StrideSums(Layout):
-    """Quantities of one call of the engine, which a control step is: the table of all that is measured of it.
+    """Quantities of one call of the engine, which a control step is: the table of its measurements.
 
     A new quantity takes a row here, the line that computes it in `observables.count_stride`, and one in
     `PaperEngine._sum`. It is then in `step.sums` of the reward's terms, in `episode.sums`, in infos and in
-    the manual. Each field has one row or, in engines without it, none, and is NaN; a sum or a peak begins at
-    0.
+    the manual. Each field has one row or, in engines without it, no row and the value NaN; a sum or a peak
+    starts at 0.
     """
 
     peak_grf_increase: Annotated[Row, Quantity("N", "increase of the stances' peaks in the control step")]
@@ -417,7 +417,7 @@ def reactions_layout(structure: Structure) -> type[Reactions]:
 
 # Names in records, states and infos
 
-TRUNK_STATE = ("time", "centre_x", "centre_y", "momentum_x", "momentum_y", "pitch", "spin")
+TRUNK_STATE = ("time", "centre_x", "centre_y", "momentum_x", "momentum_y", "pitch", "angular_momentum")
 TRUNK_REPORT = ("x", "y", "vx", "vy", "ax", "ay", "pitch_rate", "pitch_acceleration")
 LEG_REPORT = LegReport.names
 STRIDES = Strides.names
@@ -430,7 +430,7 @@ def leg_state(features: Features = PLAIN) -> tuple[str, ...]:
         "penetration",
         "penetration_rate",
         "inverse_approach_speed",
-        *("deflection_normal", "deflection_tangential")[: 2 * features.springs],
+        *("deflection_normal", "deflection_tangential")[: 2 * features.has_springs],
     )
     points = (f"{point}_{name}" for point in ("toe", "heel") for name in contact)
     return ("crank_angle", "crank_angle_rate", *gait, *(f"{name}_rate" for name in gait), *points)
@@ -448,7 +448,7 @@ def stride_peaks(features: Features = PLAIN) -> tuple[bool, ...]:
 
 def account(features: Features = PLAIN) -> tuple[str, ...]:
     """Return the names of the rows of an `Account`."""
-    return (*Account.names, *("hoof_stored", "hoof_loss")[: 2 * features.springs])
+    return (*Account.names, *("hoof_stored", "hoof_loss")[: 2 * features.has_springs])
 
 
 LEG_STATE = leg_state()
@@ -511,5 +511,5 @@ def engine_layout(features: Features = PLAIN) -> EngineLayout:
         harmonics=features.harmonics,
         has_limits=features.has_limits,
         feet=features.feet,
-        springs=2 * features.springs,
+        springs=2 * features.has_springs,
     )

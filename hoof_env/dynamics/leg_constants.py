@@ -17,7 +17,7 @@ from hoof_env.leg.profile import places
 from hoof_env.simd.layout import Layout, Row, Vector, new_layout
 
 BETWEEN_ANGLES = 1.05
-"""A point comes at most so much farther out between the angles that are looked at."""
+"""Bound on how much farther out a point is between the sampled angles [-]."""
 
 
 class Structure(NamedTuple):
@@ -45,7 +45,7 @@ class Meeting(Layout):
     """Two lengths that meet in a point, over a distance that varies."""
 
     one2: Row  # square of the length from the first point [m^2]
-    excess: Row  # how much it is over that of the other [m^2]
+    excess: Row  # excess over the square of the other length [m^2]
     side: Row  # on which side of the line from the first point to the second they meet, 1 or -1
 
 
@@ -60,11 +60,11 @@ class Rod(Layout):
     """Mass of a body, centred between its ends, as it acts on them [kg]."""
 
     near: Row  # on the end itself
-    far: Row  # on the other one
+    far: Row  # on the other end
 
 
 class Solid(Layout):
-    """The same of a body whose centre of mass is anywhere [kg]."""
+    """The same for a body whose centre of mass is anywhere [kg]."""
 
     tail: Row  # on the tail itself
     head: Row
@@ -72,7 +72,7 @@ class Solid(Layout):
 
 
 class LegConstants(Layout):
-    """Constants that legs of all structures have; `constants_layout` adds those of one."""
+    """Constants common to all structures; `constants_layout` adds the constants of one."""
 
     crank: Row  # length [m]
     travel: Row  # 1 or -1

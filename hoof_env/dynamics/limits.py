@@ -1,8 +1,8 @@
 """Limits at which a motion ends: pitch and height of the trunk, joints near the ground.
 
-What is checked after every `CHECK_EVERY` whole steps, and after the last, is kept until the call of the
-engine ends, so that a joint that dips between two calls is not missed. Beyond a limit the motion goes
-on, and its state is as good as any other.
+Limits are checked after every `CHECK_EVERY` whole steps and after the last, and a violation is stored until
+the engine's call ends, so that a joint that dips between two calls is not missed. Beyond a limit the motion
+goes on, and its state is as good as any other.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ from hoof_env.simd import (
 )
 
 CHECK_EVERY = 5
-"""Whole steps from one look to the next: to find all joints takes square roots and quotients."""
+"""Whole steps from one check to the next: finding all joints takes square roots and quotients."""
 
 ROUNDING = 1e-6  # [m], more than G's places differ by rounding
 
@@ -38,7 +38,7 @@ PITCH, HEIGHT, LOW_JOINT = float(Result.PITCH), float(Result.HEIGHT), float(Resu
 
 
 def has_moved(result: Lanes) -> Mask:
-    """Return where the motion that a call asked for happened, within the limits or beyond one."""
+    """Return where the motion of a call was simulated, within the limits or beyond one."""
     return (result == 0.0) | (result >= PITCH)
 
 
@@ -48,7 +48,7 @@ def clear_limits(trunk: TrunkRows) -> None:
 
 
 def record_violation(trunk: TrunkRows, is_beyond: Truth, result: float) -> None:
-    """Keep the first of the limits that were passed."""
+    """Store the first limit that was passed."""
     before = trunk.violated_limit[0]
     trunk.violated_limit[0] = where((before == 0.0) & is_beyond, result, before)
 
@@ -90,7 +90,7 @@ def least_height(trunk: TrunkRows, leg: LegRows, reach: Lanes) -> Lanes:
 
 
 def lower_bound(mechanism: Mechanism, trunk: TrunkRows, leg: LegRows, shape: LegConstants) -> Lanes:
-    """Return a height below which no joint is: their places need not be found for it [m]."""
+    """Return a lower bound on the height of all joints [m], which does not need their positions."""
     low = least_height(trunk, leg, shape.reach)
     for name in mechanism.sole:
         low = minimum(low, height_of_sole(trunk, leg, getattr(shape, f"sole_{name}")))

@@ -20,7 +20,7 @@ from __future__ import annotations
 
 from typing import TypeVar
 
-from hoof_env.dynamics.hoof import meet_ground
+from hoof_env.dynamics.hoof import ground_forces
 from hoof_env.dynamics.layout import MAX_STATE, LegRows, Moving, TrunkRows
 from hoof_env.dynamics.model import Model
 from hoof_env.dynamics.parts import FIXED, FREE, RAIL, SUSPENDED
@@ -54,7 +54,7 @@ Sum = TypeVar("Sum", Lanes, Plane)
 
 def add(total: Sum, x: Sum, lanes_are_legs: bool) -> Sum:
     """Return total + x, lane by lane; where the lanes are the legs of one trunk, return total plus the x of
-    all lanes, one after the other as in a loop over legs."""
+    all lanes, in the order of a loop over legs."""
     if lanes_are_legs:
         summed: Sum = lane_sum(total, x)
         return summed
@@ -78,14 +78,14 @@ def evaluate(trunk: TrunkRows, legs: LegRows, leg_count: Whole, model: Model, el
         move_trunk(trunk, model.kind)
     for i in loop(leg_count):
         leg = block_at(legs, i)
-        meet_ground(trunk, leg, model)
-        set_up_crank(trunk, leg, model.motors, elapsed)
+        ground_forces(trunk, leg, model)
+        set_up_crank(trunk, leg, model.has_motors, elapsed)
         if model.kind != FIXED:
-            load_trunk(trunk, leg, model.kind, model.motors, model.lanes_are_legs)
+            load_trunk(trunk, leg, model.kind, model.has_motors, model.lanes_are_legs)
     if model.kind != FIXED:
         accelerate_trunk(trunk, model.kind)
     for i in loop(leg_count):
-        accelerate_crank(trunk, block_at(legs, i), model.motors)
+        accelerate_crank(trunk, block_at(legs, i), model.has_motors)
 
 
 def find_crank(leg: LegRows, model: Model) -> None:
@@ -107,7 +107,7 @@ def look_up_functions(trunk: TrunkRows, leg: LegRows, model: Model) -> None:
 
 
 def scale_functions(value: Functions, slope: Slopes, length: Lanes, mass: Lanes) -> None:
-    """Scale the functions to those of a similar leg, `length` times as large with `mass` times the mass."""
+    """Scale the functions to a similar leg, `length` times as large with `mass` times the mass."""
     moment = mass * length
     inertia = mass * length * length
     value.toe = length * value.toe
@@ -194,7 +194,7 @@ def gait_parameter_at(leg: LegRows, k: int, elapsed: Number) -> tuple[Lanes, Lan
 
 
 def keep_still(trunk: TrunkRows) -> None:
-    """Set the trunk's constant quantities (those of a fixed trunk, or of one that does not pitch)."""
+    """Set the constant quantities of a trunk that is fixed or does not pitch."""
     for k in range(MOVING):
         trunk.stage[k] = trunk.state.moving[k]
         trunk.rates[k] = 0.0
@@ -221,7 +221,8 @@ def clear_trunk(trunk: TrunkRows, kind: int) -> None:
 
 
 def gather_leg(trunk: TrunkRows, leg: LegRows, kind: int, lanes_are_legs: bool) -> None:
-    """Add a leg to first moment, momentum, inertia and spin about the trunk's centre of mass (E6)."""
+    """Add a leg to first moment, momentum, inertia and angular momentum about the trunk's centre of mass
+    (E6)."""
     s = leg.first_moment
     w = leg.theta_rate
     sway = leg.swing_rate
@@ -245,7 +246,7 @@ def gather_leg(trunk: TrunkRows, leg: LegRows, kind: int, lanes_are_legs: bool) 
 
 def gather_legs(trunk: TrunkRows, legs: LegRows, leg_count: Whole, model: Model) -> None:
     """Compute the legs' functions and frames at the present state, and their sums about the trunk's centre of
-    mass (E6): what the momentum of all bodies needs, without forces."""
+    mass (E6), without forces: the parts of the momentum of all bodies."""
     clear_trunk(trunk, model.kind)
     for i in loop(leg_count):
         leg = block_at(legs, i)
@@ -256,8 +257,8 @@ def gather_legs(trunk: TrunkRows, legs: LegRows, leg_count: Whole, model: Model)
 
 
 def move_trunk(trunk: TrunkRows, kind: int) -> None:
-    """Compute place and velocity of the trunk from centre of mass and momentum of all (E7), on a rail along x
-    only, and the forces on it other than its legs'."""
+    """Compute place and velocity of the trunk from centre of mass and momentum of all bodies (E7), on a rail
+    along x only, and the forces on it except the legs'."""
     centre = trunk.stage.centre
     moment = trunk.first_moment
     momentum = trunk.stage.momentum
@@ -270,7 +271,9 @@ def move_trunk(trunk: TrunkRows, kind: int) -> None:
         place = vector(place.real, centre.imag)
         velocity = vector(velocity.real, 0.0)
     if kind == FREE:
-        spin = trunk.stage.spin - trunk.relative_angular_momentum + cross(moment, drift) * per_mass
+        spin = (
+            trunk.stage.angular_momentum - trunk.relative_angular_momentum + cross(moment, drift) * per_mass
+        )
         rate = spin / (trunk.composite_inertia - dot(moment, moment) * per_mass)  # psi_t of (E7)
         velocity = velocity - rate * per_mass * perpendicular(moment)
     trunk.place = place
@@ -442,14 +445,15 @@ def accelerate_crank(trunk: TrunkRows, leg: LegRows, motors: bool) -> None:
 def velocities_to_momenta(
     trunk: TrunkRows, legs: LegRows, leg_count: Whole, model: Model, starts: Truth
 ) -> None:
-    """Compute centre of mass, momentum and spin of all bodies at a start, as `move_trunk` inverts it (E7).
+    """Compute centre of mass, momentum and angular momentum of all bodies at a start, as `move_trunk` inverts
+    it (E7).
 
-    Their rows hold the trunk's place, velocity and pitch rate before, and keep them in lanes not in `starts`.
+    Before, their rows hold the trunk's place, velocity and pitch rate; lanes not in `starts` do not change.
     """
     gather_legs(trunk, legs, leg_count, model)
     place = trunk.state.moving.centre
     velocity = trunk.state.moving.momentum
-    rate = trunk.state.moving.spin
+    rate = trunk.state.moving.angular_momentum
     moment = trunk.first_moment
     drift = trunk.relative_momentum
     per_mass = trunk.settings.inverse_mass
@@ -465,4 +469,4 @@ def velocities_to_momenta(
         spin = rate * about + trunk.relative_angular_momentum - cross(moment, drift) * per_mass
     trunk.state.moving.centre = where(starts, centre, place)
     trunk.state.moving.momentum = where(starts, momentum, velocity)
-    trunk.state.moving.spin = where(starts, spin, rate)
+    trunk.state.moving.angular_momentum = where(starts, spin, rate)

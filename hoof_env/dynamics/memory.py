@@ -52,12 +52,12 @@ for ever and push under it."""
 
 
 NOWHERE = 1e30
-"""Finite bound that nothing reaches, used for an infinite one."""
+"""Finite number in place of an infinite bound."""
 
 
 class Memory(NamedTuple):
-    """An engine's memory as the kernels take it, and views of its parts; the last axis is the environment.
-    Shapes are those without `Features`."""
+    """An engine's memory in the form of the kernels' arguments, and views of its parts; the last axis is the
+    environment. Shapes are for an engine without `Features`."""
 
     data: Floats  # all of it, (rows, columns): whole vectors of environments, so some columns may be idle
     trunk: Floats  # the state, (7, n)
@@ -70,8 +70,8 @@ class Memory(NamedTuple):
     account: Floats  # (9, n), added up over calls
     trunk_report: Floats  # at the end of the last call, (8, n)
     limb_report: Floats  # (legs, 18, n)
-    result: Floats  # values of `parts.Result`, (n,); where it is not OK the state is left as it was
-    constants: Floats  # `leg_constants.constants_layout`, (legs, size); 0 where nothing needs them
+    result: Floats  # values of `parts.Result`, (n,); where not OK the state is unchanged
+    constants: Floats  # `leg_constants.constants_layout`, (legs, size); 0 if unused
     reactions: Floats  # `reactions.Reactions`, (legs, size, columns)
     features: Features
 
@@ -122,7 +122,7 @@ def named_rows(memory: Memory) -> dict[str, Floats]:
 def columns_for(num_envs: int) -> int:
     """Return the number of columns for some environments: whole groups of lanes."""
     columns = -(-num_envs // LANES) * LANES
-    # one group more where all rows would begin in the same few sets of the cache
+    # one more group where all rows would start in the same few sets of the cache
     return columns + LANES if columns % 128 == 0 else columns
 
 
@@ -171,11 +171,11 @@ def new_model(
     record["kind"] = TRUNKS.index(scene.trunk.kind)
     record["eighths"] = round(ground.exponent * EXPONENT_UNIT)
     record["friction_law"] = FRICTION_LAWS.index(ground.friction_law)
-    record["interpolated"] = ground.approach == "interpolated"
+    record["is_interpolated"] = ground.approach == "interpolated"
     record["is_terrain"] = terrain != Terrain.flat()
-    record["new_rates"] = scheme.new_rates
-    record["strides"] = strides
-    record["motors"] = any(isinstance(limb.drive, Motor) for limb in scene.limbs)
+    record["uses_new_rates"] = scheme.uses_new_rates
+    record["counts_strides"] = strides
+    record["has_motors"] = any(isinstance(limb.drive, Motor) for limb in scene.limbs)
     record["averages"] = scheme.averages
     record["stages"] = len(scheme.weights)
     record["fractions"][: len(scheme.fractions)] = scheme.fractions
@@ -200,7 +200,7 @@ def check_shared(scene: Mechanics, trunk: Trunk, ground: Ground, limbs: Sequence
             )
     if len(limbs) != len(scene.limbs):
         raise ParameterError(f"limbs: expected {len(scene.limbs)}, got {len(limbs)}")
-    check_limbs(trunk, limbs, scene.features.springs)
+    check_limbs(trunk, limbs, scene.features.has_springs)
     for k, (limb, own_limb) in enumerate(zip(limbs, scene.limbs, strict=True)):
         if type(limb.drive) is not type(own_limb.drive):
             raise ParameterError(f"drive: expected a {type(own_limb.drive).__name__}, got {limb.drive!r}")
@@ -232,8 +232,7 @@ def features_of(limbs: Sequence[Limb], harmonics: int, has_limits: bool, reacts:
 
 
 def check_limbs(trunk: Trunk, limbs: Sequence[Limb], springs: bool) -> None:
-    """Raise `ParameterError` if a hip is beyond the trunk, or some hooves have springs and others have
-    not."""
+    """Raise `ParameterError` if a hip is beyond the trunk, or only some hooves have springs."""
     for k, limb in enumerate(limbs):
         if trunk.length is not None and abs(limb.hip[0]) > trunk.length / 2:
             raise ParameterError(
@@ -248,7 +247,7 @@ def check_limbs(trunk: Trunk, limbs: Sequence[Limb], springs: bool) -> None:
 
 
 def scales_of(name: str, limb: Limb, own: Limb) -> tuple[float, float]:
-    """Return length and mass of a leg over those of the engine's, to which it must be similar."""
+    """Return length and mass of a leg relative to the engine's leg, to which it must be similar."""
     if limb.geometry == own.geometry:
         return 1.0, 1.0
     shape = limb.geometry.to_dict()
@@ -379,7 +378,7 @@ def only(
                 array[..., rest] = values
 
 
-def which(envs: ArrayLike | None, num_envs: int) -> NDArray[np.int64]:
+def env_indices(envs: ArrayLike | None, num_envs: int) -> NDArray[np.int64]:
     """Return the indices of environments out of `num_envs`, from indices, a mask, or None for all."""
     if envs is None:
         return np.arange(num_envs)
@@ -396,13 +395,13 @@ def which(envs: ArrayLike | None, num_envs: int) -> NDArray[np.int64]:
     )
 
 
-def each_once(envs: ArrayLike | None, num_envs: int) -> NDArray[np.int64]:
-    """Return indices as `which` does, of environments that are named once.
+def unique_env_indices(envs: ArrayLike | None, num_envs: int) -> NDArray[np.int64]:
+    """Return indices like `env_indices`, each at most once.
 
     Raises:
-        ParameterError: other environments, or one twice: NumPy would add the last of its two values alone.
+        ParameterError: not environments, or one twice: NumPy would add only the last of its values.
     """
-    where = which(envs, num_envs)
+    where = env_indices(envs, num_envs)
     if np.unique(where).size < where.size:
         raise ParameterError(f"envs: expected each environment once, got {envs!r}")
     return where
@@ -431,11 +430,11 @@ def start(
     heights: Floats,
 ) -> tuple[Floats, Floats]:
     """Return the state of n environments with filters at rest and unloaded springs: of the trunk, shape (7,
-    n), and of the legs, (legs, rows of a `LegState`, n). `heights` are those of the trunks at rest.
+    n), and of the legs, (legs, rows of a `LegState`, n). `heights` are the trunks' heights at rest.
 
-    The rows for centre of mass, momentum and spin of all hold the trunk's place, velocity and pitch rate,
-    from which the kernels compute the former (`mechanics.velocities_to_momenta`). `TrunkEngine.reset` says
-    what `trunk` holds and what is refused.
+    The rows for centre of mass, momentum and angular momentum of all bodies hold the trunk's place, velocity
+    and pitch rate, from which the kernels compute the former (`mechanics.velocities_to_momenta`). See
+    `TrunkEngine.reset` for the entries of `trunk` and for errors.
     """
     legs = len(scene.limbs)
     n = len(heights)
@@ -473,7 +472,7 @@ def start(
     moving[Moving.rows("centre")] = (at["x"], at["y"])
     moving[Moving.rows("momentum")] = (at["vx"], at["vy"])
     moving[Moving.rows("pitch")] = at["pitch"]
-    moving[Moving.rows("spin")] = at["pitch_rate"]
+    moving[Moving.rows("angular_momentum")] = at["pitch_rate"]
     rows = scene.features.of(LegState)
     leg = np.zeros((legs, rows.size, n))
     leg[:, rows.rows("crank_angle")] = angle[:, None]

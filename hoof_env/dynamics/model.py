@@ -1,4 +1,4 @@
-"""Constant settings of an engine: the record that its kernels take, and what they make of it."""
+"""Constant settings of an engine: the record that its kernels take, and its form inside them."""
 
 from __future__ import annotations
 
@@ -18,11 +18,11 @@ MODEL = np.dtype(
         ("kind", "i8"),  # of the trunk, position in `parts.TRUNKS`
         ("eighths", "i8"),  # contact exponent times 8
         ("friction_law", "i8"),  # position in `laws.FRICTION_LAWS`
-        ("interpolated", "?"),  # the approach speed, see `Ground`
+        ("is_interpolated", "?"),  # the approach speed, see `Ground`
         ("is_terrain", "?"),  # false if level and the same everywhere
-        ("new_rates", "?"),  # as are averages, stages, fractions and weights: of the `Scheme`
-        ("strides", "?"),  # true if stances are counted
-        ("motors", "?"),  # true if any crank has a motor
+        ("uses_new_rates", "?"),  # as are averages, stages, fractions and weights: of the `Scheme`
+        ("counts_strides", "?"),  # true if stances are counted
+        ("has_motors", "?"),  # true if any crank has a motor
         ("averages", "?"),
         ("stages", "i8"),
         ("fractions", "f8", (4,)),
@@ -37,14 +37,14 @@ MODEL = np.dtype(
 
 
 STATIC = (
-    "legs", "kind", "eighths", "friction_law", "interpolated", "is_terrain", "new_rates", "strides", "motors",
-    "averages", "stages", "fractions", "weights",
+    "legs", "kind", "eighths", "friction_law", "is_interpolated", "is_terrain", "uses_new_rates",
+    "counts_strides", "has_motors", "averages", "stages", "fractions", "weights",
 )  # fmt: skip
 """Fields of `MODEL` that are known when a kernel is traced."""
 
 
 def static_of(model: Any) -> tuple[tuple[str, Any], ...]:
-    """Return the fields of a model that its kernels are made for, with their values."""
+    """Return the fields `STATIC` of a model with their values."""
     return tuple((name, _plain(model[0][name])) for name in STATIC)
 
 
@@ -53,16 +53,17 @@ def _plain(value: Any) -> Any:
 
 
 class Model(NamedTuple):
-    """Constant settings inside the kernels: the fields of `MODEL`, and what does not fit into a record."""
+    """Constant settings inside the kernels: the fields of `MODEL`, and settings that do not fit into a
+    record."""
 
     kind: int
     eighths: int
     friction_law: int
-    interpolated: bool
+    is_interpolated: bool
     is_terrain: bool
-    new_rates: bool
-    strides: bool
-    motors: bool
+    uses_new_rates: bool
+    counts_strides: bool
+    has_motors: bool
     lanes_are_legs: bool  # the lanes are the legs of one trunk
     form: EngineLayout
     cells: Lanes | float  # of a leg's table
@@ -93,11 +94,11 @@ def unpack_model(
         kind=record.kind,
         eighths=record.eighths,
         friction_law=record.friction_law,
-        interpolated=record.interpolated,
+        is_interpolated=record.is_interpolated,
         is_terrain=record.is_terrain,
-        new_rates=record.new_rates,
-        strides=record.strides,
-        motors=record.motors,
+        uses_new_rates=record.uses_new_rates,
+        counts_strides=record.counts_strides,
+        has_motors=record.has_motors,
         lanes_are_legs=lanes_are_legs,
         form=form,
         cells=record.cells,

@@ -1,5 +1,5 @@
 """Measured quantities of the motion: drive torques and powers, energy account, stances; see `mechanics`. At
-the end the rule of a stance for other solvers.
+the end the rule of a stance for solvers without kernels.
 
 A stance opens when the normal force on the hoof rises above a threshold, as on a force plate. It closes when
 the force falls below it (lift-off), or after one crank revolution, whichever comes first, so that a hoof that

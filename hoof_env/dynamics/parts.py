@@ -1,7 +1,7 @@
 """Parts of an engine: a trunk, legs in their places on it, and the drives of their cranks; results of a run.
 
-A prescribed drive is the paper's: the crank angle is a function of time and of the commands, whatever torque
-that takes. A motor is a speed servo with a torque limit, a rotor and a gear, so that a ground force slows the
+A prescribed drive is the paper's: the crank angle is a function of time and of the commands, with any
+torque. A motor is a speed servo with a torque limit, a rotor and a gear, so that a ground force slows the
 crank. In both the swing is a function of the crank angle and of the gait parameters.
 """
 
@@ -36,7 +36,7 @@ class Trunk:
     """Trunk over one leg, or over several; with one leg, O, the crank centre, is its point by default.
 
     "fixed": O stays in place. "rail": O slides along x at fixed height. "suspended": O moves along x and y;
-    the leg must bear `share` of the weight of trunk and leg, the rest of the animal carries the other part
+    the leg must bear `share` of the weight of trunk and leg, the rest of the animal carries the remainder
     and adds a vertical spring and damper towards `height`. These three do not pitch. "free": the trunk moves
     along x and y and pitches, under its weight, its drag and its legs.
 
@@ -48,7 +48,7 @@ class Trunk:
         drag: resistance to forward motion [N s/m].
         height: height of O above the ground [m] where the spring is at rest, of the rail, or at a start.
         pitch_inertia: moment of inertia of the trunk about its centre of mass [kg m^2]; "free" only.
-        length: length of the trunk [m]; no hip may be beyond its ends. None is unlimited.
+        length: length of the trunk [m]; no hip may be beyond its ends. None for an unlimited one.
 
     Raises:
         ParameterError: an unknown kind or a value out of range.
@@ -82,10 +82,10 @@ class Prescribed:
     """Drive of a crank that follows the filtered command exactly (the paper's driver, row 42 of Eq. 2)."""
 
 
-MOST_IMPULSE = 1e6
+MAX_IMPULSE = 1e6
 """Largest impulse of a push [N s]."""
 
-LARGEST = 1e9
+MAX_COEFFICIENT = 1e9
 """Largest motor parameter; its square must stay finite."""
 
 
@@ -103,7 +103,7 @@ class Motor:
         gear_ratio: turns of the rotor for one of the crank [-].
 
     Raises:
-        ParameterError: a value is not finite, negative or beyond `LARGEST`.
+        ParameterError: a value is not finite, negative or beyond `MAX_COEFFICIENT`.
     """
 
     speed_gain: float = 100.0
@@ -113,7 +113,7 @@ class Motor:
 
     def __post_init__(self) -> None:
         for name in ("speed_gain", "torque_limit", "rotor_inertia", "gear_ratio"):
-            check_number(f"motor.{name}", getattr(self, name), low=0, high=LARGEST)
+            check_number(f"motor.{name}", getattr(self, name), low=0, high=MAX_COEFFICIENT)
 
     @property
     def reflected_inertia(self) -> float:
@@ -130,13 +130,13 @@ class HoofSpring:
 
     Its axes are the normal and the tangent of the ground under the point. The sole, which touches the ground,
     has no mass. Along the normal, spring and damper carry the force of Eq. 14 at the sole's penetration.
-    Along the tangent they carry at most Coulomb's friction coefficient times that; up to there the sole
-    stands still, because friction needs no sliding speed. The thresholds of the ground's friction law are not
+    Along the tangent they carry at most Coulomb's friction coefficient times that force; below it the sole
+    sticks, because friction needs no sliding speed. The thresholds of the ground's friction law are not
     used.
 
     Attributes:
         stiffness, damping: along the normal [N/m, N s/m].
-        tangential_stiffness, tangential_damping: along the tangent; None is the value along the normal.
+        tangential_stiffness, tangential_damping: along the tangent; None for the value along the normal.
 
     Raises:
         ParameterError: a value is not positive and finite: without damping the speed of a massless sole is
@@ -169,7 +169,7 @@ class HoofSpring:
 
 @dataclass(frozen=True)
 class Limits:
-    """Limits of a motion, see `Result`; infinite bounds limit nothing.
+    """Limits of a motion, see `Result`; an infinite bound is no limit.
 
     Attributes:
         pitch: lowest and highest pitch [rad].
@@ -177,7 +177,7 @@ class Limits:
         clearance: least height above the ground of all joints except the hoof's corners [m].
 
     Raises:
-        ParameterError: a bound is not a number, or the lower one is not the lower one.
+        ParameterError: a bound is not a number, or a lower bound is not below the upper one.
     """
 
     pitch: tuple[float, float] = (-math.inf, math.inf)
@@ -213,7 +213,7 @@ class Limb:
         geometry: links and masses of the leg.
         hip: place of the crank centre O on the trunk, from the trunk's centre of mass [m], forward and up.
         drive: drive of its crank.
-        spring: spring of the hoof; None is a rigid hoof.
+        spring: spring of the hoof; None for a rigid hoof.
 
     Raises:
         ParameterError: a part is of the wrong type, not finite, or the hip beyond `MAX_HIP_OFFSET`.
@@ -264,7 +264,7 @@ class Mechanics:
 
 class Reactions(NamedTuple):
     """Forces and moments of joints and drives on the links, in the world (x forward, y up,
-    counter-clockwise); a motor's rotor is not among the links. Shapes are those of `ConstrainedLeg`;
+    counter-clockwise); a motor's rotor is not among the links. Shapes are for `ConstrainedLeg`;
     `TrunkEngine` returns (legs, ..., num_envs).
 
     Attributes:
@@ -282,8 +282,8 @@ class Reactions(NamedTuple):
 
 
 class Result(IntEnum):
-    """Outcome of an advance. Values from PITCH on are violated `Limits`: the motion continues, its state is
-    kept."""
+    """Outcome of an advance. Values from PITCH on are violated `Limits`: the motion continues from
+    its state."""
 
     OK = 0
     NOT_FINITE = 1
@@ -302,7 +302,7 @@ class Result(IntEnum):
 
 def broken(results: NDArray[Any]) -> NDArray[np.bool_]:
     """Return a mask of the outcomes, values of `Result`, that mean that an environment could not be simulated
-    and kept its old state."""
+    and has its former state."""
     return (results != _OK) & (results < _PITCH)
 
 

@@ -22,20 +22,20 @@ from hoof_env.simd.memory import Arrays, Given
 
 
 def push_cranks(trunk: TrunkRows, legs: LegRows, leg_count: Whole, model: Model, impulse: Plane) -> None:
-    """Add to the speeds of motors' cranks what an `impulse` [N s] on the trunk's centre of mass changes at
-    once: (E8) and (E9) with impulses for forces, and jumps of speeds for accelerations."""
+    """Add the instantaneous change by an `impulse` [N s] on the trunk's centre of mass to the speeds of
+    motors' cranks: (E8) and (E9) with impulses for forces, and jumps of speeds for accelerations."""
     gather_legs(trunk, legs, leg_count, model)
     move_trunk(trunk, model.kind)
     for i in loop(leg_count):
         leg = block_at(legs, i)
-        # what `meet_ground` would set enters forces only, which do nothing in no time
+        # results of `ground_forces` enter only finite forces, which have no impulse
         leg.beta_rate = 0.0
         leg.ground_force = vector(full_like(leg, 0.0), 0.0)
         leg.ground_moment_theta = 0.0
         leg.ground_moment_beta = 0.0
         set_up_crank(trunk, leg, True, 0.0)
         load_trunk(trunk, leg, model.kind, True, model.lanes_are_legs)
-    # all other forces are finite, and do nothing in no time
+    # all other forces are finite, and have no impulse
     trunk.rates.force = impulse
     trunk.load = vector(full_like(trunk, 0.0), 0.0)
     trunk.load_moment = 0.0
@@ -49,10 +49,9 @@ def push_cranks(trunk: TrunkRows, legs: LegRows, leg_count: Whole, model: Model,
 
 @lru_cache(maxsize=64)
 def push_kernel(kind: EngineKind) -> Kernel:
-    """Return the kernel that adds to the crank speeds of some environments what impulses on their trunks
-    change at once.
+    """Return the kernel that changes the crank speeds of some environments by impulses on their trunks.
 
-    Its argument are the arrays of the engine, and of the n environments that are pushed: `impulses` [N s],
+    Its arguments are the arrays of the engine and, for the n environments that are pushed, `impulses` [N s],
     forward and upward, shape (2, n), and `which`, their columns, shape (n,).
     """
     form = engine_layout(kind.features)
@@ -61,7 +60,7 @@ def push_kernel(kind: EngineKind) -> Kernel:
     def push(given: Given) -> None:
         trunk = new_rows(form.trunk, 1)
         legs = new_rows(form.leg, 1, count)
-        # pushes are rare: one environment after the other; no law of contact, for none meets the ground here
+        # pushes are rare: one environment after the other; no contact law, because contact is not evaluated
         model = unpack_model(given.model, given.tables, given.ground, False, None, form)
         data, impulses, which = given.data, given.impulses, given.which
         size = which.shape[0]

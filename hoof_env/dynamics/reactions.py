@@ -81,7 +81,7 @@ def rod_loads(rod: Rod, tail: Point, head: Point) -> tuple[Plane, Plane]:
 
 
 def solid_loads(solid: Solid, tail: Point, head: Point) -> tuple[Plane, Plane]:
-    """Return the same of a body whose centre of mass is anywhere."""
+    """Return the same for a body whose centre of mass is anywhere."""
     mixed = solid.mixed
     mirrored = vector(mixed.real, -mixed.imag)
     return solid.tail * tail.a + mixed * head.a, solid.head * head.a + mirrored * tail.a
@@ -101,7 +101,7 @@ def hinge_force(
     hinge: Point, first: Point, second: Point, inverse: Lanes, turn_one: Lanes, turn_two: Lanes
 ) -> Plane:
     """Return the force f on the first of two parts in their hinge, with one x f = turn_one about its far end,
-    and two x f = -turn_two about that of the other."""
+    and two x f = -turn_two about the far end of the second."""
     one = hinge.at - first.at
     two = hinge.at - second.at
     return (inverse * turn_one) * two + (inverse * turn_two) * one
@@ -119,7 +119,7 @@ Summed = TypeVar("Summed", Lanes, Plane)
 
 
 class _Statics:
-    """Forces of one leg as they become known: `pins` are those on a body in a pin, by body and point."""
+    """Forces of one leg as they become known: `pins` are the forces on a body in a pin, by body and point."""
 
     def __init__(self, structure: Structure, constants: LegConstants, points: dict[str, Point]) -> None:
         self.structure = structure
@@ -130,8 +130,7 @@ class _Statics:
         self.ground: dict[int, Loads] = {}
 
     def rest(self, bodies: Iterable[int], unknown: Iterable[str]) -> Loads:
-        """Return the forces that bodies need besides those that are known; pins at points of `unknown` are
-        not."""
+        """Return the forces on bodies minus the known ones; pins at points of `unknown` are not known."""
         rest: Loads = {}
         for i in bodies:
             body = self.mechanism.bodies[i]
@@ -149,7 +148,7 @@ class _Statics:
         return rest
 
     def pin(self, body: int, point: str) -> Plane:
-        """Return the force on a body in a pin, if need be from those on all others there."""
+        """Return the force on a body in a pin, if necessary from the forces on all further bodies there."""
         if (body, point) not in self.pins:
             others = [self.pins[other, point] for other in self.mechanism.at(point) if other != body]
             self.pins[body, point] = -_sum(others)
@@ -290,7 +289,7 @@ def force_on_second(g: LegConstants, motion: Motion) -> Plane:
 
 
 def store(rows: Reactions, values: list[Plane | Lanes]) -> None:
-    """Write numbers, or planar vectors, to rows one after the other."""
+    """Write numbers, or planar vectors, to consecutive rows."""
     at = 0
     for each in values:
         for part in (each.a, each.b) if isinstance(each, Plane) else (each,):

@@ -1,4 +1,4 @@
-"""States of an engine that were kept: their parts, and whether they fit another engine."""
+"""States of an engine: their parts, and whether they fit another engine."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ from hoof_env.errors import Floats, ParameterError, finite
 from hoof_env.gait import FilterSettings
 
 STATE = ("trunk", "limbs", "strides", "command", "account", "trunk_settings", "limb_settings")
-"""Names of the arrays that hold what changes."""
+"""Names of the arrays of a state."""
 
 _MOVING = TrunkState.rows("moving").start
 _PLACES = [
@@ -39,7 +39,8 @@ def read_state(
     expected: dict[str, Any], memory: Memory, state: Any
 ) -> tuple[dict[str, Floats], NDArray[np.bool_]]:
     """Return the arrays of a state by the names of `STATE`, and a mask of the environments that were ever
-    reset in it. `expected` is the layout of the engine; `TrunkEngine.set_state` says what is refused."""
+    reset in it. `expected` is the layout of the engine; See `TrunkEngine.set_state` for
+    errors."""
     parts = (*STATE, "layout")
     missing = sorted(set(parts) - set(state)) if isinstance(state, Mapping) else parts
     if missing or not isinstance(state["layout"], Mapping):
@@ -71,15 +72,15 @@ def check_column(column: Memory, settings: Floats) -> None:
 
 
 def _check_numbers(title: str, arrays: Mapping[str, Floats]) -> NDArray[np.bool_]:
-    """Return a mask of the environments that were ever reset. Raise `ParameterError` if a number of theirs is
-    not finite, or a place or an angle is too large for the tables."""
+    """Return a mask of the environments that were ever reset. Raise `ParameterError` if one of their numbers
+    is not finite, or a place or an angle is too large for the tables."""
     trunk = arrays["trunk"]
     limbs = arrays["limbs"]
     reset: NDArray[np.bool_] = np.ones(trunk.shape[-1], bool)
     places = trunk[_PLACES], limbs[:, _ANGLES]
     squares = sum(float(np.vdot(part, part)) for part in arrays.values())
     farthest = max(float(np.vdot(part, part)) for part in places)
-    # two sums of squares tell quickly that all is good; only otherwise each array is searched
+    # two sums of squares are a fast check; only if it fails each array is searched
     if not (math.isfinite(squares) and farthest <= MAX_STATE**2):
         reset = np.logical_not(np.isnan(trunk).all(0) & np.isnan(limbs).all((0, 1)))
         for name in STATE:
@@ -114,7 +115,7 @@ def identity_of(scene: Mechanics, filters: FilterSettings, **numbers: float) -> 
 
 
 def _differences(expected: dict[str, Any], given: dict[str, Any]) -> str:
-    """Return a sentence that says where two layouts differ; empty if nowhere."""
+    """Return a list of the differences of two layouts, as text; empty if they are equal."""
     if expected == given:
         return ""
     names = [name for name in {**expected, **given} if expected.get(name) != given.get(name)]

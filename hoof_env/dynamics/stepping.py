@@ -32,14 +32,14 @@ def filter_accelerations(leg: LegRows, count: int, settings: Sequence[Number]) -
         gain = settings[3 * k]
         rate_bound = settings[3 * k + 1]
         acc_bound = settings[3 * k + 2]
-        # a cascade: the outer loop asks for a rate, the inner one, `INNER` times as fast, follows it
+        # a cascade: the outer loop sets a rate, the inner loop, `INNER` times as fast, follows it
         wanted = clip(gain * (leg.command[k] - leg.state.gait[k]), rate_bound)
         leg.gait_acceleration[k] = clip(INNER * gain * (wanted - leg.state.gait_rate[k]), acc_bound)
 
 
 def advance_rows(kind: int, to: Layout, start: Layout, factor: Number, slope: Layout) -> None:
     """Set to = start + factor slope for all rows that move."""
-    # the last two rows, pitch and spin, move only with a free trunk
+    # the last two rows, pitch and angular momentum, move only with a free trunk
     for k in range(MOVING if kind == FREE else MOVING - 2):
         to[k] = start[k] + factor * slope[k]
 
@@ -65,8 +65,8 @@ def begin_step(trunk: TrunkRows, legs: LegRows, leg_count: Whole, model: Model) 
 
 
 def weigh_stage(trunk: TrunkRows, legs: LegRows, leg_count: Whole, model: Model, weight: Number) -> None:
-    """Add the derivatives at the present stage to their means, if the scheme averages: otherwise the last
-    stage's derivatives are those of the step."""
+    """Add the derivatives at the present stage to their means, if the scheme averages: otherwise the step
+    uses the last stage's derivatives."""
     if not model.averages:
         return
 
@@ -100,7 +100,7 @@ def next_stage(trunk: TrunkRows, legs: LegRows, leg_count: Whole, model: Model, 
     for i in loop(leg_count):
         leg = block_at(legs, i)
         is_motor = leg.settings.is_motor > 0.0
-        # a prescribed crank is where its filter says at each stage, not where the scheme would bring it
+        # at each stage a prescribed crank is at its filter's angle, not at the scheme's
         angle, spin = prescribed(leg, elapsed)
         leg.theta = where(is_motor, leg.state.crank_angle + elapsed * leg.theta_rate, angle)
         leg.theta_rate = where(is_motor, leg.state.crank_angle_rate + elapsed * leg.theta_acceleration, spin)
@@ -108,7 +108,7 @@ def next_stage(trunk: TrunkRows, legs: LegRows, leg_count: Whole, model: Model, 
 
 
 def use_new_rates(trunk: TrunkRows, h: Number) -> None:
-    """Set the rates of centre and pitch to those at the step's end (semi-implicit Euler)."""
+    """Set the rates of centre and pitch to the values at the step's end (semi-implicit Euler)."""
     rates = trunk.rates
     rates.velocity = rates.velocity + h * rates.force * trunk.settings.inverse_mass
     rates.pitch_rate = rates.pitch_rate + h * trunk.pitch_acceleration
@@ -117,7 +117,7 @@ def use_new_rates(trunk: TrunkRows, h: Number) -> None:
 def end_step(trunk: TrunkRows, legs: LegRows, leg_count: Whole, model: Model, h: Number) -> None:
     """Advance the state by a step; the filters advance exactly."""
     if model.kind != FIXED:
-        if model.new_rates:
+        if model.uses_new_rates:
             use_new_rates(trunk, h)
         rates = trunk.mean_rates if model.averages else trunk.rates
         advance_rows(model.kind, trunk.state.moving, trunk.state.moving, h, rates)
@@ -132,7 +132,7 @@ def end_step(trunk: TrunkRows, legs: LegRows, leg_count: Whole, model: Model, h:
             rate = leg.mean_theta_rate
             acceleration = leg.mean_theta_acceleration
         omega = leg.state.crank_angle_rate + h * acceleration
-        if model.new_rates:  # semi-implicit Euler
+        if model.uses_new_rates:  # semi-implicit Euler
             rate = omega
         leg.state.crank_angle = where(is_motor, leg.state.crank_angle + h * rate, angle)
         leg.state.crank_angle_rate = where(is_motor, omega, spin)
@@ -152,17 +152,17 @@ class Scheme:
     order: int  # of convergence
     fractions: tuple[float, ...]  # a_j, one fewer than stages
     weights: tuple[float, ...]  # w_j
-    new_rates: bool = False  # coordinates move with the rates of the step's end
+    uses_new_rates: bool = False  # coordinates move with the rates of the step's end
 
     @property
     def averages(self) -> bool:
-        """True if a step uses the mean of several stages' rates, and not those of the last stage."""
+        """True if a step uses the mean of several stages' rates, not the rates of the last stage."""
         return self.weights[-1] != 1.0
 
 
 SCHEMES = MappingProxyType(
     {
-        "semi_implicit_euler": Scheme(1, (), (1.0,), new_rates=True),
+        "semi_implicit_euler": Scheme(1, (), (1.0,), uses_new_rates=True),
         "midpoint": Scheme(2, (1 / 2,), (0.0, 1.0)),
         "rk3": Scheme(3, (1 / 3, 2 / 3), (1 / 4, 0.0, 3 / 4)),  # Heun
         "rk4": Scheme(4, (1 / 2, 1 / 2, 1.0), (1 / 6, 1 / 3, 1 / 3, 1 / 6)),

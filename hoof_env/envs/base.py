@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from hoof_env._display import html_table, line_of
 from hoof_env.dynamics.engine import TrunkEngine
-from hoof_env.dynamics.memory import which as which_of
+from hoof_env.dynamics.memory import env_indices as which_of
 from hoof_env.envs.drawn_recording import DrawnRecording
 from hoof_env.episodes.batch import EpisodeBatch
 from hoof_env.episodes.recording import Recording, commands_of_step, surroundings_of

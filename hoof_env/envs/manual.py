@@ -22,11 +22,11 @@ from hoof_env.paper_solver.integrators import INTEGRATORS
 from hoof_env.render.size import USUAL_SIZE
 from hoof_env.tasks import horse, leg_starts, observation
 from hoof_env.tasks.horse_gaits import SIZES, horse_gaits
-from hoof_env.tasks.own_parts import constants_of
 from hoof_env.tasks.plain import to_json
 from hoof_env.tasks.registry import TASKS, Task, task_of
 from hoof_env.tasks.reward import check_weights
 from hoof_env.tasks.settings import ABOUT
+from hoof_env.tasks.user_parts import constants_of
 
 MULTI_OBJECTIVE = "hoof_env/HorseLegMO-v0"
 """Id of the leg's task with a reward for each objective."""
@@ -161,9 +161,9 @@ def constants(task: Task) -> Table:
     found = constants_of(task.terms, task.entries).values()
     rows = [(c.name, f"{c.value:g}", c.unit, c.meaning) for c in found]
     rows += [
-        (f"{term.name}.{row.name}", f"{row.begin:g}", row.unit, f"{row.meaning}; kept, from this value on")
+        (f"{term.name}.{row.name}", f"{row.initial:g}", row.unit, f"{row.meaning}; state, initial value")
         for term in task.terms
-        for row in term.keeps
+        for row in term.state
     ]
     return Table(("Constant", "Default", "Unit", "Meaning"), list(rows))
 
@@ -181,8 +181,8 @@ def choices() -> dict[str, str]:
         "horse_gaits": horse_gaits(),
     }
     numbers = {
-        "lowest": leg_starts.LOWEST,
-        "highest": leg_starts.HIGHEST,
+        "lowest": leg_starts.MIN_HEIGHT,
+        "highest": leg_starts.MAX_HEIGHT,
         "horse_mass": horse.MASS,
         "smallest_size": SIZES[0],
         "largest_size": SIZES[1],

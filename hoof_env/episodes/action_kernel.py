@@ -10,7 +10,7 @@ from hoof_env.simd import Cell, Truth, Whole, full, loop, read, write
 from hoof_env.simd.math import clip
 from hoof_env.simd.user_functions import foreign
 from hoof_env.tasks.episode import ACTIONS
-from hoof_env.tasks.own_parts import ActionMap
+from hoof_env.tasks.user_parts import ActionMap
 
 
 def are_numbers(scene: Scene) -> Truth:

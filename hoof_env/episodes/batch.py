@@ -42,7 +42,7 @@ from hoof_env.simd.memory import Held
 from hoof_env.simd.threads import run_together
 from hoof_env.simd.user_functions import UserFunctionError, user_error
 from hoof_env.tasks.registry import Task
-from hoof_env.tasks.reward import BEARING, LONGEST_STRIDE
+from hoof_env.tasks.reward import BEARING, MAX_STRIDE
 from hoof_env.tasks.settings import ResolvedSettings, Settings
 
 Floats = NDArray[np.float64]
@@ -354,10 +354,10 @@ class EpisodeBatch:
             row[which] = 0.0
         self.rows.rewards[which] = 0.0
         # The full allowance: a leg can bear its weight from the first step on.
-        episode.allowance[which] = BEARING * LONGEST_STRIDE
+        episode.allowance[which] = BEARING * MAX_STRIDE
         episode.terms[:, which] = 0.0
         episode.sums[:, which] = 0.0
-        begins = [row.begin for term in self.task.terms for row in term.keeps]
+        begins = [row.initial for term in self.task.terms for row in term.state]
         if begins:
             episode.own[:, which] = np.array(begins)[:, None]
 

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from hoof_env.episodes.rows import Rows
 from hoof_env.tasks.parameters import check_range
-from hoof_env.tasks.schedules import SPEED, Course
+from hoof_env.tasks.schedules import SPEED, Ramp
 from hoof_env.tasks.settings import ResolvedSettings
 
 Index = NDArray[np.int64]
@@ -25,14 +25,14 @@ class Commands:
     Attributes:
         speeds: lowest and highest commanded speed at any time [m/s]; None if no speed is commanded.
         seconds: shortest and longest time until another speed is commanded [s].
-        course: course of the speeds over a schedule; None without one.
+        ramp: ramp of the speeds over a schedule; None without one.
         largest_change: largest change from one commanded speed to the next [m/s].
         dt: control step [s].
     """
 
     speeds: tuple[float, float] | None
     seconds: tuple[float, float]
-    course: Course | None
+    ramp: Ramp | None
     largest_change: float
     dt: float
 
@@ -41,7 +41,7 @@ class Commands:
         cls,
         s: ResolvedSettings,
         speeds: tuple[float, float] | None,
-        schedule: Mapping[str, Course],
+        schedule: Mapping[str, Ramp],
         largest_change: float,
         dt: float,
     ) -> Commands:
@@ -50,18 +50,18 @@ class Commands:
         Args:
             s: settings.
             speeds: lowest and highest commanded speed of the body [m/s]; None for none.
-            schedule: courses of scheduled settings.
+            schedule: ramps of scheduled settings.
             largest_change: see the class.
             dt: control step [s].
 
         Raises:
             ParameterError: a setting is out of range.
         """
-        course = schedule.get(SPEED)
-        speeds = course.hull if course else speeds
+        ramp = schedule.get(SPEED)
+        speeds = ramp.bounds if ramp else speeds
         varies = speeds is not None and speeds[0] < speeds[1]
         seconds = check_range("target_seconds", s.target_seconds, dt if varies else 0.0)
-        return cls(speeds, seconds, course, largest_change, dt)
+        return cls(speeds, seconds, ramp, largest_change, dt)
 
     @property
     def varies(self) -> bool:
@@ -72,7 +72,7 @@ class Commands:
         """Return the lowest and highest commanded speed [m/s], each one number, or one for each number of
         earlier control steps where they follow a schedule."""
         assert self.speeds
-        return self.course.after(steps_before) if self.course else self.speeds
+        return self.ramp.range_at(steps_before) if self.ramp else self.speeds
 
     def begin(self, rows: Rows, which: Index, generators: Generators, options: Mapping[str, Any]) -> None:
         """Draw or set the first commanded speeds of some rows."""

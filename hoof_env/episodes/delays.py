@@ -65,14 +65,14 @@ class Delays:
         return number if number > 1 else 0
 
     @property
-    def keeps_actions(self) -> bool:
+    def has_actions(self) -> bool:
         """True if a row keeps actions."""
         return bool(self.action.most or self.action.substeps or self.last_actions)
 
     @property
     def past_actions(self) -> int:
         """Number of actions that a row keeps."""
-        return max(self.action.most + 1, self.last_actions) if self.keeps_actions else 0
+        return max(self.action.most + 1, self.last_actions) if self.has_actions else 0
 
     def fill(self, record: Any, frame_size: int, action_size: int, engine_substeps: int) -> None:
         """Fill in its part of the task's record.
@@ -89,7 +89,7 @@ class Delays:
         record["history"] = self.history
         record["action_size"] = action_size
         record["kept_actions"] = self.past_actions
-        record["keeps_actions"] = self.keeps_actions
+        record["has_actions"] = self.has_actions
         record["last_actions"] = self.last_actions
         parts = parts_of(self.substeps, self.action.substeps, self.observation.substeps)
         record["parts"] = len(parts.substeps)

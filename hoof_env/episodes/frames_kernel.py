@@ -31,7 +31,7 @@ def remember(scene: Scene, n: Whole) -> None:
         row_size = task.frames * task.frame_size
         for lane in range(scene.lanes):
             move_on(scene.frames + (n + lane) * row_size, task.first_frame, task.frames - 1, task.frame_size)
-    if task.keeps_actions:
+    if task.has_actions:
         row_size = task.kept_actions * task.action_size
         for lane in range(scene.lanes):
             row = n + lane
@@ -44,7 +44,7 @@ def remember(scene: Scene, n: Whole) -> None:
 def put_action(scene: Scene, n: Whole) -> None:
     """Put the action that acts now in its place, in row n and its neighbours."""
     task = scene.task
-    if task.keeps_actions:
+    if task.has_actions:
         size = task.action_size
         for lane in range(scene.lanes):
             row = n + lane

@@ -37,7 +37,7 @@ def measured_names(features: Features = PLAIN, prefixes: Iterable[str] = ("",)) 
     leg = (*leg_state(features), *STRIDES, *stride_sums(features))
     command = tuple(f"command_{name}" for name in parameter_names(features.harmonics))
     each = (f"{prefix}{name}" for prefix in prefixes for name in (*leg, *command, *LEG_REPORT))
-    return ("pitch", "spin", *TRUNK_REPORT, "result", *each)
+    return ("pitch", "angular_momentum", *TRUNK_REPORT, "result", *each)
 
 
 class InfoLayout:

@@ -8,14 +8,14 @@ from hoof_env.dynamics.layout import LegMemory, StrideSums, TrunkMemory
 from hoof_env.dynamics.limits import has_moved
 from hoof_env.simd import Lanes, Mask, Number, block_at, maximum, minimum, rounded, where
 from hoof_env.tasks.episode import FAILED, TRUNCATED, Episode, Memories
-from hoof_env.tasks.reward import BEARING, LONGEST_STRIDE, Outcome
+from hoof_env.tasks.reward import BEARING, MAX_STRIDE, Outcome
 
 
 def bear(episode: Episode, impulse: Lanes, seconds: Number) -> Lanes:
     """Return the part of an impulse over the weight for which bearing is rewarded [s]: all within the
     allowance, less the part beyond it. The allowance grows with time, and the impulse uses it up; see
     `reward.BEARING`."""
-    allowance = minimum(episode.allowance + BEARING * seconds, BEARING * LONGEST_STRIDE)
+    allowance = minimum(episode.allowance + BEARING * seconds, BEARING * MAX_STRIDE)
     borne = minimum(impulse, allowance)
     episode.allowance = allowance - borne
     return borne - (impulse - borne)
@@ -49,7 +49,7 @@ def find_outcome(
     sum_up(leg, layouts, works, sums)
     progress = x - episode.x_before
     # A fixed trunk does not travel: what counts is how far hooves in stance slide backward.
-    if task.stays:
+    if task.is_fixed:
         progress = leg.sums.travel
     episode.x_before = x
     seconds = where(works, task.dt, 0.0)

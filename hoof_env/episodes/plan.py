@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hoof_env.dynamics.engine import TrunkEngine
-from hoof_env.dynamics.parts import LARGEST, Mechanics
+from hoof_env.dynamics.parts import MAX_COEFFICIENT, Mechanics
 from hoof_env.dynamics.stepping import SCHEMES
 from hoof_env.episodes.commands import Commands
 from hoof_env.episodes.delays import Delays
@@ -29,12 +29,12 @@ from hoof_env.paper_solver.integrators import INTEGRATORS
 from hoof_env.tasks.body import Body
 from hoof_env.tasks.episode import ACTIONS, episode_layout, task_type
 from hoof_env.tasks.observation import check_groups, groups_of
-from hoof_env.tasks.own_parts import check_constants, constants_of, own_of
 from hoof_env.tasks.parameters import check_drift, check_parameters, make_terrain, resolved, substeps_of
 from hoof_env.tasks.registry import Task
 from hoof_env.tasks.reward import check_weights
 from hoof_env.tasks.schedules import check_schedule
 from hoof_env.tasks.settings import ResolvedSettings, Settings
+from hoof_env.tasks.user_parts import check_constants, constants_of, declared_by
 
 LONGEST_EPISODE = 1e6
 """Largest `episode_seconds` [s]."""
@@ -124,7 +124,7 @@ class Plan:
     @property
     def layout(self) -> Any:
         """Layout of an episode's memory."""
-        terms, own = self.task.terms, own_of(self.task.terms, self.task.entries)
+        terms, own = self.task.terms, declared_by(self.task.terms, self.task.entries)
         return episode_layout(self.body.kernels.episode, len(terms), self.mechanics.features, self.legs, own)
 
     @property
@@ -151,7 +151,7 @@ class Plan:
             actions=np.zeros((columns, actions), single),
             observations=np.zeros((columns, len(self.observation_names)), single),
             rewards=np.zeros(columns),
-            acted=np.zeros((columns, actions), single) if self.delays.keeps_actions else None,
+            acted=np.zeros((columns, actions), single) if self.delays.has_actions else None,
             mapped=np.zeros((columns, len(self.body.action_names)), single) if self.task.action_map else None,
             past_actions=np.zeros((columns, self.delays.past_actions, actions), single),
             frames=np.zeros((columns, self.delays.frames, frame), single),
@@ -248,7 +248,7 @@ def _check_choices(s: ResolvedSettings) -> None:
     for name in ("baumgarte_alpha", "baumgarte_beta"):
         check_number(name, getattr(s, name), low=0.0, high=MOST_BAUMGARTE)
     for name in ("motor_gain", "motor_torque", "motor_inertia"):
-        check_number(name, getattr(s, name), low=0.0, high=LARGEST)
+        check_number(name, getattr(s, name), low=0.0, high=MAX_COEFFICIENT)
 
 
 def _make_engine(
@@ -289,7 +289,7 @@ def _make_engine(
 
 def _record_type(task: Task, body: Body, engine: TrunkEngine) -> np.dtype[Any]:
     """Return the type of the record of a task's constants."""
-    fields = (*body.kernels.task_fields, *own_of(task.terms, task.entries).fields)
+    fields = (*body.kernels.task_fields, *declared_by(task.terms, task.entries).fields)
     slots = Slots.of(task.entries)
     return task_type(len(task.terms), slots.count, engine.features.gait_size, fields)
 
@@ -301,14 +301,14 @@ def _fill(plan: Plan, engine: TrunkEngine) -> None:
         record[name] = value
     record["rate_bound"][:ACTIONS] = engine.filters.to_array()[:, 1]
     record["weights"] = [plan.weights[term.name] for term in task.terms]
-    if own_of(task.terms, task.entries).constants:
+    if declared_by(task.terms, task.entries).constants:
         record["constants"] = plan.constants
     record["episode_seconds"] = plan.episode_seconds
     record["h"] = engine.substep
     record["substeps"] = plan.substeps * engine.substeps
     record["dt"] = plan.dt
     record["episode_steps"] = plan.steps_per_episode
-    record["stays"] = plan.settings.trunk == "fixed"
+    record["is_fixed"] = plan.settings.trunk == "fixed"
     slots = Slots.of(task.entries).places
     groups = plan.observed.fill(record, slots, len(plan.observation_names))
     plan.noise.fill(record, groups)

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from hoof_env.episodes.rows import Rows
 from hoof_env.errors import ParameterError
-from hoof_env.tasks.disturbances import MOST_PUSH, Push, check_pushes
+from hoof_env.tasks.disturbances import MAX_PUSH, Push, check_pushes
 from hoof_env.tasks.parameters import check_range
 from hoof_env.tasks.settings import ResolvedSettings
 
@@ -52,7 +52,7 @@ class Pushes:
         given = check_pushes("pushes", s.pushes, dt, steps_per_episode)
         impulse = None
         if s.push_impulse is not None:
-            impulse = check_range("push_impulse", s.push_impulse, -MOST_PUSH, MOST_PUSH)
+            impulse = check_range("push_impulse", s.push_impulse, -MAX_PUSH, MAX_PUSH)
         # Intervals shorter than a control step do no harm where nothing is pushed.
         seconds = check_range("push_seconds", s.push_seconds, dt if impulse else 0.0)
         if given and impulse:

@@ -11,6 +11,7 @@ from typing import Any
 
 from hoof_env.constants import GRAVITY
 from hoof_env.dynamics.engine import TrunkEngine
+from hoof_env.dynamics.parts import Mechanics
 from hoof_env.dynamics.step_length import StepLength
 from hoof_env.episodes.rows import Rows
 from hoof_env.errors import ParameterError
@@ -18,7 +19,7 @@ from hoof_env.ground.terrain import Terrain
 from hoof_env.leg.profile import leg_profile
 from hoof_env.tasks.body import Body
 from hoof_env.tasks.parameters import draw_parameters, extremes
-from hoof_env.tasks.schedules import Course, drawn_names
+from hoof_env.tasks.schedules import Ramp, drawn_names
 from hoof_env.tasks.settings import ResolvedSettings
 
 Parameters = Mapping[str, float | tuple[float, float]]
@@ -30,14 +31,14 @@ class Randomization:
     Attributes:
         ranges: numbers, or ranges to draw from, by name, of `randomize` and of a schedule, there with all
             values that it ever takes.
-        courses: courses of scheduled parameters by name.
+        ramps: ramps of scheduled parameters by name.
 
     Args:
         s: settings.
         body: body.
         terrain: ground.
         given: ranges of the setting `randomize`.
-        schedule: courses of all scheduled settings.
+        schedule: ramps of all scheduled settings.
     """
 
     def __init__(
@@ -46,13 +47,13 @@ class Randomization:
         body: Body,
         terrain: Terrain,
         given: Parameters,
-        schedule: Mapping[str, Course],
+        schedule: Mapping[str, Ramp],
     ) -> None:
         self._settings = s
         self._body = body
         self._terrain = terrain
-        self.courses = {name: schedule[name] for name in drawn_names(schedule)}
-        self.ranges: Parameters = {**given, **{name: course.hull for name, course in self.courses.items()}}
+        self.ramps = {name: schedule[name] for name in drawn_names(schedule)}
+        self.ranges: Parameters = {**given, **{name: ramp.bounds for name, ramp in self.ramps.items()}}
         self._last_checked = ""
 
     def substeps(self) -> int | None:
@@ -82,10 +83,10 @@ class Randomization:
         s = self._with(changes)
         trunk, ground, limbs = self._body.parts(s)
         profiles = [leg_profile(limb.geometry) for limb in limbs]
-        length = StepLength(
+        mechanics = Mechanics(
             limbs, profiles, trunk, ground, self._terrain, s.integrator, step_error=self._body.step_error
         )
-        return length.choose(s.sim_dt, asked, stacklevel=5)
+        return StepLength(mechanics).choose(s.sim_dt, asked, stacklevel=5)
 
     def _with(self, changes: Mapping[str, Any]) -> ResolvedSettings:
         """Return the settings with changes."""
@@ -130,7 +131,7 @@ class Randomization:
         except ParameterError as error:
             sources: dict[str, Iterable[str]] = {
                 "randomize": self._settings.randomize or (),
-                "schedule": self.courses,
+                "schedule": self.ramps,
                 "options['parameters']": [n for n in parameters if parameters[n] != self.ranges.get(n)],
             }
             named = set(re.findall(r"\w+", str(error)))
@@ -151,10 +152,10 @@ class Randomization:
             engine: engine of the batch.
         """
         parameters = {**self.ranges, **of_options}
-        for name, course in self.courses.items():
+        for name, ramp in self.ramps.items():
             if name not in of_options:
-                low, high = map(float, course.after(rows.steps_before[env]))
-                parameters[name] = (low, high) if course.is_range else low
+                low, high = map(float, ramp.range_at(rows.steps_before[env]))
+                parameters[name] = (low, high) if ramp.is_range else low
         values = draw_parameters(parameters, generator)
         self.put(rows, env, values, engine)
         return values

@@ -40,10 +40,10 @@ def compute_user_term(scene: Scene, term: Term, k: int, outcome: Outcome, n: Who
     The rows that it keeps have their former values where the engine failed: what it read there may be NaN.
     """
     now = scene.kept_rows(n)
-    count = scene.layouts.own_rows if term.keeps else 0
+    count = scene.layouts.own_rows if term.state else 0
     before = [now[row] for row in range(count)]
-    keeps = term.name if term.keeps else ""
-    compute = foreign(term.title, term.compute, keeps=keeps, legs=scene.layouts.legs)
+    stateful = term.name if term.state else ""
+    compute = foreign(term.title, term.compute, stateful=stateful, legs=scene.layouts.legs)
     found: Lanes = compute(outcome, scene.task.weights[k], *scene.constants(term.constants))
     works = has_moved(outcome.trunk.result)
     for row in range(count):

@@ -13,8 +13,8 @@ from hoof_env.simd.memory import Arrays, Given, RecordType
 from hoof_env.tasks.body import BodyKernels
 from hoof_env.tasks.episode import ACTIONS, Memories, memories_of, task_type
 from hoof_env.tasks.observation import Entry, ObservationInputs
-from hoof_env.tasks.own_parts import ActionMap, Constant, Own, own_of
 from hoof_env.tasks.reward import Term
+from hoof_env.tasks.user_parts import ActionMap, Constant, Declarations, declared_by
 
 STEP_ARRAYS = {
     "episode": "f8",
@@ -67,9 +67,9 @@ class TaskKind:
     known: tuple[tuple[str, Any], ...]
 
     @cached_property
-    def own(self) -> Own:
+    def own(self) -> Declarations:
         """What terms and entries declare."""
-        return own_of(self.terms, self.entries)
+        return declared_by(self.terms, self.entries)
 
     @cached_property
     def layouts(self) -> Memories:

@@ -12,7 +12,7 @@ from hoof_env.episodes.batch import EpisodeBatch
 from hoof_env.episodes.row_plans import RowPlans
 from hoof_env.episodes.rows import repeated
 from hoof_env.errors import ParameterError
-from hoof_env.tasks.disturbances import MOST_PUSH, Push
+from hoof_env.tasks.disturbances import MAX_PUSH, Push
 from hoof_env.tasks.settings import Settings
 
 Floats = NDArray[np.float64]
@@ -206,9 +206,9 @@ def _read_pushes(batch: EpisodeBatch, given: Any) -> NDArray[Any]:
         except (TypeError, ValueError, OverflowError):
             pushes = []
     impulses = np.abs([push[1:] for row in pushes for push in row])
-    if len(pushes) != batch.num_envs or not (impulses <= MOST_PUSH).all():
+    if len(pushes) != batch.num_envs or not (impulses <= MAX_PUSH).all():
         raise ParameterError(
-            f"state['pushes']: expected the pushes of each environment, up to {MOST_PUSH:g} N s, got"
+            f"state['pushes']: expected the pushes of each environment, up to {MAX_PUSH:g} N s, got"
             f" {given!r:.60}"
         )
     found = np.empty(batch.num_envs, object)

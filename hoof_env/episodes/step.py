@@ -96,7 +96,7 @@ def _new_kernels(kind: TaskKind, is_scalar: bool) -> StepKernels:
         measure_rows(kind, given)
 
     return StepKernels(
-        step=Kernel(step, [kind.arrays], f"step_{name}", threads=not is_scalar),
+        step=Kernel(step, [kind.arrays], f"step_{name}", is_threaded=not is_scalar),
         apply=Kernel(apply_actions, [kind.arrays], "apply"),
         finish=Kernel(finish, [kind.arrays], "finish"),
         observe=Kernel(observe, [kind.arrays], f"observe_{name}"),

@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 
 from hoof_env.episodes.rows import Rows
 from hoof_env.errors import check_number
-from hoof_env.tasks.disturbances import MOST_STRENGTH
-from hoof_env.tasks.schedules import STRENGTH, Course
+from hoof_env.tasks.disturbances import MAX_STRENGTH
+from hoof_env.tasks.schedules import STRENGTH, Ramp
 from hoof_env.tasks.settings import ResolvedSettings
 
 
@@ -22,20 +22,20 @@ class Strength:
 
     Attributes:
         factor: the factor [-].
-        course: its course over a schedule; None without one.
+        ramp: its ramp over a schedule; None without one.
     """
 
     factor: float
-    course: Course | None
+    ramp: Ramp | None
 
     @classmethod
-    def of(cls, s: ResolvedSettings, schedule: Mapping[str, Course]) -> Strength:
+    def of(cls, s: ResolvedSettings, schedule: Mapping[str, Ramp]) -> Strength:
         """Return the strength of settings.
 
         Raises:
             ParameterError: it is out of range.
         """
-        factor = check_number("strength", s.strength, low=0.0, high=MOST_STRENGTH)
+        factor = check_number("strength", s.strength, low=0.0, high=MAX_STRENGTH)
         return cls(factor, schedule.get(STRENGTH))
 
     def begin(
@@ -46,5 +46,5 @@ class Strength:
         options: Mapping[str, Any],
     ) -> None:
         """Set the strength of episodes that start in some rows."""
-        factor = self.course.after(rows.steps_before[which])[0] if self.course else self.factor
+        factor = self.ramp.range_at(rows.steps_before[which])[0] if self.ramp else self.factor
         rows.named.strength[which] = options.get("strength", factor)

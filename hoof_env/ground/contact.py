@@ -1,4 +1,4 @@
-"""Settings of the ground, those of a preset, and contacts of hoof points (Eqs. 10 to 15) for the paper's
+"""Settings of the ground, also from presets, and contacts of hoof points (Eqs. 10 to 15) for the paper's
 solver."""
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ class Contact:
 
     penetration: float = 0.0  # [m], negative above the ground (Eq. 10)
     rate: float = 0.0  # [m/s], positive while going in (Eq. 12)
-    approach: float = 0.0  # [m/s], rate at touch-down, kept until the point leaves; 0 outside
+    approach: float = 0.0  # [m/s], rate at touch-down, latched until the point leaves; 0 outside
     normal: float = 0.0  # [N], upward on the hoof (Eq. 14)
     friction: float = 0.0  # [N], along x on the hoof (Eq. 15)
     x: float = 0.0  # [m], place of the point
@@ -43,7 +43,7 @@ class GroundRecord(NamedTuple):
     chi: float  # damping factor [-]
     dashpot: float  # its coefficient [N s/m]
     friction_law: int  # index into `FRICTION_LAWS`
-    interpolated: bool
+    is_interpolated: bool
 
 
 @dataclass(frozen=True)
@@ -63,7 +63,7 @@ class Ground:
         friction: mu_k [-]; the paper's 0.4.
         friction_slow, friction_fast: threshold speeds of the friction law [m/s], assumed (not in the paper);
             only "ambrosio" uses the first.
-        reference_mass: mass [kg] for which "kelvin-voigt" has this restitution; unused by the others.
+        reference_mass: mass [kg] for which "kelvin-voigt" has this restitution; the other laws do not use it.
 
     Raises:
         ParameterError: an unknown law or a value out of range.
@@ -123,7 +123,7 @@ class Ground:
             chi=chi,
             dashpot=dashpot,
             friction_law=FRICTION_LAWS.index(self.friction_law),
-            interpolated=self.approach == "interpolated",
+            is_interpolated=self.approach == "interpolated",
         )
 
 
@@ -136,7 +136,7 @@ def latch(contact: Contact, penetration: float, rate: float, ground: GroundRecor
     """Update penetration and rate of a point; on entering the ground, latch its approach speed (floored)."""
     if penetration > 0.0 and not contact.inside:
         speed = rate
-        if ground.interpolated and contact.penetration < 0.0:
+        if ground.is_interpolated and contact.penetration < 0.0:
             # part of the step up to the crossing of the surface
             part = contact.penetration / (contact.penetration - penetration)
             speed = contact.rate + part * (rate - contact.rate)
@@ -188,7 +188,7 @@ def load_ground(preset: Preset = DEFAULT_PRESET, **overrides: Any) -> Ground:
 
     Args:
         preset: name, path or content; settings that it does not have are the defaults of `Ground`.
-        overrides: attributes of `Ground` that replace the preset's; None keeps them.
+        overrides: attributes of `Ground` that replace the preset's, unless None.
 
     Raises:
         ParameterError: unknown preset name, an override out of range, or content that is wrong as below.

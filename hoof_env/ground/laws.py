@@ -48,7 +48,7 @@ FACTORS: dict[str, Callable[[float], float]] = {
 NORMAL_LAWS = (*FACTORS, "kelvin-voigt")
 """Names of the normal laws."""
 
-SMALLEST_RESTITUTION = 0.01
+MIN_RESTITUTION = 0.01
 """Smallest restitution [-] of laws with a damping that grows without bound towards 0."""
 
 REGULAR_LAWS = ("lankarani-nikravesh", "hunt-crossley")
@@ -70,9 +70,9 @@ def damping(law: str, restitution: float, stiffness: float, reference_mass: floa
     """
     check_choice("normal_law", law, NORMAL_LAWS)
     cr = check_number("restitution", restitution, low=0, high=1)
-    if law not in REGULAR_LAWS and cr < SMALLEST_RESTITUTION:
+    if law not in REGULAR_LAWS and cr < MIN_RESTITUTION:
         raise ParameterError(
-            f"restitution: expected a number in [{SMALLEST_RESTITUTION}, 1] for {law!r}, whose damping grows "
+            f"restitution: expected a number in [{MIN_RESTITUTION}, 1] for {law!r}, whose damping grows "
             f"without bound towards 0, got {restitution!r}"
         )
     if law == "kelvin-voigt":
@@ -96,7 +96,7 @@ def restitution_of_damping_ratio(zeta: float) -> float:
     if zeta < 1.0:
         w = math.sqrt(1 - zeta**2)
         return math.exp(-zeta / w * (math.pi - math.atan2(2 * zeta * w, 1 - 2 * zeta**2)))
-    # the limit of both other branches, which divide by 0 here
+    # the limit of the two remaining branches, which divide by 0 here
     if zeta == 1.0:
         return math.exp(-2.0)
     w = math.sqrt(zeta**2 - 1)
@@ -146,7 +146,7 @@ def friction_part(speed: Real, law: int, slow: Real, fast: Real) -> Real:
     elif law == THRELFALL:
         part = 1.0 - exp_of_negative(-3.0 * minimum(speed / fast, 1.0))
     else:
-        # `simd.math.tanh` without its choice of a sign: a speed has none
+        # `simd.math.tanh` without its choice of a sign: a speed is not negative
         e = exp_of_negative(-2.0 * (speed / fast))
         part = (1.0 - e) / (1.0 + e)
     return minimum(maximum(part, 0.0), 1.0)

@@ -2,25 +2,25 @@
 
 A mass m on the ground has three rates. The spring's is the frequency w = sqrt(n K d^(n - 1) / m) at the
 deepest penetration. Damping is chi K d^n / (v0 m) + c / m, where v0 is the approach speed. Friction is the
-slope of its law times F / m: between the threshold speeds, a few millimetres a second apart, it changes from
-nothing to all, which makes it the fastest of the three under a light hoof.
+slope of its law times F / m: between the threshold speeds, a few millimetres a second apart, it rises from
+zero to its full value, which makes it the fastest of the three under a light hoof.
 
 The spring decides on accuracy. tests/ground/test_stiffness.py drops a mass on the contact of Eq. 14 and
-measures the error e of its state after it has left, that of the speed over the touch-down speed or that
-of the place over the deepest penetration, whichever is larger, against an adaptive scheme of eighth order.
+measures the error e of its state after it has left, the larger of the error of the speed over the touch-down
+speed and the error of the place over the deepest penetration, against an adaptive scheme of eighth order.
 For n from 1 to 3, chi from 0 to 3, weights up to 0.3 of the peak force, steps h w of 0.025 to 0.4 and 16
 places of the touch-down within a step, all errors obey one law:
 
     e < C (h w)^p,   p = min(order, n + 1),
 
-because d^n has a kink at touch-down that limits the order. `SCHEME_LIMITS` holds the largest C, that of n =
-1, rounded up; at n = 1.5 less than 0.7 of it is enough for semi-implicit Euler and the midpoint rule, less
-than 0.4 for the others.
+because d^n has a kink at touch-down that limits the order. `SCHEME_LIMITS` holds the largest C, at n = 1,
+rounded up; at n = 1.5 less than 0.7 of it is enough for semi-implicit Euler and the midpoint rule, less than
+0.4 for the remaining schemes.
 
-A hoof with a spring k and a damper c of its own has a sole without mass. Its penetration d follows the
-leg's with the rate (k + n K d^(n - 1)) / (c + chi K d^n / v0): the stiff ground against all damping. It is
-largest somewhere on the way in. The mass then has the frequency of both springs in series, the damping of c
-at most, and friction needs no sliding speed.
+A hoof with a spring k and a damper c has a sole without mass. Its penetration d follows the leg's with the
+rate (k + n K d^(n - 1)) / (c + chi K d^n / v0): the stiff ground against all damping. It is largest somewhere
+on the way in. The mass then has the frequency of both springs in series, at most the damping of c, and
+friction needs no sliding speed.
 
 Damping and friction decay: explicit schemes are stable up to h rate = 2 (Euler, midpoint), 2.51 (third order)
 and 2.79 (RK4), and half of that is the limit here. Past its limit friction does not diverge, because its
@@ -63,7 +63,7 @@ SCHEME_LIMITS: Mapping[str, SchemeLimits] = MappingProxyType(
 DEPTHS = 65
 """Number of penetrations at which the rate of a sole is evaluated."""
 
-LARGEST_ANGLE = 0.4
+MAX_ANGLE = 0.4
 """Largest h w [-], up to which the errors were measured."""
 
 
@@ -83,7 +83,7 @@ class ContactRates:
         tolerance = check_number("tolerance", tolerance, low=0, high=1, exclusive_low=True)
         order = min(limits.order, self.exponent + 1)
         # e < C (h w)^p of the module's text, solved for h w
-        angle = min((tolerance / limits.error) ** (1 / order), LARGEST_ANGLE)
+        angle = min((tolerance / limits.error) ** (1 / order), MAX_ANGLE)
         allowed = {"elastic": angle, "damping": limits.decay, "friction": limits.decay}
         rates = {name: getattr(self, name) for name in allowed}
         return {name: allowed[name] / rate if rate > 0 else math.inf for name, rate in rates.items()}
@@ -135,9 +135,9 @@ def contact_rates(
         load: force that presses the point down from outside [N], as a part of the weight; the spring is
             assumed to overshoot under it.
         speed: speed at which the point touches down [m/s]. Fast points go deep, slow ones are damped
-            strongly: where both occur, ask for both and take the larger rates.
-        sliding_mass: mass that it sets against friction [kg]; None is `mass`.
-        terrain: shape of the ground, of which the stiffest and the roughest places count; None is flat.
+            strongly: where both occur, compute both and use the larger rates.
+        sliding_mass: mass that it sets against friction [kg]; None for `mass`.
+        terrain: shape of the ground, whose stiffest and roughest places count; None for flat ground.
     """
     mass = check_number("mass", mass, low=0, exclusive_low=True)
     load = check_number("load", load, low=0)

@@ -1,7 +1,7 @@
 """Shape of the ground along x, and places where it is softer, harder or more slippery than `Ground`.
 
 Height and the two factors are given at evenly spaced knots and are linear in between, so that only the slope
-jumps; beyond the first and the last knot the ground is level and keeps their values.
+jumps; beyond the first and the last knot the ground is level with constant values.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from numpy.typing import ArrayLike, NDArray
 from hoof_env.errors import ParameterError, check_number
 from hoof_env.simd import Lanes, Matrix, Number, floor, gather_eight, minimum, where
 
-MOST_KNOTS = 1_000_000
+MAX_KNOTS = 1_000_000
 """Largest number of knots."""
 
 LONG_WAY = 1000.0
@@ -120,7 +120,7 @@ class Terrain:
 
     @classmethod
     def patches(cls, patches: Iterable[Sequence[float]], spacing: float = 0.01) -> Terrain:
-        """Return flat ground with patches of other stiffness and friction.
+        """Return flat ground with patches of different stiffness and friction.
 
         Args:
             patches: (x0, x1, factor of stiffness, factor of friction) each; they may touch, not overlap.
@@ -171,7 +171,7 @@ class Terrain:
         return cls(**data)
 
     def to_dict(self) -> dict[str, Any]:
-        """Return entries that JSON can hold; numbers keep their bits."""
+        """Return entries for JSON, which preserves the bits of numbers."""
         values = {field.name: getattr(self, field.name) for field in fields(self)}
         return {name: list(value) if isinstance(value, tuple) else value for name, value in values.items()}
 
@@ -208,7 +208,7 @@ class Terrain:
 
     @cached_property
     def grid(self) -> TerrainGrid:
-        """The grid of `to_grid`, made once; read-only."""
+        """The grid of `to_grid`, cached and read-only."""
         grid = self.to_grid()
         grid.cells.flags.writeable = False
         return grid
@@ -219,15 +219,15 @@ def _knots(start: float, end: float, spacing: float) -> NDArray[np.float64]:
     check_number("terrain.spacing", spacing, low=1e-4, high=1e6)
     # 1e-6: a length that is a whole number of spacings but for rounding gets no knot more
     count = math.ceil((end - start) / spacing - 1e-6) + 1
-    if count > MOST_KNOTS:
-        wanted = f"at most {MOST_KNOTS} knots from {start:g} to {end:g} m"
+    if count > MAX_KNOTS:
+        wanted = f"at most {MAX_KNOTS} knots from {start:g} to {end:g} m"
         raise ParameterError(f"terrain.spacing: expected {wanted}, got {spacing!r} m")
     return start + spacing * np.arange(count, dtype=np.float64)
 
 
 def _row(name: str, values: Any, low: float, high: float, count: int | None) -> tuple[float, ...]:
     """Return `values` as `count` floats within [low, high]. They are one number, or `count` numbers; a
-    `count` of None accepts any number of them."""
+    `count` of None accepts any number."""
     if count is not None and np.ndim(values) == 0:
         return (check_number(name, values, low=low, high=high),) * count
     plain = _plain_row(values, low, high, count)
@@ -237,21 +237,21 @@ def _row(name: str, values: Any, low: float, high: float, count: int | None) -> 
         row = tuple(check_number(f"{name}[{k}]", value, low=low, high=high) for k, value in enumerate(values))
     except TypeError:
         row = ()
-    if isinstance(values, (str, bytes)) or not 0 < len(row) <= MOST_KNOTS or (count and len(row) != count):
+    if isinstance(values, (str, bytes)) or not 0 < len(row) <= MAX_KNOTS or (count and len(row) != count):
         raise ParameterError(f"{name}: expected {count or 'a row of'} numbers, got {_short(values)}")
     return row
 
 
 def _plain_row(values: Any, low: float, high: float, count: int | None) -> tuple[float, ...] | None:
     """Return a tuple or list of `float` as a tuple if all are within bounds, else None. Hills have thousands
-    of knots, and to check them one by one, which tells the one that is wrong, takes longer than all else that
-    makes an environment."""
+    of knots, and a check one by one, which finds the wrong value, takes longer than the rest of making an
+    environment."""
     if type(values) not in (tuple, list) or set(map(type, values)) != {float}:
         return None
-    if len(values) > MOST_KNOTS or (count is not None and len(values) != count):
+    if len(values) > MAX_KNOTS or (count is not None and len(values) != count):
         return None
     row = np.array(values)
-    # Bounds may be infinite, and values may not.
+    # Bounds may be infinite, values must be finite.
     is_good = np.isfinite(row) & (low <= row) & (row <= high)
     return tuple(values) if is_good.all() else None
 
@@ -264,13 +264,13 @@ def _short(value: Any) -> str:
 class TerrainGrid(NamedTuple):
     """Terrain for the kernels: the arguments of `surface` after x.
 
-    `cells` has a row for each cell, from the level one before the first knot to that behind the last, shape
-    (knots + 1, 8): height, its rise over the cell, normal x and y, factor of stiffness and its rise, factor
-    of friction and its rise.
+    `cells` has a row for each cell, from the level cell before the first knot to the level cell after the
+    last, shape (knots + 1, 8): height, its rise over the cell, normal x and y, factor of stiffness and its
+    rise, factor of friction and its rise.
     """
 
     cells: NDArray[np.float64]
-    origin: float  # x at which the first cell begins [m]
+    origin: float  # x at which the first cell starts [m]
     per_metre: float  # number of cells in a metre [1/m]
 
 

@@ -15,10 +15,10 @@ if TYPE_CHECKING:
     from hoof_env.leg.geometry import Geometry
 
 ANGLES = 3600
-"""Number of crank angles at which a leg is looked at."""
+"""Number of crank angles at which a leg is checked."""
 
 
-LEAST_TURN = 1e-9
+MIN_TURN = 1e-9
 """Angle below which two directions are one, up to rounding [rad]."""
 
 
@@ -30,12 +30,12 @@ def coordinate(lengths: Any, text: str) -> float:
 
 
 def tables(geometry: Geometry) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
-    """Return how each point of a leg is found, as arrays for `closed_form.solve_points`.
+    """Return the steps that find a leg's points, as arrays for `closed_form.solve_points`.
 
     Returns:
         steps: shape (points to find, 4), rows (is_dyad, point, first, second) by `Mechanism.number`.
         values: shape (points to find, 3), rows (r1^2, r1^2 - r2^2, side) for a dyad, (along, across, 0) in
-            lengths of the body for a point of one.
+            lengths of the body for a body point.
     """
     number = geometry.mechanism.number
     lengths = geometry.lengths
@@ -77,7 +77,7 @@ def solve(geometry: Geometry, theta: Any) -> tuple[NDArray[np.complex128], ...]:
 def centres(geometry: Geometry, z: NDArray[np.complex128], mirrored: bool) -> NDArray[np.complex128]:
     """Return the bodies' centres of mass from the points, or their derivatives, shape (..., bodies).
 
-    `mirrored` says whether the points are in the world's sense, after the mirror of `Geometry.travel`.
+    `mirrored` is true if the points are in the world's sense, after the mirror of `Geometry.travel`.
     """
     mechanism = geometry.mechanism
     tail = z[..., mechanism.tails]
@@ -149,10 +149,10 @@ def check_full_revolution(geometry: Geometry) -> None:
 
 
 def weld_angles(geometry: Geometry) -> list[float]:
-    """Return the angle of the first body of each weld from that of the second, before the mirror [rad].
+    """Return the angle of each weld's first body relative to the second, before the mirror [rad].
 
     Raises:
-        GeometryError: the points of the two bodies turn against each other.
+        GeometryError: the two bodies turn relative to each other.
     """
     mechanism = geometry.mechanism
     if not mechanism.welds:
@@ -163,14 +163,14 @@ def weld_angles(geometry: Geometry) -> list[float]:
     for one, other in mechanism.welds:
         axes = [z[:, mechanism.heads[i]] - z[:, mechanism.tails[i]] for i in (one, other)]
         turns = axes[0] * axes[1].conj()
-        if len(turns) and np.abs(np.angle(turns * turns[0].conj())).max() > LEAST_TURN:
+        if len(turns) and np.abs(np.angle(turns * turns[0].conj())).max() > MIN_TURN:
             names = " and ".join(repr(mechanism.bodies[i].name) for i in (one, other))
             raise GeometryError(
                 f"mechanism.welds: {names} turn against each other, so they cannot be welded; make the "
                 "points of one points of the other body, or leave the weld out"
             )
         angle = float(np.angle(turns[0])) if len(turns) else 0.0
-        angles.append(angle if abs(angle) > LEAST_TURN else 0.0)
+        angles.append(angle if abs(angle) > MIN_TURN else 0.0)
     return angles
 
 

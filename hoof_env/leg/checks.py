@@ -34,7 +34,7 @@ def numbers_of(what: str, given: Any) -> dict[str, Any]:
 
 
 def check_names(what: str, given: Mapping[Any, Any]) -> None:
-    """Raise `ParameterError` unless all names are texts; a file would hold others as texts."""
+    """Raise `ParameterError` unless all names are texts; a file would store any other name as text."""
     for name in given:
         if not isinstance(name, str):
             raise ParameterError(f"{what}: expected names that are texts, got {name!r}")
@@ -44,7 +44,7 @@ def checked_path(given: Any, suffix: str) -> Path:
     """Return the path of a file that is written.
 
     Raises:
-        ParameterError: no path, or one of another suffix.
+        ParameterError: no path, or a path with another suffix.
     """
     if not isinstance(given, (str, Path)):
         raise ParameterError(f"path: expected the path of a file that ends in {suffix}, got {given!r}")
@@ -55,7 +55,7 @@ def checked_path(given: Any, suffix: str) -> Path:
 
 
 def check_keys(what: str, given: Any, expected: Sequence[str], optional: Sequence[str] = ()) -> None:
-    """Raise `ParameterError` unless a mapping has the expected keys, and no others than the optional ones."""
+    """Raise `ParameterError` unless a mapping has all expected keys and no unknown ones."""
     names = ", ".join(expected or optional) or "no entries"
     if not isinstance(given, Mapping):
         raise ParameterError(f"{what}: expected a mapping with {names}, got {given!r}")
@@ -71,7 +71,7 @@ def check_keys(what: str, given: Any, expected: Sequence[str], optional: Sequenc
 
 
 def count_of(values: Any) -> int:
-    """Return the number of values in a sequence or row, 0 if it is none or a text."""
+    """Return the number of values in a sequence or row, 0 for a text or any other value."""
     if isinstance(values, np.ndarray):
         return values.size if values.ndim == 1 else 0
     return len(values) if isinstance(values, Sequence) and not isinstance(values, TEXTS) else 0
@@ -95,7 +95,7 @@ def checked_masses(given: Any, bodies: int) -> tuple[float, ...]:
     """Return the bodies' masses.
 
     Raises:
-        ParameterError: another number of them, or one that is not finite or not above 0.
+        ParameterError: a wrong number of masses, or a mass that is not finite or not above 0.
     """
     if count_of(given) != bodies:
         raise ParameterError(f"masses: expected {bodies} link masses, got {given!r}")
@@ -103,7 +103,8 @@ def checked_masses(given: Any, bodies: int) -> tuple[float, ...]:
 
 
 def check_feet(toe: Any, heel: Any, feet: Sequence[str]) -> None:
-    """Raise `ParameterError` unless toe and heel are the feet of a mechanism; the heel may be None of one."""
+    """Raise `ParameterError` unless toe and heel are the feet of a mechanism; with one foot the heel is
+    None."""
     given = [foot for foot in (toe, heel) if foot is not None]
     if not all(isinstance(foot, str) for foot in given) or toe is None or sorted(given) != sorted(feet):
         expected = f"{' and '.join(sorted(feet))}, one each" if len(feet) == 2 else f"{feet[0]} and None"
@@ -111,10 +112,10 @@ def check_feet(toe: Any, heel: Any, feet: Sequence[str]) -> None:
 
 
 def checked_pivot(given: Any, pivots: Sequence[str]) -> Any:
-    """Return the place of the one pivot as a pair, of several as a mapping.
+    """Return the place of a single pivot as a pair, or the places of several as a mapping.
 
     Raises:
-        ParameterError: a place is missing or no pair of finite numbers.
+        ParameterError: a place is missing or is not a pair of finite numbers.
     """
     if isinstance(given, Mapping):
         check_keys("pivot", given, pivots)
@@ -134,7 +135,7 @@ def checked_pivot(given: Any, pivots: Sequence[str]) -> Any:
 
 
 def read_structure(given: Any, solids: Any) -> tuple[Mechanism, dict[str, Mapping[str, Any]]]:
-    """Return mechanism and bodies that are no uniform rods, whose numbers may stand in the list."""
+    """Return the mechanism and the bodies that are no uniform rods, which the list may describe."""
     labels: dict[str, str] = {}
     if not isinstance(given, Mechanism):
         given, listed, labels = split_solids(given)
@@ -144,10 +145,10 @@ def read_structure(given: Any, solids: Any) -> tuple[Mechanism, dict[str, Mappin
 
 
 def merged_solids(given: Any, listed: Solids, labels: Mapping[str, str]) -> Any:
-    """Return the bodies that are no uniform rods of both places where they may stand.
+    """Return the bodies that are no uniform rods, from `solids` and from the mechanism's list.
 
     Raises:
-        ParameterError: a body stands in both.
+        ParameterError: both describe a body.
     """
     if not isinstance(given, Mapping):
         return given
@@ -185,14 +186,14 @@ def checked_solids(
                     f"{what}['centre']: expected two numbers, along and across from the tail, in metres, "
                     f"got {solid['centre']!r}"
                 )
-            # a tuple, which its owner cannot change either
+            # a tuple, which the caller cannot change
             checked["centre"] = tuple(check_number(f"{what}['centre']", part) for part in solid["centre"])
         solids[name] = MappingProxyType(checked)
     return solids
 
 
 def plain_solids(solids: Solids) -> dict[str, Any]:
-    """Return such bodies as JSON can hold them."""
+    """Return such bodies in a form for JSON."""
     return {
         name: {key: list(value) if key == "centre" else value for key, value in solid.items()}
         for name, solid in solids.items()
@@ -202,7 +203,7 @@ def plain_solids(solids: Solids) -> dict[str, Any]:
 def with_solids(
     values: NDArray[np.float64], key: str, solids: Solids, mechanism: Mechanism
 ) -> NDArray[np.float64]:
-    """Return masses or inertias of rods with those that are given instead."""
+    """Return masses or inertias of rods, replaced by the solids' where these are given."""
     given = [solids.get(body.name, {}) for body in mechanism.bodies]
     return np.array([solid.get(key, value) for solid, value in zip(given, values, strict=True)])
 

@@ -83,8 +83,8 @@ def intersect(e1: Planar, e2: Planar, k1: Any, k2: Any) -> Planar:
 def meet(first: Planar, second: Planar, one2: Any, excess: Any, side: Any) -> Planar:
     """Return the point at two lengths from two points; NaN where the points are too far apart or too close.
 
-    `one2` is the square of the length from `first`, `excess` how much it is over that of the other; `side` is
-    +1 to the left of the line from `first` to `second`, -1 to the right.
+    `one2` is the square of the length from `first`, `excess` its excess over the square of the second; `side`
+    is +1 to the left of the line from `first` to `second`, -1 to the right.
     """
     span = second - first
     d2 = dot(span, span)
@@ -120,10 +120,10 @@ def solve_points(
     the leg with the crank's centre at the origin [m, m/rad, m/rad^2].
 
     The crank turns clockwise, its pin is at crank * exp(-i theta); `fixed` are the fixed points, `steps` and
-    `values` are `assembly.tables`. What does not move has one vector for all angles.
+    `values` are `assembly.tables`. A fixed point has one vector for all angles.
     """
-    nothing = Vectors(np.float64(0.0), np.float64(0.0))
-    points = [(Vectors(place.real, place.imag), nothing, nothing) for place in fixed]
+    zero = Vectors(np.float64(0.0), np.float64(0.0))
+    points = [(Vectors(place.real, place.imag), zero, zero) for place in fixed]
     cosine, sine = cos_sin(theta)
     if theta.size == 1:
         cosine, sine = cosine[0], sine[0]  # numbers, which take a fifth of the time of arrays of one
@@ -147,7 +147,7 @@ def solve_points(
 def cos_sin(angle: Floats) -> tuple[Floats, Floats]:
     """Return cosine and sine of angles [rad] by the C library; NaN where an angle is not finite.
 
-    NumPy's own, in vectors, have other last bits on some processors.
+    NumPy's vectorised functions have other last bits on some processors.
     """
     finite = np.isfinite(angle)
     angles = np.where(finite, angle, 0.0).tolist()

@@ -1,4 +1,4 @@
-"""Geometry of a leg: its lengths, pivot, assembly, masses and how it stands in the world.
+"""Geometry of a leg: its lengths, pivot, assembly and masses, and its place in the world.
 
 A `Geometry` is a frozen value; building one checks it. `leg.presets` reads its files.
 """
@@ -53,7 +53,7 @@ class Geometry:
         lengths: the lengths that the mechanism names [m].
         pivot: position of the fixed pivot relative to the crank's centre [m]; of several, by name.
         assembly: for each dyad's point, +1 if it lies left of the line between its two centres, else -1.
-        toe, heel: which of the two feet is which; the heel of a leg with one foot is None.
+        toe, heel: names of the two feet; the heel of a leg with one foot is None.
         travel: +1 if the leg travels towards +x of its own frame, -1 if towards -x. The world's x always
             points forward; the mirror is applied where the leg is placed in the world and nowhere else.
         hip_height: height of O above the ground in the paper's set-up [m], one level for both gaits.
@@ -63,9 +63,9 @@ class Geometry:
             half-length l, in kg m^2 though its units do not match; it needs no mass).
         full_turn: whether the crank must be able to turn fully. If not, it may rock between dead points, and
             `TrunkEngine` alone takes such a leg.
-        mechanism: the structure, or the list of it; that of the paper by default.
+        mechanism: the structure or its list; the paper's by default.
         solids: bodies that are no uniform rods, by name: "mass" [kg], "centre" along and across from the tail
-            [m], "inertia" about it [kg m^2], else those of a rod; or these stand in the list's `bodies`.
+            [m], "inertia" about it [kg m^2], by default a rod's; or as entries of the list's `bodies`.
         name, provenance: where the numbers come from.
 
     Raises:
@@ -208,11 +208,11 @@ class Geometry:
             theta, swing: crank angle and swing of the pose in which the model begins [rad].
             trunk: a `Trunk` that carries the leg, at its height; without one, O is held at `hip_height`.
             motor: a `Motor` that drives the crank; without one, the crank turns freely.
-            ground: a `Ground`, of which the friction alone is taken; none if None.
+            ground: a `Ground`, of which only the friction is used; no ground if None.
             timestep: of the simulation [s].
 
         Raises:
-            ParameterError: a number, type or suffix that cannot be, or no leg at this `theta`.
+            ParameterError: an invalid number, type or suffix, or no leg at this `theta`.
             OutputError: the file cannot be written.
         """
         return leg_to_mjcf(self, path, (theta, swing), trunk, motor, ground, timestep)
@@ -224,11 +224,11 @@ class Geometry:
         content |= {"pivot": list(self.pivot), "masses": None if self.masses is None else list(self.masses)}
         if isinstance(self.pivot, Mapping):
             content["pivot"] = {name: list(place) for name, place in self.pivot.items()}
-        # what is the paper's or the default is left out
+        # defaults and the paper's mechanism are left out
         if content.pop("full_turn") is False:
             content["full_turn"] = False
         listed = content.pop("mechanism").to_mapping()
-        # mechanisms that differ in the roles of their bodies are equal, their lists are not
+        # mechanisms that differ only in their bodies' roles are equal, but not their lists
         if listed != PAPER.to_mapping():
             content["mechanism"] = listed
         if content.pop("solids"):
@@ -269,15 +269,16 @@ class Geometry:
         """A similar leg: lengths, pivot and hip height times `factor`, angles and gaits as before.
 
         Mass per length stays, so masses scale with `factor`, first moments with its square and the inertias
-        of uniform rods with its cube; those of `inertia="paper"` know no mass and scale with `factor`. Bodies
-        of one density have masses that scale with `factor` cubed: give `mass_per_metre` for these.
+        of uniform rods with its cube; inertias of `inertia="paper"` do not depend on mass and scale with
+        `factor`. Bodies of one density have masses that scale with `factor` cubed: give `mass_per_metre` for
+        these.
 
         Args:
             factor: of every length [-].
-            mass_per_metre: of every link [kg/m]; in the place of `linear_density` and of own `masses`.
+            mass_per_metre: of every link [kg/m]; in place of `linear_density` and `masses`.
 
         Returns:
-            The leg, by the same name; `provenance` says by how much it is scaled.
+            The leg, by the same name; `provenance` has the factor.
 
         Raises:
             ParameterError: a number is not finite or not above 0, or a length leaves the limits of the class.
@@ -287,7 +288,7 @@ class Geometry:
     def replace(self, **changes: Any) -> Geometry:
         """A copy with some attributes changed; `lengths` and `assembly` may be partial mappings."""
         for name in ("lengths", "assembly"):
-            # what is no mapping is left to the checks of the class
+            # other types are left to the checks of the class
             if isinstance(changes.get(name), Mapping):
                 changes[name] = {**getattr(self, name), **changes[name]}
         return replace(self, **changes)

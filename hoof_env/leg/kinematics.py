@@ -144,7 +144,7 @@ def pose(
         frame: motion of the leg's frame; at rest at the origin if None.
 
     Raises:
-        ParameterError: an angle, rate or acceleration is not finite, or leg or frame are something else.
+        ParameterError: an angle, rate or acceleration is not finite, or leg or frame have another type.
     """
     theta = check_number("theta", theta)
     theta_rate, theta_acc = check_number("theta_rate", theta_rate), check_number("theta_acc", theta_acc)

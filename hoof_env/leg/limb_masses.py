@@ -1,12 +1,12 @@
 """Segment masses of a horse's fore and hind limb on the links of a leg.
 
-The masses are published and stand, with where they were read, in `hoof_env/data/limbs`. Which link carries
+The masses are published; `hoof_env/data/limbs` has them with their sources. Which link carries
 which segment is assumed there, for the mechanism of the paper: it has no bones. Links are taken from the hip
 down to the ground, as high as their centres are on average in the walk of `identified`;
 `docs/evidence/limb_masses.md` has them.
 
-All that counts as scapula, brachium or thigh hangs on the links. What a horse has above, such as muscles of
-the croup as far as they were weighed with the trunk, stays with the trunk: `trunk_mass`.
+Scapula, brachium and thigh are carried by the links. Parts above, such as muscles of the croup as far as they
+were weighed with the trunk, belong to the trunk: `trunk_mass`.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ from hoof_env.leg.mechanism_list import PAPER
 LIMBS = ("fore", "hind")
 
 BODY_MASS = 475.0
-"""Default mass of the animal [kg]. Shares of it are the same up to 600 kg (Nauwelaerts and others 2011)."""
+"""Default mass of the animal [kg]. Shares of it are the same up to 600 kg (Nauwelaerts et al. 2011)."""
 
 
 @cache
@@ -43,7 +43,7 @@ def segment_masses(limb: str, body_mass: float = BODY_MASS) -> dict[str, float]:
 
     Args:
         limb: "fore" or "hind".
-        body_mass: of the animal [kg]; the published masses are those of one of 538 kg, in proportion.
+        body_mass: of the animal [kg]; published for 538 kg, and proportional to it.
 
     Raises:
         ParameterError: another limb, or a mass that is not finite or not above 0.
@@ -75,7 +75,7 @@ def with_limb_masses(geometry: Geometry, limb: str, body_mass: float = BODY_MASS
         body_mass: of the animal [kg], as of `segment_masses`.
 
     Returns:
-        The leg, by the same name; `provenance` says whose masses it has.
+        The leg, by the same name; `provenance` has the source of its masses.
 
     Raises:
         ParameterError: another limb, a mass that is not finite or not above 0, or a leg of another mechanism

@@ -24,7 +24,7 @@ HOOF_LINK = "hoof"
 """Name of the link with the foot that touches the ground."""
 
 TAKEN = (FRAME_NAME, CRANK_LINK, HOOF_LINK, "world", "trunk", "swing", "x", "z", "pitch")
-"""Names of other parts and joints of a simulator's model."""
+"""Names that a simulator's model already uses for parts and joints."""
 
 Pins = dict[tuple[str, str, str], list[tuple[int, int]]]
 
@@ -56,7 +56,7 @@ class LinkTree:
             two = link_of[joint.j]
             if one == two:
                 continue  # the inside of a rigid link
-            # Seen from the other link the force has the other sign
+            # On the other link the force has the opposite sign
             if (joint.point, two, one) in pins:
                 pins[joint.point, two, one].append((row, -1))
             else:
@@ -70,8 +70,8 @@ class LinkTree:
 
     @cached_property
     def loops(self) -> tuple[tuple[str, str, str], ...]:
-        """Pins that close loops, those outside the tree. Of several links at a point, each pair that others
-        hold together there already is left out: it would be held twice."""
+        """Pins outside the tree, which close loops. Of several links at a point, a pair that other pins
+        already hold together there is left out, because it would be held twice."""
         held: dict[str, list[set[str]]] = {}
         for link, parent, point in self.tree:
             _join(held.setdefault(point, []), link, parent)
@@ -92,14 +92,14 @@ class LinkTree:
         return tuple(dict.fromkeys(point for body in bodies for point in body.all_points))
 
     def pin_forces(self, joints: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Return the forces at the pins [N], shape (..., pins, 2), from those at the joints, shape
+        """Return the forces at the pins [N], shape (..., pins, 2), from the forces at the joints, shape
         (..., joints, 2)."""
         signed = [sum(sign * joints[..., row, :] for row, sign in rows) for rows in self.pins.values()]
         return np.stack(signed, axis=-2)
 
 
 def link_tree(mechanism: Mechanism, merge: bool = True) -> LinkTree:
-    """Return the tree of a leg's links, each as few pins from the frame as can be.
+    """Return the tree of a leg's links, each as few pins from the frame as possible.
 
     Args:
         mechanism: structure of the leg.
@@ -125,7 +125,7 @@ def link_tree(mechanism: Mechanism, merge: bool = True) -> LinkTree:
 
 
 def _join(groups: list[set[str]], one: str, two: str) -> bool:
-    """Put the groups of two links together; return False if they are together already."""
+    """Merge the groups of two links; return False if they are already one group."""
     mine = next((group for group in groups if one in group), {one})
     others = next((group for group in groups if two in group), {two})
     if mine is others:
@@ -158,7 +158,7 @@ def _rigid_groups(mechanism: Mechanism) -> list[set[int]]:
     """Return the bodies in groups that cannot move against each other.
 
     Welded bodies are one group, and so are three groups that are pinned to each other in three points. Two
-    pins between two groups would hold more than there is to hold: `read_mechanism` refuses such a list.
+    pins between two groups would be redundant: `read_mechanism` refuses such a list.
     """
     groups = [set(part) for part in dict.fromkeys(mechanism.parts)]
     while (found := _rigid_triangle(mechanism, groups)) is not None:

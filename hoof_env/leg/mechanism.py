@@ -1,8 +1,8 @@
-"""The structure of a leg as a list: points in the order in which they are found, bodies, joints, feet.
+"""The structure of a leg as a list: points in solving order, bodies, joints, feet.
 
-A `Mechanism` is the structure alone. It is hashable, and kernels are made for it. Its lengths have names
-only; the numbers stand in `Geometry`, by these names. `mechanism_list.read_mechanism` reads and checks the
-list as it stands in a preset:
+A `Mechanism` is the structure alone. It is hashable, and kernels are made for it. Its lengths have only
+names, for which `Geometry` has the numbers. `mechanism_list.read_mechanism` reads and checks the list of a
+preset:
 
     {"fixed": ["O", "B"],                         the first is the centre of the crank
      "crank": {"point": "A", "length": "OA"},
@@ -13,12 +13,12 @@ list as it stands in a preset:
      "joints": [["O", "OA", "frame"], ["A", "AC", "OA"], ["C", "BC", "AC"], ["B", "BC", "frame"]],
      "feet": ["D"]}
 
-To read a mechanism: `points` names all points in solving order; `steps` says how each is found after the
-fixed points and the crank's pin; `bodies`, `joints` and `welds` are numbered from 0 in the order of the list;
-`tails` and `heads` are the numbers, among `points`, of the bodies' ends. A body's axes begin at its tail and
-point along to its head, across to the left of that. `Geometry` adds numbers, in the same orders:
-`body_lengths`, `body_masses`, `body_centres`, `body_inertias`, `fixed` (places of the fixed points), and
-`leg.pose` has the places of all points.
+To read a mechanism: `points` names all points in solving order; `steps` finds all points after the fixed
+points and the crank's pin; `bodies`, `joints` and `welds` are numbered from 0 in the order of the list;
+`tails` and `heads` are the numbers, among `points`, of the bodies' ends. A body's axes start at its tail:
+along points to its head, across to the left. `Geometry` adds numbers, in the same orders: `body_lengths`,
+`body_masses`, `body_centres`, `body_inertias`, `fixed` (places of the fixed points), and `leg.pose` has the
+places of all points.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ from functools import cached_property
 from typing import Any
 
 FRAME = -1
-"""Number that stands for the leg's frame among the bodies of a joint."""
+"""Number of the leg's frame among the bodies of a joint."""
 
 FRAME_NAME = "frame"
 """Name of the leg's frame in the list of joints."""
@@ -51,10 +51,10 @@ class Dyad:
 
 @dataclass(frozen=True)
 class BodyPoint:
-    """A point of a body, by its coordinates from the end `origin` of it.
+    """A point of a body, by its coordinates from the body's end `origin`.
 
     The axis along points from `origin` to the other end `toward`, across to the left of it. A coordinate is
-    the name of a length, "-" before it turns it round, "" is 0.
+    the name of a length, a leading "-" reverses it, "" is 0.
     """
 
     point: str
@@ -68,9 +68,9 @@ class BodyPoint:
 
 @dataclass(frozen=True)
 class Body:
-    """A rigid body with the ends `tail` and `head`, whose distance is the length of the name `length`.
+    """A rigid body with the ends `tail` and `head`, whose distance is the length named `length`.
 
-    `points` are its further points, `role` says what it is in the leg.
+    `points` are its further points, `role` is its function in the leg.
     """
 
     name: str
@@ -97,7 +97,7 @@ class Joint:
 
 @dataclass(frozen=True)
 class Group:
-    """The two rigid parts that meet in a dyad's point: bodies that are welded to each other are one part.
+    """The two rigid parts that meet in a dyad's point; bodies that are welded together are one part.
 
     `one` holds the dyad's first point, `two` its second; both are numbers of bodies.
     """
@@ -115,7 +115,7 @@ class Mechanism:
         fixed: points of the leg's frame; the first is the centre of the crank.
         pin: the point at which the crank carries the linkage.
         crank_length: name of the crank's length.
-        steps: how each further point is found from points before it.
+        steps: construction of each further point from points before it.
         bodies, joints, welds: of Eq. 2 in the order of its rows; a weld holds two bodies, which share a
             joint, in one orientation.
         feet: points that touch the ground, one or two.
@@ -168,12 +168,12 @@ class Mechanism:
 
     @property
     def pivots(self) -> tuple[str, ...]:
-        """The other fixed points."""
+        """The fixed points except the crank's centre."""
         return self.fixed[1:]
 
     @cached_property
     def points(self) -> tuple[str, ...]:
-        """Every named point, in the order in which they are found."""
+        """Every named point, in solving order."""
         return (*self.fixed, self.pin, *(step.point for step in self.steps))
 
     @cached_property
@@ -193,7 +193,7 @@ class Mechanism:
 
     @cached_property
     def lengths(self) -> tuple[str, ...]:
-        """Names of all lengths: those of the bodies first."""
+        """Names of all lengths, the bodies' lengths first."""
         named = [*self.body_lengths, self.crank_length]
         for step in self.steps:
             if isinstance(step, Dyad):
@@ -221,7 +221,7 @@ class Mechanism:
 
     @cached_property
     def parts(self) -> tuple[tuple[int, ...], ...]:
-        """The rigid part to which each body belongs: itself and what is welded to it."""
+        """The rigid part to which each body belongs: itself and the bodies welded to it."""
         part = [{i} for i in range(len(self.bodies))]
         for one, other in self.welds:
             whole = part[one] | part[other]
@@ -241,12 +241,12 @@ class Mechanism:
         return tuple(found)
 
     def is_corner(self, dyad: Dyad) -> bool:
-        """True if the points from which a dyad is found are at a distance that never changes."""
+        """Return whether the two points that define a dyad are at a constant distance."""
         return {dyad.first, dyad.second} <= {*self.fixed} or bool(self.bodies_with(dyad.first, dyad.second))
 
     @cached_property
     def plates(self) -> tuple[tuple[str, ...], ...]:
-        """Groups of three points or more at distances that never change: triangles of links, and bodies with
+        """Groups of three or more points at constant distances: triangles of links, and bodies with
         further points."""
         corners = [dyad for dyad in self.dyads if self.is_corner(dyad)]
         triangles = [(dyad.first, dyad.second, dyad.point) for dyad in corners]
@@ -254,20 +254,21 @@ class Mechanism:
 
     @cached_property
     def sole(self) -> tuple[str, ...]:
-        """The points that keep their distances from both of two feet."""
+        """The points at constant distances from both feet, if there are two."""
         if len(self.feet) < 2:
             return ()
         rigid = [{*plate} for plate in self.plates] + [{body.tail, body.head} for body in self.bodies]
 
-        def keeps(point: str) -> bool:
+        def is_rigid(point: str) -> bool:
             return all(any({point, foot} <= group for group in rigid) for foot in self.feet)
 
-        keep_each_other = any({*self.feet} <= group for group in rigid)
+        feet_are_rigid = any({*self.feet} <= group for group in rigid)
         others = [point for point in self.points if point not in self.feet]
-        return tuple(point for point in others if keep_each_other and keeps(point))
+        return tuple(point for point in others if feet_are_rigid and is_rigid(point))
 
     def body_of_foot(self, foot: str) -> int:
-        """Return the body that feels the ground in a foot: one with both feet, or the first that has it."""
+        """Return the body on which the ground acts in a foot: one with both feet, or the first with this
+        foot."""
         return (self.bodies_with(*self.feet) or self.bodies_with(foot))[0]
 
     def bodies_with(self, *points: str) -> list[int]:
@@ -275,6 +276,6 @@ class Mechanism:
         return [i for i, body in enumerate(self.bodies) if {*points} <= {*body.all_points}]
 
     def at(self, point: str) -> list[int]:
-        """Return the bodies that joints tie to each other at a point, `FRAME` among them."""
+        """Return the bodies that joints connect at a point, possibly `FRAME`."""
         pairs = [(joint.i, joint.j) for joint in self.joints if joint.point == point]
         return list(dict.fromkeys(number for pair in pairs for number in pair))

@@ -1,4 +1,4 @@
-"""Reads the list of a mechanism, as it stands in a preset, and checks it with words."""
+"""Parse and validate the mechanism section of a preset."""
 
 from __future__ import annotations
 
@@ -21,8 +21,7 @@ def read_mechanism(given: Any) -> Mechanism:
     """Read and check the list of a mechanism, see `hoof_env.leg.mechanism`.
 
     Raises:
-        ParameterError: an entry is missing, unknown or at odds with another; it is named, with what would
-            mend it.
+        ParameterError: an entry is missing, unknown or inconsistent; the message has its name and the remedy.
     """
     keys = _entries("mechanism", given, PARTS, OPTIONAL_PARTS)
     fixed = _names("mechanism.fixed", keys["fixed"])
@@ -70,8 +69,8 @@ def read_mechanism(given: Any) -> Mechanism:
 
 
 def split_solids(given: Any) -> tuple[Any, dict[str, dict[str, Any]], dict[str, str]]:
-    """Return a list without the numbers of its bodies, these by the names of the bodies, and the entries from
-    which they are, for errors. What is no list is returned as it is, for `read_mechanism` to refuse."""
+    """Return a list without the numbers of its bodies, these numbers by body, and their entries for errors.
+    Any other value is returned unchanged, for `read_mechanism` to refuse."""
     bodies = given.get("bodies") if isinstance(given, Mapping) else None
     if not isinstance(bodies, (list, tuple)):
         return given, {}, {}
@@ -134,7 +133,7 @@ def _read_dyad(
 
 
 def _check_found(where: str, told: str, names: Iterable[str], known: Mapping[str, None]) -> None:
-    """Check that a point stands after the points from which it is found."""
+    """Check that a point is listed after the points that define it."""
     for name in names:
         if name not in known:
             raise ParameterError(
@@ -172,7 +171,7 @@ def _read_body_point(
 
 
 def _measured(read: Mapping[str, Any], known: Mapping[str, None], distances: Any) -> Body:
-    """Return a body whose points are known and whose length is the distance of its ends."""
+    """Return a body whose points are known and whose length is the distance between its ends."""
     body: Body = read["body"]
     for name in body.all_points:
         if name not in known:
@@ -259,7 +258,7 @@ def _check_crank(mechanism: Mechanism) -> None:
 
 
 def _check_joints(mechanism: Mechanism) -> None:
-    """Check that the joints at each point tie its bodies to each other once."""
+    """Check that the joints at each point connect its bodies exactly once."""
     for one, other in mechanism.welds:
         if not any({one, other} == {joint.i, joint.j} for joint in mechanism.joints):
             names = f"{mechanism.bodies[one].name!r} and {mechanism.bodies[other].name!r}"
@@ -344,7 +343,7 @@ def _list(where: str, given: Any) -> Sequence[Any]:
 def _name(where: str, given: Any) -> str:
     if not isinstance(given, str) or not given or given.startswith("-"):
         raise ParameterError(f"{where}: expected a name, got {given!r}")
-    # Names become columns of files, whose headers separate them by these.
+    # Names become columns of files, with these characters as separators.
     if not given.isprintable() or any(letter in given for letter in ',;"'):
         raise ParameterError(
             f"{where}: expected a name that prints, without comma, semicolon and quotes, got {given!r}"
@@ -381,6 +380,6 @@ Flesh = tuple[str, str, float, float]
 
 def flesh_of(mechanism: Mechanism) -> list[Flesh]:
     """Return the flesh around the links where a horse's leg has its bones: from point, to point, radius at
-    both ends [m]; none of other mechanisms than the paper's."""
+    both ends [m]; empty for any mechanism except the paper's."""
     flesh = _paper()["flesh"] if mechanism == PAPER else []
     return [(tail, head, float(one), float(other)) for tail, head, one, other in flesh]

@@ -1,14 +1,13 @@
 """Legs as models of MuJoCo (MJCF): hinges, closed loops, masses, feet, motors, a trunk and a ground.
 
-The world's x points forward and its z up; what this package calls y is z there. Links are bodies of one tree,
-and loops are closed by `connect` constraints. URDF has no loops and cannot hold such a leg. Coordinates of
-the model are this package's where both have them: `crank` and `swing` are their angles, `x` and `z` the place
-of O; hinges of all other links are 0 in the pose that is written, counter-clockwise if seen with x to the
-right.
+The world's x points forward and its z up; this package's y is z there. Links are bodies of one tree, and
+loops are closed by `connect` constraints. URDF has no loops and cannot hold such a leg. Coordinates of the
+model agree with this package's where both exist: `crank` and `swing` are their angles, `x` and `z` the place
+of O; hinges of all other links are 0 in the exported pose, counter-clockwise if seen with x to the right.
 
 MuJoCo's constraints are springs: with its defaults, a loop can be pulled through a dead point into another
-assembly. Here their time constant is two time steps, the stiffest that MuJoCo lets stand, and their impedance
-0.9999, its largest. Its contact is no viscoelastic law of force: of the ground only friction is written.
+assembly. Here their time constant is two time steps, the smallest that MuJoCo accepts, and their impedance
+0.9999, its largest. Its contact is not a viscoelastic force law, so only the ground's friction is exported.
 """
 
 from __future__ import annotations
@@ -47,7 +46,7 @@ SWING_DAMPING = 400.0
 """Damping of the servo that holds the swing [N m s/rad]."""
 
 LIGHT = 1e-6
-"""Mass [kg] and inertia [kg m^2] of the frame that swings, which has none of its own but must have some."""
+"""Placeholder mass [kg] and inertia [kg m^2] of the massless swing frame; MuJoCo requires positive values."""
 
 SLIDES = {"fixed": (), "rail": ("x",), "suspended": ("x", "z"), "free": ("x", "z", "pitch")}
 """Coordinates that each kind of trunk has."""
@@ -121,8 +120,8 @@ class PlacedLeg:
         hip: place of O from the trunk's point [m].
         motor: drive of the crank; without one the crank turns freely.
         armature: further inertia of the crank [kg m^2].
-        label: follows the names of the leg's parts.
-        tree: its links; None is that of as few links as can be.
+        label: suffix of the names of the leg's parts.
+        tree: its links; by default as few as possible.
     """
 
     geometry: Geometry
@@ -140,7 +139,7 @@ class Options:
     """Choices about a model.
 
     Attributes:
-        timestep: of the simulation [s].
+        timestep: step of the simulation [s].
         option: attributes of MuJoCo's `option`, such as the integrator.
         loop_seconds: time constant of the loops [s]; two time steps if None.
         floor: add a ground at the height 0 with this coefficient of friction, which feet can touch.
@@ -377,7 +376,7 @@ def _add_feet(
 def _add_motor(
     parts: dict[str, ET.Element], leg: PlacedLeg, motor: MotorLike, pitches: bool, swings: bool
 ) -> None:
-    """Add the servo of a crank, and the rotor where it turns with what carries it."""
+    """Add the servo of a crank, and the rotor if it turns with its carrier."""
     top = _text(motor.torque_limit)
     ET.SubElement(
         parts["actuator"],
@@ -414,7 +413,7 @@ def _solid(
 
 
 def _add_inertia(body: ET.Element, centre: complex, mass: float, inertia: float) -> None:
-    # The motion is planar: inertias about the other axes are free, and these are those of a ball
+    # The motion is planar: inertias about the remaining axes are arbitrary: a ball's
     diagonal = " ".join([_text(inertia)] * 3)
     ET.SubElement(body, "inertial", pos=_place(centre), mass=_text(mass), diaginertia=diagonal)
 

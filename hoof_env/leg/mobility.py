@@ -1,7 +1,7 @@
-"""Check that a leg turns, that its bodies move as its points do, and that nothing else moves.
+"""Check that a leg turns, that its bodies move with its points, and that no other motion is possible.
 
-A list may have as many rows as coordinates and still leave one body free while it holds another twice, or
-name a point of a body that goes its own way. The numbers of a leg tell: `check_motion` looks at some angles.
+A list may have as many rows as coordinates and still leave one body free and hold another twice, or name a
+point of a body that moves independently. `check_motion` tests the leg's numbers at some angles.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ SAMPLES = 360
 """Number of crank angles at which the points are found."""
 
 RANKED = 8
-"""Number of these, at most, at which the rows are looked at: a row may depend on others at single angles."""
+"""Largest number of these at which the rows' rank is computed: at single angles rows may be dependent."""
 
 ROUNDING = 1e-8
 """Part of a length, or of the largest singular value, that is rounding."""
@@ -44,10 +44,10 @@ class _Motion:
 
 
 def check_motion(geometry: Geometry) -> None:
-    """Raise `GeometryError` unless a leg turns fully, if it must, the points of each body keep their places
-    on it, and the rows of joints, welds and crank leave no body free.
+    """Raise `GeometryError` unless a leg turns fully, if it must, the points of each body are fixed on it,
+    and the rows of joints, welds and crank leave no body free.
 
-    Bodies of the paper's mechanism are not looked at, nor are those of a leg that no angle assembles.
+    Bodies of the paper's mechanism, and of a leg that assembles at no angle, are not checked.
     """
     motion = _Motion(
         geometry.mechanism,
@@ -65,7 +65,7 @@ def check_motion(geometry: Geometry) -> None:
         _check_once(motion)
 
 
-# Each environment makes its leg anew, and most legs were checked before. An error is not kept: it is raised
+# Each environment makes a new leg, and most legs were checked before. An error is not cached: it is raised
 # each time.
 @lru_cache(maxsize=32)
 def _check_once(motion: _Motion) -> None:
@@ -120,7 +120,7 @@ def _check_rows(mechanism: Mechanism, z: NDArray[np.complex128]) -> None:
 
 def _rows(mechanism: Mechanism, z: NDArray[np.complex128]) -> NDArray[np.float64]:
     """Return the matrices of joints, welds and crank for the velocities (x, y, angle) of all bodies, where x
-    and y are those of the body's part that passes the crank's centre; shape (angles, rows, rows)."""
+    and y are of the body's point at the crank's centre; shape (angles, rows, rows)."""
     size = 3 * len(mechanism.bodies)
     matrix = np.zeros((len(z), size, size))
     for row, joint in enumerate(mechanism.joints):

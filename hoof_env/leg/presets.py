@@ -1,7 +1,7 @@
-"""Files of legs: presets of this package, by name, and others of the same form.
+"""Files of legs: presets of this package by name, and files of the same form.
 
-Presets are JSON files with a provenance line. The default one is *identified* from the paper's results, for
-the paper prints no lengths.
+Presets are JSON files with a provenance line. The default one is *identified* from the paper's results,
+because the paper prints no lengths.
 """
 
 from __future__ import annotations

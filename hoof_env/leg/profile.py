@@ -1,11 +1,11 @@
 """Functions of the crank angle that determine a leg's motion, as polynomials for the fast engine.
 
-Nothing about the linkage enters the equations of motion but a few functions of the crank angle: where toe and
-heel are, the first moment of the links about O, and three inertias. `LegProfile` computes them from the
-closed form of `leg.kinematics` and keeps each as one polynomial of degree 5 a cell of crank angle. A
-polynomial costs neither square root nor division, and all functions share one look-up. Values are good to
-some 1e-12, derivatives to `derivative_error` (below 1e-9) of their largest value; both are worse where links
-come near a dead point, which no leg that ships does.
+The linkage enters the equations of motion only by a few functions of the crank angle: places of toe and heel,
+the first moment of the links about O, and three inertias. `LegProfile` computes them from the closed form of
+`leg.kinematics` and stores each as one polynomial of degree 5 per cell of crank angle. A polynomial costs
+neither square root nor division, and all functions share one look-up. Values are good to some 1e-12,
+derivatives to `derivative_error` (below 1e-9) of their largest value; both are worse where links come near a
+dead point, which the legs of this package do not.
 
 Everything is in the frame of the leg with O at the origin, after the mirror into the world's sense
 (`kinematics.mirror`), so that the world's x points forward and angles are counter-clockwise.
@@ -36,7 +36,7 @@ class Functions(Layout):
 
     toe: Vector  # [m]
     heel: Vector  # [m]
-    moment_slope: Vector  # s', a function of its own, for its derivative must be good [kg m]
+    moment_slope: Vector  # s', stored separately for an accurate derivative [kg m]
     crank_inertia: Row  # a, of the crank's turning alone: sum of m |z'|^2 + J alpha'^2 [kg m^2]
     coupling: Row  # b, of crank and frame: sum of m z x z' + J alpha' [kg m^2]
     first_moment: Vector  # s: sum of m z over the links [kg m]
@@ -55,7 +55,7 @@ class Slopes(Layout):
 
 
 FUNCTIONS, SLOPED = Functions.size, Slopes.size
-"""Number of functions, and of those that have derivatives."""
+"""Number of functions, and number of functions with derivatives."""
 
 TURN = 2 * np.pi
 WHOLE = 2.0**52  # added to a whole number it leaves it in the last bits
@@ -68,14 +68,14 @@ def by_name(values: NDArray[np.float64]) -> dict[str, NDArray[np.float64]]:
 
 DEGREE = 5
 CELLS = (1024, 1280, 1536, 2048, 3072, 4096, 6144)
-"""Numbers of cells that are tried."""
+"""Candidate numbers of cells."""
 
-MOST_CELLS = 2**16
-"""Largest number of cells that may be asked for."""
+MAX_CELLS = 2**16
+"""Largest number of cells."""
 
 SAMPLED = 16
-"""Number of cells of which one is fitted first: where its derivatives are not good enough, the others of that
-number of cells need no fit."""
+"""Interval of the cells that are fitted first: if their derivatives are not good enough, the remaining cells
+are not fitted."""
 
 BETWEEN = np.array([-0.4999, -0.23, 0.06, 0.31, 0.4999])
 """Angles between the nodes at which derivatives are compared, from the middle of a cell in cells."""
@@ -83,14 +83,14 @@ BETWEEN = np.array([-0.4999, -0.23, 0.06, 0.31, 0.4999])
 ROW = float(FUNCTIONS * (DEGREE + 1))  # numbers in a row of the table
 
 PIECE = 2048
-"""Number of angles whose functions are computed at once: many more take twice as long an angle."""
+"""Number of angles whose functions are computed at once: many more take twice as long per angle."""
 
 ROWS = 256
 """Number of rows that BLAS multiplies at once."""
 
 DERIVATIVE_ERROR = 1e-9
-"""The number of cells is the smallest that keeps derivatives this good, relative to their largest value, or
-the largest where none does."""
+"""Error of derivatives over their largest value that determines the number of cells: the smallest candidate
+that satisfies it, else the largest."""
 
 
 def places(geometry: Geometry, theta: NDArray[np.float64]) -> tuple[NDArray[np.complex128], ...]:
@@ -112,7 +112,7 @@ def functions(
 
 
 def _piece(geometry: Geometry, theta: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Return what `functions` does, of angles that are few enough for the processor's cache."""
+    """Return `functions` at angles that are few enough for the processor's cache."""
     z, dz, ddz = places(geometry, theta)
     m, inertia = geometry.body_masses, geometry.body_inertias
     mechanism = geometry.mechanism
@@ -160,20 +160,20 @@ class LegProfile:
         cells: number of cells of a revolution.
         table: shape (cells, (DEGREE + 1) * FUNCTIONS): row j belongs to the crank angles within half a cell
             of 2 pi j / cells and holds the coefficients, highest power of the angle from there first, of the
-            functions that have derivatives and then of the others. Of a crank that rocks, rows are NaN where
-            its links have no place, and within about a degree of each end, for derivatives grow there without
-            bound.
+            functions with derivatives and then of the remaining ones. Of a crank that rocks, rows are NaN
+            where its links have no place, and within about a degree of each end, because derivatives are
+            unbounded there.
         derivative_error: largest error of a derivative over its largest value, between the nodes [-].
 
     Raises:
-        ParameterError: no leg, or no number of cells.
+        ParameterError: not a leg, or not a number of cells.
         GeometryError: the links have no place at some crank angle, or at any if the leg need not turn fully.
     """
 
     def __init__(self, geometry: Geometry, cells: int | None = None) -> None:
         self.geometry = one_of("geometry", geometry, Geometry)
         finest = CELLS if geometry.full_turn else CELLS[-1:]  # a rocking crank: as near to its ends as can be
-        for tried in finest if cells is None else (count("cells", cells, most=MOST_CELLS),):
+        for tried in finest if cells is None else (count("cells", cells, most=MAX_CELLS),):
             self.cells = tried
             is_last = cells is not None or tried == finest[-1]
             if not is_last and self._is_too_coarse():
@@ -205,14 +205,14 @@ class LegProfile:
     def _is_too_coarse(self) -> bool:
         """Return whether derivatives in one of every `SAMPLED` cells are twice as bad as is allowed.
 
-        Twice, for the sample may miss the largest derivatives, to which errors are relative.
+        Twice, because the sample may miss the largest derivatives, to which errors are relative.
         """
         chosen = np.arange(0, self.cells, SAMPLED)
         x = BETWEEN * (2 * np.pi / self.cells)
         theta = (chosen[:, None] + BETWEEN).ravel() * (2 * np.pi / self.cells)
         _, exact = functions(self.geometry, theta)
         if not np.isfinite(exact).all():
-            return False  # the fit of all cells says where the links have no place
+            return False  # the fit of all cells finds where the links have no place
         rows = _fit(self.geometry, chosen, self.cells).repeat(len(x), axis=0)
         _, slope = _evaluate(rows, np.tile(x, len(chosen))[:, None])
         return bool((np.abs(slope - exact) / np.abs(exact).max(0)).max() >= 2 * DERIVATIVE_ERROR)
@@ -280,9 +280,9 @@ def _fit(geometry: Geometry, chosen: NDArray[np.int64], cells: int) -> NDArray[n
     return table
 
 
-# The look-up: functions side by side, for each lane by itself, since each has a row of its own; then rows and
-# columns are swapped. Horner's scheme with fused operations takes one instruction a power for the value and
-# one for the derivative. Each waits for the one before, so the lanes go through the powers together.
+# The look-up: functions side by side, lane by lane, since each lane has its own row; then rows and columns
+# are swapped. Horner's scheme with fused operations takes one instruction a power for the value and one
+# for the derivative. Each waits for the one before, so the lanes go through the powers together.
 
 
 def _polynomials(rows: list[Any], angles: list[Any], first: int, last: int) -> tuple[Any, Any]:
@@ -313,11 +313,11 @@ def _polynomials(rows: list[Any], angles: list[Any], first: int, last: int) -> t
 def locate(leg: Any, cells: Lanes | float) -> None:
     """Find in which of `cells` of its table the crank angle of a leg is, and how far from its middle.
 
-    To be asked some while before `look_up`, which waits for the answer. What is not a number is in some cell,
-    not a number from its middle."""
+    Called some time before `look_up`, which waits for the result. NaN is in some cell, at a distance of NaN
+    from its middle."""
     angle = leg.theta
     cell = steady(angle * (cells / TURN) + ROUNDER) - ROUNDER
-    # Cell 0 begins before its turn does: its row is there again at the end of the table.
+    # Cell 0 starts before its turn: its row is repeated at the end of the table.
     row = cell - cells * floor(angle * (1 / TURN))
     row = minimum(cells, where(row > 0.0, row, 0.0))  # not `maximum`: NaN is in cell 0
     leg.row_begin = (row + leg.settings.first_row) * ROW + WHOLE
@@ -325,8 +325,8 @@ def locate(leg: Any, cells: Lanes | float) -> None:
 
 
 def look_up(leg: Any, table: Pointer) -> None:
-    """Fill a leg's functions and slopes, see `Functions`, where `locate` found its crank angle to be; what is
-    not a number gives values that are none."""
+    """Fill a leg's functions and slopes, see `Functions`, in the cell that `locate` found; NaN
+    for an angle of NaN."""
     machine, fields, lanes = CURRENT.machine, leg._layout.fields, max(leg._n, 1)
     values, slopes = fields["functions"].start, fields["slopes"].start
     if machine.runs_now:
@@ -337,7 +337,7 @@ def look_up(leg: Any, table: Pointer) -> None:
         first = leg._at(fields[name].start)
         return [machine.load(machine.at(first, per_lane * lane, kind), kind) for lane in range(lanes)]
 
-    # What was added to the number of a row's first element is in the upper half of its bits.
+    # The constant added to the number of a row's first element is in the upper half of its bits.
     begins = [machine.widened(begin) for begin in loaded("row_begin", "i32", 2)]
     places = [table + Index(begin) for begin in begins]
     angles = [Lanes(x, 0) for x in loaded("cell_angle", "double", 1)]

@@ -78,7 +78,7 @@ def head(figure: Any, height: float, reproduction: Reproduction, title: str, gro
         height: its height [inch].
         reproduction: the reproduction, for the name of its preset.
         title: first line.
-        ground: condition of the ground, for the second line, which also says that the leg is identified.
+        ground: condition of the ground, for the second line, after the note that the leg is identified.
         note: third line.
     """
     figure.set_size_inches(WIDTH, height)

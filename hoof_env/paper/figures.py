@@ -122,7 +122,7 @@ def _draw_hoof_paths(ax: Any, trace: Trace) -> None:
         ax.plot(x, y, color=colour, lw=0.9, label=f"path of the {name}", zorder=4)
         ground = np.where(y < 0, y, np.nan)
         ax.plot(x, ground, color=colour, lw=2.4, label=f"{name} in the ground", zorder=5)
-        # The arrow stands at the highest point, where it hides nothing near the ground.
+        # The arrow is at the highest point, where it does not hide the ground.
         k = int(np.argmax(y))
         tip = min(k + len(x) // 200, len(x) - 1)
         draw_arrow(ax, (x[k], y[k]), (x[tip], y[tip]), colour)
@@ -221,7 +221,7 @@ DASHED = (0, (3, 2))
 def draw_forces(figure: Any, reproduction: Reproduction) -> None:
     """Draw figure 5: force of the ground over time in the four conditions, with sub-phases, simulated peaks,
     published peaks at the times of the simulated ones, and published instants of contact on the time axis;
-    means over the cycle stand at the side."""
+    means over the cycle are at the side."""
     note = "Bars: margin of each determinable row. Peaks have no time in print: marks at the simulated ones."
     head(figure, 4.2, reproduction, "Figure 5. Ground reaction force", "elastic and inelastic", note)
     axes = figure.subplots(1, 4, width_ratios=(9, 2, 9, 2)).reshape(2, 2)

@@ -1,8 +1,8 @@
-"""How far the published rows depend on the ground level, which decides what a row can say about a leg.
+"""Dependence of the published rows on the ground level, which decides whether a row tests a leg.
 
-The paper prints no ground level that can be meant, so the level was fitted with the leg. A row that moves by
-more than its bar as the ground moves by up to `SHIFTS` is not determinable: its agreement says where the
-search put the ground, and nothing about the leg. These rows are `rows.NOT_DETERMINABLE`.
+The paper prints no plausible ground level, so the level was fitted with the leg. A row that moves by
+more than its bar as the ground moves by up to `SHIFTS` is not determinable: its agreement tests the
+fitted ground level, not the leg. These rows are `rows.NOT_DETERMINABLE`.
 """
 
 from __future__ import annotations

@@ -84,7 +84,8 @@ def draw_mechanism(figure: Any, reproduction: Reproduction) -> None:
 
 
 def _draw_links(ax: Any, at: dict[str, Point], *, close: bool) -> None:
-    """Draw all links; number those of the hoof in the close view, and the others in the view of the leg."""
+    """Draw all links; number the hoof's links in the close view, and the remaining links in the view of the
+    leg."""
     # The legend has the numbers of all links with the same role.
     numbers: dict[str, str] = {}
     for number, body in enumerate(PAPER.bodies, start=1):

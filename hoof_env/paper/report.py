@@ -33,9 +33,9 @@ WORST = 3
 """Number of rows of each solver that are named as its worst."""
 
 PAGE = Path(__file__).with_name("report.md.in")
-"""Template of the page; its numbers and tables begin with $."""
+"""Template of the page; its numbers and tables start with $."""
 
-# Digits behind the decimal point by unit or by measure of a bar.
+# Decimal places by unit or by measure of a bar.
 _DIGITS = {"s": 4, "deg": 2, "N": 1, "%": 2, "-": 3, "point": 2, "": 3}
 _PACKAGES = ("gymnasium", "numpy", "llvmlite")
 
@@ -90,7 +90,7 @@ def _of(entries: Iterable[Mapping[str, Any]], **wanted: str) -> list[Any]:
 
 
 def format_number(value: float | None, unit: str, sign: str = "") -> str:
-    """Return a number with the digits of its unit, "none" for None; with `sign` "+" its sign is shown."""
+    """Return a number with the digits of its unit, "none" for None; with the sign if `sign` is "+"."""
     return "none" if value is None else f"{value:{sign}.{_DIGITS[unit]}f}"
 
 
@@ -128,7 +128,7 @@ def _rows_table(reproduction: Reproduction, solvers: list[str]) -> str:
         for solver in solvers:
             (row,) = _of(reproduction.rows, id=published.id, solver=solver)
             error = format_error(row, reproduction)
-            # `within_bar` is None, and not False, for a row that is spared.
+            # `within_bar` of a spared row is None, not False.
             if row["within_bar"] is False:
                 error += " ✗"
             elif row["spared"] == UNDETERMINED:
@@ -143,7 +143,7 @@ def _rows_table(reproduction: Reproduction, solvers: list[str]) -> str:
 
 
 def _undetermined(reproduction: Reproduction) -> str:
-    """Return the section on rows that are not determinable, "" if there are none."""
+    """Return the section on rows that are not determinable, "" without such rows."""
     spared = list(dict.fromkeys(row["id"] for row in _of(reproduction.rows, spared=UNDETERMINED)))
     if not spared:
         return ""
@@ -194,7 +194,7 @@ def _limit(reproduction: Reproduction, name: str) -> float:
 
 
 def _details_table(reproduction: Reproduction) -> str:
-    """Return the table of figures beside the published ones, by gait."""
+    """Return the table of figures that the paper does not print, by gait."""
     by_name: dict[str, list[str]] = {}
     gaits = list(dict.fromkeys(entry["id"].partition(".")[0] for entry in reproduction.details))
     for entry in reproduction.details:
@@ -205,8 +205,8 @@ def _details_table(reproduction: Reproduction) -> str:
 
 
 def _resultants(reproduction: Reproduction, solvers: list[str]) -> str:
-    """Return how many rows are within their bars under the reading of 'maximum force' that is used, and under
-    the other one, which is the resultant."""
+    """Return the number of rows within their bars under the used reading of 'maximum force' and under the
+    alternative, the resultant."""
     parts = []
     for solver in solvers:
         readings = []
@@ -233,8 +233,8 @@ def _beside_table(reproduction: Reproduction, solvers: list[str]) -> str:
 
 
 def _shape(reproduction: Reproduction, claim_id: str, figures: bool) -> str:
-    """Return a paragraph on a claim about shape, with the verdict of each solver; where all agree, with what
-    the last one shows."""
+    """Return a paragraph on a claim about shape, with the verdict of each solver; if all agree, with the
+    evidence of the last."""
     entries = _of(reproduction.shapes, id=claim_id)
     first = entries[0]
     lines = [f"**`{claim_id}`**: {first['claim']}"]
@@ -294,7 +294,7 @@ def which_beta(reproduction: Reproduction) -> dict[str, str]:
             f"{1e3 * a:.2f} mm, {1e3 * b:.2f} mm in stance ({name} β)," for name, (a, b) in drifts.items()
         ),
         "within": listed(f"{sum(rows)} of {len(rows)} ({name} β)" for name, rows in judged.items()),
-        # Both readings of beta share the leg, so that none, one or both can meet all rows.
+        # Both readings of beta share the leg, so that zero, one or both can meet all rows.
         "verdict": {
             0: "This leg meets all of these with neither",
             1: f"This leg meets all of these with the {met[0] if met else ''} β only",
@@ -312,7 +312,7 @@ def largest_drift(reproduction: Reproduction, solver: str) -> tuple[float, float
         trace = reproduction.traces[gait, "elastic", solver]
         exact = reproduction.traces[gait, "elastic", EXACT]
         error = hoof_error(trace, exact)
-        # The exact stance for all solvers: drift would move the contacts of the other.
+        # The exact stance for all solvers: drift would move the contacts of an inexact one.
         on_ground = measure_stance(exact)
         inside = (trace["time"] >= on_ground.start) & (trace["time"] <= on_ground.end)
         cycle.append(float(error.max()))

@@ -52,7 +52,7 @@ def run_cycle(gait: str, solver: str, **settings: Any) -> Trace:
     Args:
         gait: "walk" or "run".
         solver: one of `SOLVERS`.
-        **settings: other arguments of the environment.
+        **settings: further arguments of the environment.
 
     Returns:
         A row for t = 0 and one for each substep.
@@ -82,10 +82,10 @@ def reproduce(progress: Callable[[str], None] | None = None, *, preset: str | No
 
     Args:
         progress: function that is called with one line of text after each run.
-        preset: name or file of a geometry; None takes the environment's default.
+        preset: name or file of a geometry; None for the environment's default.
 
     Raises:
-        ParameterError: the preset is no leg of the paper's mechanism, or lacks its gaits.
+        ParameterError: the preset is not a leg of the paper's mechanism, or lacks its gaits.
     """
     tell = progress or (lambda line: None)
     settings: dict[str, Any] = {} if preset is None else {"preset": preset}
@@ -132,7 +132,7 @@ def stances_at(hip_height: float, **settings: Any) -> dict[tuple[str, str], Stan
 
     Args:
         hip_height: height of the hip above the ground [m]; ground that rises lowers it.
-        **settings: other arguments of the environment.
+        **settings: further arguments of the environment.
     """
     return {
         (gait, condition): measure_stance(
@@ -195,7 +195,7 @@ def write_reproduction(
 
     Args:
         reproduction: the reproduction.
-        out_dir: the folder, which is made if it is missing.
+        out_dir: the folder, created if missing.
         figures: True draws the figures (needs matplotlib).
         command: command that is named in `reproduction.md`.
 

@@ -47,7 +47,7 @@ class Bar:
     measure: str
 
     def error(self, simulated: float, published: float) -> float:
-        """Return the signed error in the bar's own measure."""
+        """Return the signed error in the bar's measure."""
         difference = simulated - published
         return 100 * difference / published if self.measure == "%" else difference
 
@@ -113,7 +113,7 @@ class PublishedRow:
 
 @dataclass(frozen=True)
 class Claim:
-    """Claim of the paper about shape: `id`, the `claim` in words, and the `reading` that is taken, or ""."""
+    """Claim of the paper about shape: `id`, the text of the `claim`, and the used `reading`, or ""."""
 
     id: str
     claim: str
@@ -135,8 +135,8 @@ class Published:
 
 
 def load_published(path: Path | None = None) -> Published:
-    """Read the published numbers from a file, by default those of this package; raise `DataFileError` if the
-    file cannot be read, is incomplete, or has an id twice."""
+    """Read the published numbers from a file, by default the file of this package; raise `DataFileError` if
+    the file cannot be read, is incomplete, or has an id twice."""
     file: Any = path or resources.files("hoof_env.paper").joinpath("published.json")
     try:
         data = json.loads(file.read_text(encoding="utf-8"))
@@ -237,8 +237,8 @@ class Quantity:
     """Measure of a published row.
 
     Attributes:
-        value: function of the stance in the row's condition (elastic if it has none) and in the other one.
-        definition: definition of the value in words.
+        value: function of the stances in the row's condition (by default elastic) and in the opposite one.
+        definition: text that defines the value.
         other_readings: function of the same stances that returns values under other readings, by name.
     """
 
@@ -308,8 +308,8 @@ def compare(published: Published, stances: Stances, solver: str) -> list[dict[st
 def counted(rows: Iterable[Mapping[str, Any]], shapes: Iterable[Mapping[str, Any]], solver: str) -> str:
     """Return a sentence with the numbers of a solver's rows within their bars and of claims that hold.
 
-    Rows that are not determinable are counted apart, and so are checks of our own beside the paper's claims;
-    claims that hold in another reading than the printed one are told.
+    Rows that are not determinable, and checks that are not claims of the paper, are counted separately;
+    claims that hold in a reading other than the printed one are named.
     """
     own_rows = [row for row in rows if row["solver"] == solver]
     verdicts = [row["within_bar"] for row in own_rows if not row["spared"]]
@@ -362,7 +362,7 @@ def _compare(row: PublishedRow, stances: Stances, solver: str) -> dict[str, Any]
 
 def _measure(row: PublishedRow, stances: Stances) -> tuple[float | None, str, dict[str, Any]]:
     """Return the simulated value of a row, its definition, and values under other readings by name."""
-    # The only row of both gaits; all others compare conditions of one gait.
+    # The only row of both gaits; every other row compares conditions of one gait.
     if row.id == "ratio.angle_variation":
         run = stances["run", "elastic"]
         walk = stances["walk", "elastic"]

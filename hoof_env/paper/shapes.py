@@ -7,7 +7,7 @@ move an animal forward: it contradicts `walk.walks`. The arrows may also be the 
 ground (`HOOF_ON_GROUND`): they point back while the ground pushes the leg forward. Both readings get a
 verdict. The claim is counted by the reading that the net impulse of the walking stance leaves possible
 (`walk_brakes`), which is the same for every solver. A walk that brakes in one half of stance and propels in
-the other fulfils neither reading.
+the second fulfils neither reading.
 """
 
 from __future__ import annotations

@@ -2,7 +2,7 @@
 
 q holds (x, y, th) of the bodies of the leg's mechanism in the frame of the paper's drawing: O at the origin,
 crank turning clockwise. The leg's frame, which carries the pivot C and turns by phi about O, is treated as
-one more body whose motion is prescribed. So one expression serves every joint, and the Jacobian's column of
+a further body with prescribed motion, so that one expression serves every joint, and the Jacobian's column of
 the frame's orientation is d Phi / d phi.
 """
 
@@ -29,7 +29,7 @@ class Closure(NamedTuple):
     error_rate: Vector  # Phi_q qd + Phi_t
     jacobian: Vector  # Phi_q, square (Eq. 3)
     by_phi: Vector  # d Phi / d phi; d Phi / d theta is 1 in the driver's row and 0 elsewhere
-    gamma: Vector  # what Phi_q qdd must be, -(Phi_q qd)_q qd - 2 Phi_qt qd - Phi_tt
+    gamma: Vector  # required Phi_q qdd: -(Phi_q qd)_q qd - 2 Phi_qt qd - Phi_tt
 
 
 class Constraints:
@@ -39,7 +39,7 @@ class Constraints:
     def __init__(self, geometry: Geometry) -> None:
         mechanism = geometry.mechanism
         joints = mechanism.joints
-        self.size = 3 * len(mechanism.bodies)  # of coordinates and of equations: nothing is free
+        self.size = 3 * len(mechanism.bodies)  # of coordinates and of equations, which are equal in number
         self.joint_rows = 2 * len(joints)
         self.driver_row = self.size - 1
         self.crank = mechanism.crank

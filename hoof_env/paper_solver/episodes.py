@@ -17,7 +17,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from hoof_env.dynamics.engine import TrunkEngine
 from hoof_env.dynamics.layout import LEG_REPORT, LEG_STATE, TRUNK_REPORT, TRUNK_STATE, stride_sums
-from hoof_env.dynamics.memory import LIFT_OFF, which
+from hoof_env.dynamics.memory import LIFT_OFF, env_indices
 from hoof_env.dynamics.observables import StanceCounter
 from hoof_env.dynamics.parts import Result
 from hoof_env.errors import ParameterError
@@ -76,7 +76,7 @@ def check_settings(settings: Any) -> None:
     }
     for name, expected in only.items():
         value = getattr(settings, name)
-        # An empty mapping is as good as None.
+        # An empty mapping is equivalent to None.
         if value != expected and not (expected is None and not value):
             raise ParameterError(f'{name}: expected {expected!r} with solver="paper", got {value!r}')
 
@@ -133,7 +133,7 @@ class PaperEngine(TrunkEngine):
     ) -> None:
         """Start environments, see `TrunkEngine.reset`."""
         super().reset(gaits, crank_angle, x=x, envs=envs, **trunk)
-        where = which(envs, self.num_envs)
+        where = env_indices(envs, self.num_envs)
         memory = self._memory
         angles = np.broadcast_to(crank_angle, (1, where.size))[0].tolist()
         places = np.broadcast_to(x, where.shape).tolist()

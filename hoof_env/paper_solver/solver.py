@@ -1,11 +1,11 @@
 """A leg as the paper solves it (Eqs. 2-9): 42 coordinates, 42 multipliers, Baumgarte stabilisation. A leg of
-B bodies has 3 B of them; the numbers here are those of the paper's.
+B bodies has 3 B of them; the numbers here are the paper's.
 
     [ M      Phi_q^T ] [ qdd    ]   [ h                                    ]
     [ Phi_q  0       ] [ lambda ] = [ gamma - 2 alpha Phi_dot - beta^2 Phi ]      (Eq. 8)
 
-Crank angle and swing follow the motion law exactly; q and qd are integrated numerically and drift. That is
-what this solver is for: it shows what the paper's method does. `TrunkEngine` computes the same motion in
+Crank angle and swing follow the motion law exactly; q and qd are integrated numerically and drift. The
+solver exists to show this property of the paper's method. `TrunkEngine` computes the same motion in
 closed form.
 
 Phi_q is square, so the second row of Eq. 8 alone fixes qdd: contact, masses and weight change the multipliers
@@ -50,10 +50,10 @@ from hoof_env.paper_solver.constraints import Closure, Constraints, Vector, clos
 from hoof_env.paper_solver.integrators import INTEGRATORS
 
 MOTION_NAMES = LEG_STATE[:2] + LEG_REPORT[:4]
-"""Names of the fields of `Motion`, whose own are the symbols of Eq. 8's motion law."""
+"""Names of the fields of `Motion`, which are symbols of Eq. 8's motion law there."""
 
 TRACE = np.dtype([(name, "f8") for name in (*TRUNK_STATE, *TRUNK_REPORT, *LEG_STATE, *LEG_REPORT)])
-"""State and report of one leg at the end of a substep, by the names that `TrunkEngine` gives them. On a fixed
+"""State and report of one leg at the end of a substep, by the names of `TrunkEngine`. On a fixed
 trunk its velocity, momentum and pitch are 0."""
 
 
@@ -114,7 +114,7 @@ class ConstrainedState:
 
     @classmethod
     def from_arrays(cls, arrays: Mapping[str, Any], size: int) -> ConstrainedState:
-        """Return the state of a leg with `size` coordinates from what `to_arrays` gives.
+        """Return the state of a leg with `size` coordinates from the result of `to_arrays`.
 
         Raises:
             KeyError, TypeError, ValueError: a part is missing or has another shape.
@@ -140,13 +140,13 @@ class ConstrainedLeg:
 
     Args:
         geometry: the leg.
-        ground: what it stands on.
+        ground: the ground.
         sim_dt: time step h [s].
         filters: bounds of the command filters.
         alpha, beta: Baumgarte's parameters [1/s]; the paper's 15 and sqrt(2 * 15). A closure error decays by
             the roots of s^2 + 2 alpha s + beta^2.
         integrator: one of `INTEGRATORS`.
-        height: of O above the ground [m]; the geometry's own if None.
+        height: height of O above the ground [m]; the geometry's if None.
 
     Raises:
         ParameterError: a value out of range or an unknown integrator.
@@ -237,11 +237,11 @@ class ConstrainedLeg:
     def advance(self, command: NDArray[np.float64], trace: NDArray[np.void]) -> Result:
         """Advance `len(trace)` substeps under a command (four gait parameters), filling one trace row each.
 
-        If q, qd or the multipliers stop being finite, or Eq. 8 is singular, the state stays as it was, the
-        result says so and `trace` is without meaning.
+        If q, qd or the multipliers stop being finite, or Eq. 8 is singular, the state is unchanged,
+        `trace` is meaningless, and the result is the failure.
 
         Raises:
-            ParameterError: the command is not four finite numbers, or `trace` is none of `new_trace`.
+            ParameterError: the command is not four finite numbers, or `trace` is not from `new_trace`.
         """
         command = finite("command", command)
         if command.shape != (4,):

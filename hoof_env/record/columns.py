@@ -33,11 +33,11 @@ def columns_of(
     the columns of `columns_of_engine` with the leg's prefix.
 
     Args:
-        record: `engine.state | engine.report`, for one instant, or what `engine.run` returns.
+        record: `engine.state | engine.report` for one instant, or the result of `engine.run`.
         hips: crank centres by the prefixes of the legs.
         terrain: the engine's terrain; level if None.
         commands: commanded gait parameters, shape (n, legs, parameters), or (1, legs, parameters) for all
-            instants; None if not known.
+            instants; None if unknown.
     """
     columns: Columns = {name: np.atleast_1d(record[name][..., 0]).astype(float) for name in OF_TRUNK}
     for i, (prefix, hip) in enumerate(hips.items()):
@@ -49,7 +49,7 @@ def columns_of(
 
 def body_units(of_leg: Mapping[str, str], prefixes: Iterable[str]) -> dict[str, str]:
     """Return the units of a body's columns from the units of a single leg's: each leg's columns have its
-    prefix, and the trunk has columns of its own."""
+    prefix, and the trunk has separate columns."""
     found = {name: UNITS[name] for name in OF_TRUNK}
     own = {name: unit for name, unit in of_leg.items() if name not in OF_TRUNK}
     return found | {f"{prefix}{name}": unit for prefix in prefixes for name, unit in own.items()}
@@ -74,9 +74,9 @@ def columns_of_engine(
     """Return the columns of a leg from the engine's record of one environment.
 
     Args:
-        record: `engine.state | engine.report`, for one instant, or what `engine.run` returns.
+        record: `engine.state | engine.report` for one instant, or the result of `engine.run`.
         terrain: the engine's terrain; level if None.
-        command: commanded gait parameters, shape (4,) or (n, 4); None if not known.
+        command: commanded gait parameters, shape (4,) or (n, 4); None if unknown.
         leg: index of the leg.
         hip: its crank centre O relative to the trunk's place [m].
     """

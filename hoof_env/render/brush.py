@@ -20,7 +20,7 @@ _fonts: dict[int, Any] = {}
 
 
 def _font(size: int) -> Any:
-    """Return pygame's own font, the same on all systems; make it anew after a `pygame.quit()`."""
+    """Return pygame's built-in font, the same on all systems; load it again after a `pygame.quit()`."""
     if not pygame.font.get_init():  # an older font crashes pygame, and pygame-ce refuses it
         _fonts.clear()
         pygame.font.init()

@@ -188,7 +188,7 @@ class Drawing:
         """Return the numbers of some legs: flesh, hooves, links and joints."""
         whole = np.stack(points)
         n = len(points)
-        # A leg without these points has no flesh: a part without extent stands for it.
+        # A leg without these points has no flesh, drawn as a part without extent.
         parts = self._flesh or [(self._geometry.toe, self._geometry.toe, 0.0, 0.0)]
         first, last, one, other = zip(*parts, strict=True)
         flesh = capsules(
@@ -261,7 +261,7 @@ class HorseDrawing(Drawing):
         self.half_width = 2.05 * self.size
 
     def _trunk(self, now: BodyInstant) -> tuple[Points, Points]:
-        """Return the outlines of tail, ear, barrel, neck and head; nothing holds a horse."""
+        """Return the outlines of tail, ear, barrel, neck and head; a horse needs no support."""
         centre = complex(now.x, now.y)
         turn = np.exp(1j * now.pitch)
         parts = (TAIL, EAR, *BODY)

@@ -1,6 +1,7 @@
-"""The scene of a horse: the whole animal, far legs behind the trunk and near ones before it, and the forces.
+"""The scene of a horse: the whole animal, far legs behind the trunk and near legs in front of it, and the
+forces.
 
-The camera follows the trunk along x and keeps its height over the ground.
+The camera follows the trunk along x and stays at a constant height over the ground.
 """
 
 from __future__ import annotations
@@ -23,7 +24,7 @@ from hoof_env.render.scene import LegScene
 
 FAR_COAT = 0.45  # opacity of far legs [-]
 WIDE_M = (1.75, 2.25)
-"""Visible width behind and before the trunk's centre [m]."""
+"""Visible width behind and ahead of the trunk's centre [m]."""
 
 SOIL_M = 0.45
 """Visible depth below the ground [m]."""

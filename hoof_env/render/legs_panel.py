@@ -46,7 +46,7 @@ class LegsPanel:
         self._brush = brush
         self._box = pygame.Rect(box)
         self._legs = tuple(leg.removesuffix("_") for leg in legs)
-        self._weight = weight_n or MIN_FULL_SCALE_N  # 0 stands for an unknown weight
+        self._weight = weight_n or MIN_FULL_SCALE_N  # 0 if the weight is unknown
         self._lift_off = lift_off_n
         self._inside = self._box.inflate(-36 * unit, -28 * unit)
         left = self._inside.left + round(34 * unit)

@@ -17,7 +17,7 @@ from hoof_env.render.brush import FINE, Brush
 from hoof_env.render.colours import CRANK, FAINT, FORCE, GREY, INK, PAPER
 
 SECONDS = 3  # time shown [s]
-RESOLUTION = 0.01  # the curve keeps the largest force of every such interval [s]
+RESOLUTION = 0.01  # the curve has the largest force of every such interval [s]
 MIN_FULL_SCALE_N = 200.0  # least full scale of the curve [N]
 UNDER_CURVE = (252, 230, 214)
 
@@ -28,7 +28,7 @@ NUMBERS = (
     ("peak of this stance", "", FORCE),
     ("highest so far", "", FORCE),
 )
-"""Title, unit and colour; "" stands for the unit of forces."""
+"""Title, unit and colour; "" for the unit of forces."""
 
 
 class Unit(NamedTuple):
@@ -70,7 +70,7 @@ class Stances:
     """Stances, in which the normal force exceeds `threshold` [N], and their peaks from a stream of instants.
 
     Attributes:
-        opened: when the open stance began [s]; None between stances.
+        opened: start of the open stance [s]; None between stances.
         peaks: peak of each stance so far, the last one's still growing while it is open.
         highest: force so far [N].
     """
@@ -101,8 +101,8 @@ class Stances:
 
 class LegPanel:
     """Numbers, gait and force curve in one box (left, top, width, height) of the picture, with the weight of
-    trunk and leg [N] as a line, unless it is 0, and stances from `lift_off_n` [N] on. `limits` are those of
-    the gait parameters, by name, see `gait.limits_of`.
+    trunk and leg [N] as a line, unless it is 0, and stances from `lift_off_n` [N] on. `limits` are the
+    limits of the gait parameters, by name, see `gait.limits_of`.
 
     Its `full_scale`, the force at the top of the curve's axis [N], only grows during an episode.
     """

@@ -74,7 +74,7 @@ class Picture(Protocol):
         """Make the panel in a box (left, top, width, height) of the picture."""
 
     def drawing(self, here: Surroundings, numbers: int) -> Drawing:
-        """Make the drawing of a page whose rows begin with `numbers` numbers."""
+        """Make the drawing of a page whose rows start with `numbers` numbers."""
 
 
 class LegPicture:

@@ -1,7 +1,7 @@
 """Pictures of a body in motion: an off-screen RGB array, or a window.
 
 Drawing is done in software on an off-screen surface; only render mode "human" opens a display. Every
-number in the picture is read from instants (`record.instant`); it computes no mechanics of its own.
+number in the picture is read from instants (`record.instant`); no mechanics are computed here.
 """
 
 from __future__ import annotations
@@ -125,7 +125,7 @@ class Renderer:
         return self._pygame.surfarray.pixels3d(self._packed).transpose(1, 0, 2).copy()
 
     def close(self) -> None:
-        """Close the window, if there is one, for good. Calling it again does nothing."""
+        """Close the window, if there is one, permanently. A second call has no effect."""
         self._closed = True
         if self._window_open:
             self._window_open = False
@@ -156,8 +156,8 @@ class Renderer:
 def open_window(size: tuple[int, int], title: str) -> Any:
     """Open pygame's window; return its surface.
 
-    Without a display SDL falls back to a driver that shows nothing: it is warned of, unless SDL_VIDEODRIVER
-    asks for it.
+    Without a display SDL falls back to an invisible driver: there is a warning, unless SDL_VIDEODRIVER
+    selects it.
 
     Raises:
         HoofEnvError: no driver can be started.
@@ -171,8 +171,8 @@ def open_window(size: tuple[int, int], title: str) -> Any:
     try:
         pygame.display.init()
         driver = pygame.display.get_driver()
-        asked_for = os.environ.get("SDL_VIDEODRIVER", "").split(",")
-        if driver in ("dummy", "offscreen") and driver not in asked_for:
+        requested = os.environ.get("SDL_VIDEODRIVER", "").split(",")
+        if driver in ("dummy", "offscreen") and driver not in requested:
             logger.warn(f"a window needs a display, and there is none: nobody sees this one; {advice}")
         window = pygame.display.set_mode(size)
     except pygame.error as error:

@@ -1,8 +1,8 @@
 """The scene: sky, ground, trunk and legs, the paths of toe and heel, the forces on the hooves.
 
-The camera follows the crank centre O along x. It keeps its height over the ground around O, and there is room
-for every angle that the leg can reach; only when O leaves its usual heights does the camera follow it up or
-down.
+The camera follows the crank centre O along x. It stays at a constant height over the ground
+around O, with room for every angle that the leg can reach; it follows O up or down only when O leaves its
+usual heights.
 """
 
 from __future__ import annotations
@@ -93,7 +93,7 @@ class LegScene:
         sky = geometry.hip_height + up + spare
         self._centre = (size[0] - right) / 2
         self._scale = min(size[1] / (soil + sky), self._centre / (out + MARGIN_M * self.small))
-        self._level = size[1] - soil * self._scale  # of the ground [pixels] while the camera keeps its height
+        self._level = size[1] - soil * self._scale  # of the ground [pixels] at the camera's usual height
         self._camera = 0j
         # Of each leg time [s], heel and toe [m].
         self._paths: list[deque[tuple[float, complex, complex]]] = [deque() for _ in hips]

@@ -1,5 +1,4 @@
-"""Numbers side by side: values of kernels that work on many environments, or many legs, in one
-instruction."""
+"""SIMD values: kernels process several environments, or several legs, per instruction."""
 
 import hoof_env.simd.numpy_functions  # noqa: F401 - lets NumPy's functions work on values
 from hoof_env.simd.compile import on_numpy

@@ -34,12 +34,12 @@ LEVEL = 2
 """LLVM's level of optimisation: without its vectorisers, for the code is vectors already."""
 
 CODE_MODEL = "jitdefault"
-"""LLVM's model of distances in machine code: constants may lie anywhere. MCJIT asks the system for memory for
-code and for constants apart, and a process whose memory is full of holes has them far from each other; the
-small model, 3 to 6 % faster, ended such a process."""
+"""LLVM's code model: constants may lie anywhere. MCJIT allocates code and constants separately, and in a
+process with fragmented memory they are far apart; the small model, 3 to 6 % faster, crashed such a
+process."""
 
 PROCESSOR = "HOOF_ENV_CPU"
-"""Environment variable: the processor to compile for, in LLVM's words, such as x86-64 or haswell."""
+"""Environment variable: the processor to compile for, by LLVM's name, such as x86-64 or haswell."""
 
 RECENT = 64
 """Number of unused kernels whose machine code stays loaded, in case an environment is made again."""
@@ -67,7 +67,7 @@ def _new_target() -> Any:
 
 
 def relocation(architecture: str) -> str:
-    """Return LLVM's model of relocation for an architecture, as numba chooses it for its own objects."""
+    """Return LLVM's relocation model for an architecture, the same as numba's for compiled objects."""
     return "static" if architecture.startswith("x86") else "default"
 
 
@@ -82,11 +82,11 @@ def target() -> Any:
 
 
 def _check_processor() -> None:
-    """Check that LLVM knows the processor of the environment variable: it says so on the standard error
-    alone, and ends the process when it compiles for one that it does not know.
+    """Check that LLVM knows the processor of the environment variable. LLVM reports an unknown processor on
+    the standard error only, and ends the process when it compiles for it.
 
     Raises:
-        ParameterError: it does not.
+        ParameterError: the processor is unknown.
     """
     try:
         error = os.dup(2)
@@ -98,11 +98,11 @@ def _check_processor() -> None:
         _new_target()
     finally:
         os.dup2(error, 2)
-        os.write(writing, b"\n")  # so that there is something to read
-        said = os.read(reading, 4096)
+        os.write(writing, b"\n")  # so that the read does not block
+        output = os.read(reading, 4096)
         for number in (error, reading, writing):
             os.close(number)
-    if b"not a recognized processor" in said:
+    if b"not a recognized processor" in output:
         raise ParameterError(
             f"{PROCESSOR}: expected a processor in LLVM's words, such as haswell or x86-64-v3, got"
             f" {os.environ[PROCESSOR]!r}"
@@ -141,7 +141,7 @@ def optimised(text: str, machine: Any = None) -> Any:
     passes = llvm.create_pass_builder(machine, tuning)
     manager = passes.getModulePassManager()
     manager.run(module, passes)
-    # llvmlite 0.50 forgets it: its class has the `_dispose` of the base that does nothing
+    # llvmlite 0.50 does not free it: its class inherits a `_dispose` without effect
     if type(manager)._dispose is ObjectRef._dispose:
         NewPassManager._dispose(manager)
     return module
@@ -196,8 +196,8 @@ def code_of(text: str, name: str) -> Code:
 
 
 Parameter = Any
-"""What a kernel takes: `Arrays` for what `Arrays.hold` returns, `Matrix` for an array of doubles, `float`,
-`int`."""
+"""Type of a kernel's argument: `Arrays` for a result of `Arrays.hold`, `Matrix` for an array of doubles,
+`float`, `int`."""
 
 
 class Kernel:
@@ -205,9 +205,9 @@ class Kernel:
 
     Args:
         function: the function, of values.
-        parameters: what each of its arguments is, see `Parameter`.
+        parameters: types of its arguments, see `Parameter`.
         name: name for messages and files.
-        threads: True if several threads may run it at once, without Python's lock; a call takes a little
+        is_threaded: True if several threads may run it at once, without Python's lock; a call takes a little
             longer.
 
     Attributes:
@@ -219,12 +219,12 @@ class Kernel:
         function: Callable[..., Any],
         parameters: Sequence[Parameter],
         name: str | None = None,
-        threads: bool = False,
+        is_threaded: bool = False,
     ) -> None:
         self.function = function
         self.parameters = tuple(parameters)
         self.name = name or function.__name__
-        self.threads = threads
+        self.is_threaded = is_threaded
         self.call: Any = None
 
     def __call__(self, *arguments: Any) -> Any:
@@ -250,7 +250,7 @@ class Kernel:
         for kind in self.parameters:
             kinds += _CTYPES[kind] if isinstance(kind, type) else [ctypes.c_void_p]
         code = code_of(text, self.name)
-        make: Any = ctypes.CFUNCTYPE if self.threads else ctypes.PYFUNCTYPE
+        make: Any = ctypes.CFUNCTYPE if self.is_threaded else ctypes.PYFUNCTYPE
         call = make(result, *kinds)(code.address)
         call.code = code  # the machine code lives as long as the function
         self.call = call
@@ -317,7 +317,8 @@ def traced(function: Callable[..., Any], parameters: Sequence[Parameter]) -> tup
 def _run(
     function: Callable[..., Any], parameters: Sequence[Parameter], arguments: Sequence[Any], machine: Any
 ) -> Any:
-    """Run the function of a kernel on a machine that computes at once; return what machine code would."""
+    """Run the function of a kernel on a machine that computes at once; return the result of the machine
+    code."""
     with running_on(machine), np.errstate(all="ignore"):
         given: list[Any] = []
         for kind, argument in zip(parameters, arguments, strict=True):
@@ -344,8 +345,8 @@ class _Here(threading.local):
 _HERE = _Here()
 
 BLOCKS: list[Any] = []
-"""Machines of the blocks that are open in any thread. While there are some, whoever keeps a kernel's
-`call`, to save what a check costs, has to call the kernel itself."""
+"""Machines of the open blocks of all threads. While the list is not empty, code that calls a kernel's `call`
+directly, to save the cost of a check, must call the kernel itself."""
 
 
 def on_numpy(exact: bool = True) -> AbstractContextManager[None]:
@@ -377,8 +378,7 @@ def is_on_machine() -> bool:
 
 
 def kernel(function: Callable[..., Any]) -> Kernel:
-    """Make a kernel of a function, whose annotations say what its arguments are: `Matrix`, `Number` or
-    `Whole`."""
+    """Make a kernel of a function with annotated arguments: `Matrix`, `Number` or `Whole`."""
     kinds = {Matrix: Matrix, Number: float, Lanes: float, Whole: int, Index: int}
     hints = get_type_hints(function)
     names = function.__code__.co_varnames[: function.__code__.co_argcount]

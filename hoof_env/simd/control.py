@@ -20,7 +20,7 @@ def when(condition: Truth) -> Callable[[Callable[[], None]], None]:
     @when(any_lane(inside))
     def _() -> None: ...
 
-    What the function changes is in memory, or in a `Cell`.
+    The function's results are in memory, or in a `Cell`.
     """
 
     def decorate(function: Callable[[], None]) -> None:
@@ -30,8 +30,8 @@ def when(condition: Truth) -> Callable[[Callable[[], None]], None]:
 
 
 def cond(condition: Truth, then: Callable[[], Any], otherwise: Any) -> Any:
-    """Return what `then` returns where a condition holds that all lanes share, else `otherwise`: a value or a
-    tuple of values, or a function that returns them. The result enters sums rounded."""
+    """Return the result of `then` where a condition holds that all lanes share, else `otherwise`: a value or
+    a tuple of values, or a function that returns them. The result enters sums rounded."""
     if _is_known(condition):
         if condition:
             return rounded(then())
@@ -77,7 +77,7 @@ def cond(condition: Truth, then: Callable[[], Any], otherwise: Any) -> Any:
 
 
 def _kind_of(*values: Any) -> tuple[int, int]:
-    """Return the number of lanes of values of one kind, and of what they consist."""
+    """Return the number of lanes of values of one kind, and the number of parts of each."""
     n = max(getattr(value, "n", 0) for value in values)
     return n, 2 if any(isinstance(value, Plane) for value in values) else 1
 
@@ -92,7 +92,7 @@ def _keep(values: Any, kinds: Any, slots: Any) -> None:
 
 def loop(begin: Whole, end: Whole | None = None, step: Whole = 1) -> Iterator[Any]:
     """Run the body of a `for` with the numbers of `range`; traced once if a bound is known only when the
-    kernel runs. What changes from turn to turn is in memory, or in a `Cell`."""
+    kernel runs. Variables that change from turn to turn are in memory, or in a `Cell`."""
     first, last = (0, begin) if end is None else (begin, end)
     if not any(isinstance(bound, Index) for bound in (first, last, step)):
         yield from range(first, last, step)
@@ -120,8 +120,8 @@ def rolled(count: int) -> Whole:
 
 
 class Cell:
-    """Variable of a kernel that changes inside `loop` or `when`: lanes, an ordinary number, or a whole one if
-    it begins as one. What it holds enters sums rounded."""
+    """Variable of a kernel that changes inside `loop` or `when`: lanes, an ordinary number, or a whole number
+    if its first value is one. Its value enters sums rounded."""
 
     def __init__(self, value: Any) -> None:
         is_whole = isinstance(value, (int, Index))

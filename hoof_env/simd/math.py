@@ -32,7 +32,7 @@ Real = TypeVar("Real", float, Lanes)
 EXPONENT_UNIT = 8
 """Denominator of the exponents that `root_power` takes: whole multiples of 1 / EXPONENT_UNIT."""
 
-LOWEST_EXPONENT = -40.0
+MIN_EXPONENT = -40.0
 """Lowest exponent of `exp_of_negative`: below it the result stays at exp(-40) = 4e-18."""
 
 TWO_OVER_PI = 2 / math.pi
@@ -69,7 +69,7 @@ def exp_of_negative(x: Real) -> Real:
     """Return exp(x) for x <= 0, relative error below 1e-13; exp(-40) below -40. The series of exp(x / 256),
     squared eight times."""
     # Taylor's series to the tenth power, by Horner's rule
-    y = maximum(x, LOWEST_EXPONENT) * (1 / 256)
+    y = maximum(x, MIN_EXPONENT) * (1 / 256)
     e = 1 / 3628800 * y + 1 / 362880
     e = e * y + 1 / 40320
     e = e * y + 1 / 5040

@@ -43,18 +43,18 @@ ENOUGH = 2**22
 
 
 def aligned(*shape: int) -> NDArray[np.float64]:
-    """Return a new array of doubles, not filled, that begins at a cache line: a vector across two lines takes
+    """Return a new array of doubles, not filled, that starts at a cache line: a vector across two lines takes
     two loads.
 
-    An array of a large page or more begins at such a page, if the system has them: otherwise each row of many
-    environments lies in a page of its own, and address translation takes time. This reserves up to 4 MiB
-    more, which are not touched.
+    An array of at least a large page starts at such a page, if the system has them: otherwise each row of
+    many environments lies in a separate page, and address translation takes time. This reserves up to 4 MiB
+    more, which are never used.
     """
     size = math.prod(shape)
     item_size = np.dtype(np.float64).itemsize
     is_large = size * item_size >= LARGE
     step, least = (LARGE, ENOUGH // item_size) if is_large else (LINE, 0)
-    # more than needed, so that an aligned array fits wherever NumPy's memory begins
+    # more than needed, so that an aligned array fits wherever NumPy's memory starts
     room = np.empty(max(size, least) + step // item_size)
     first = -room.ctypes.data % step // item_size
     return room[first : first + size].reshape(shape)
@@ -109,9 +109,9 @@ class Matrix:
 
 
 def refuse_write(what: str) -> NoReturn:
-    """Refuse that a user's function writes what it was given."""
+    """Refuse a write of a user's function to its arguments."""
     raise TraceError(
-        f"assignment to {what}: a function may set only the rows that its term declares with `keeps`, as"
+        f"assignment to {what}: a function may set only the `state` that its term declares, as"
         " step.episode.own.<term>.<row>"
     )
 
@@ -145,7 +145,7 @@ class Field:
 
 
 class Record:
-    """Record of the caller: fields that are known when the kernel is traced, and others, read when it
+    """Record of the caller: fields that are known when the kernel is traced, and fields that are read when it
     runs."""
 
     def __init__(self, place: Any, kind: np.dtype[Any], known: Mapping[str, Any]) -> None:
@@ -201,7 +201,7 @@ class Held(int):
         return held
 
     def on(self, columns: range) -> Held:
-        """Return the same arrays for a call that works on other columns."""
+        """Return the same arrays for a call on different columns."""
         return self if columns == self.columns else Held.of(self.arrays, self.numbers.copy(), columns)
 
     def __reduce__(self) -> NoReturn:
@@ -256,7 +256,7 @@ class Given:
     """Arrays inside a kernel: `given.name` is a `Matrix` or a `Record`.
 
     Attributes:
-        begin, end: range of columns that the call works on.
+        begin, end: range of the call's columns.
     """
 
     def __init__(self, arrays: Arrays, x: Any) -> None:
@@ -289,12 +289,12 @@ class Given:
 
 
 class Rows:
-    """Memory on the stack with n doubles a row, named by a layout. Of a machine that computes at once it is
-    a list of arrays, of which a store replaces an entry: arrays themselves do not change.
+    """Memory on the stack with n doubles a row, named by a layout. On a machine that computes at once it
+    is a list of arrays, and a store replaces an entry: arrays themselves do not change.
 
-    `locked` gives the same rows to functions that may not write them: `_open` is then None, or the names of
-    the fields, one inside the other, of the rows that they may set nevertheless; else it is (). `_size` is
-    the number of rows and `_legs` that of equal layouts that follow each other, by which indices of such
+    `locked` gives the same rows to functions that may not write them: `_open` is then None, or the path
+    of field names to the rows that they may set nevertheless; else it is (). `_size` is
+    the number of rows and `_legs` the number of consecutive equal layouts, against which indices of such
     functions are checked; None for rows of the package itself.
     """
 
@@ -318,7 +318,7 @@ class Rows:
         return self._n
 
     def __repr__(self) -> str:
-        """Return the names of the fields or, on a machine that computes at once, what they hold."""
+        """Return the names of the fields or, on a machine that computes at once, their values."""
         names = () if self._layout is None else tuple(self._layout.fields)
         if not (names and CURRENT.machine.runs_now):
             return f"rows of {', '.join(names) or 'numbers'}"
@@ -413,7 +413,7 @@ class Rows:
         return part
 
     def _check(self, size: int | None, may_set: tuple[str, ...] | None) -> None:
-        """Check indices, and refuse to set rows but those of the names `may_set`."""
+        """Check indices from now on, and refuse to set rows except at the path `may_set`."""
         object.__setattr__(self, "_size", size)
         object.__setattr__(self, "_open", may_set)
 
@@ -445,21 +445,21 @@ def _no_field(layout: Any, name: str) -> str:
 
 
 def locked(rows: Any, but: tuple[str, ...] = (), legs: int = 1) -> Any:
-    """Return rows, or what else a user's function takes, such that it cannot write them.
+    """Return rows, or another argument of a user's function, in a form that it cannot write.
 
     Args:
-        rows: rows, a pointer, a matrix, or a named tuple with such.
-        but: names, one inside the other, of the field whose rows it may set.
-        legs: number of equal layouts that follow each other, for `block_at`, of the field `leg`.
+        rows: rows, a pointer, a matrix, or a named tuple of these.
+        but: path of names to the field whose rows it may set.
+        legs: number of consecutive equal layouts in the field `leg`, for `block_at`.
     """
     if isinstance(rows, Rows):
-        made = object.__new__(type(rows))
+        view = object.__new__(type(rows))
         for name in ("_place", "_n", "_layout", "_first", "_empty", "_row", "_stride"):
             if hasattr(type(rows), name):
-                object.__setattr__(made, name, getattr(rows, name))
-        made._check(rows._layout and rows._layout.size, but or None)
-        object.__setattr__(made, "_legs", legs)
-        return made
+                object.__setattr__(view, name, getattr(rows, name))
+        view._check(rows._layout and rows._layout.size, but or None)
+        object.__setattr__(view, "_legs", legs)
+        return view
     if isinstance(rows, Pointer):
         return Pointer(rows.x, rows.item, True)
     if isinstance(rows, Matrix):
@@ -528,8 +528,8 @@ def new_rows(layout: None, lanes: int, count: int = 1) -> Block: ...
 @overload
 def new_rows(layout: type[AnyLayout], lanes: int, count: int = 1) -> AnyLayout: ...
 def new_rows(layout: Any, lanes: int, count: int = 1) -> Any:
-    """Return memory on the stack of the kernel, `count` times the rows of a layout, or `count` rows without
-    names if that is None."""
+    """Return memory on the stack of the kernel, `count` times the rows of a layout, or `count` unnamed rows
+    if `layout` is None."""
     size = count * (1 if layout is None else layout.size)
     if CURRENT.machine.runs_now:
         return Rows([None] * size, lanes, layout)

@@ -1,4 +1,4 @@
-"""NumPy's functions on values: `np.where`, `np.exp` and others, which a user's function calls as on arrays.
+"""NumPy's functions on values: `np.where`, `np.exp` and so on, which a user's function calls as on arrays.
 
 Any other function is refused with a list of these (`values.Value`). Functions of the C library are called
 lane by lane, so that a lane has the bits that it would have alone.

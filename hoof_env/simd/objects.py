@@ -1,7 +1,8 @@
 """Machine code of kernels in files: plain objects of the processor, in a folder of the user's.
 
-A file's name is the digest of all that its code follows from, so that no file is ever out of date. A file
-begins with the digest of its content. A file that other users could write is not read, because it is run.
+A file's name is the digest of everything that determines its code, so that no file is ever out of date. A
+file starts with the digest of its content. A file that another user could write is not read, because it is
+run.
 """
 
 from __future__ import annotations
@@ -19,7 +20,7 @@ from pathlib import Path
 FOLDER = "HOOF_ENV_CACHE_DIR"
 """Environment variable: folder of the files in the place of the user's cache folder."""
 
-MOST_FILES = 2000
+MAX_FILES = 2000
 """Number of files beyond which the least recently used half goes; a file has 5 to 100 kB."""
 
 DAY = 86400.0
@@ -28,7 +29,7 @@ DAY = 86400.0
 DIGEST = hashlib.sha256().digest_size
 
 _NAME = re.compile(r".+-[0-9a-f]{40}\.o(\..+)?")  # and of one that is being written
-_SAID: set[Path] = set()
+_WARNED: set[Path] = set()
 
 
 def folder() -> Path:
@@ -50,7 +51,7 @@ def folder() -> Path:
 
 
 def read(name: str) -> bytes | None:
-    """Return the content of a file; None if there is none that can be trusted."""
+    """Return the content of a file; None without a trusted file."""
     path = folder() / name
     try:
         if not (_is_own(path.parent) and _is_own(path)):
@@ -68,8 +69,7 @@ def read(name: str) -> bytes | None:
 
 
 def write(name: str, content: bytes) -> None:
-    """Keep a content in a file, at once or not at all; without a folder that can be written it is not
-    kept."""
+    """Write a content to a file atomically; do nothing if the folder cannot be written."""
     path = folder() / name
     try:
         path.parent.mkdir(parents=True, exist_ok=True, mode=0o700)
@@ -90,7 +90,7 @@ def write(name: str, content: bytes) -> None:
 
 
 def _is_own(place: Path) -> bool:
-    """Return True if a file or folder belongs to this user, or to root, and nobody else can change it."""
+    """Return whether a file or folder belongs to this user or to root, and no other user can change it."""
     if not hasattr(os, "geteuid"):
         return True  # the folders of Windows' users are their own
     try:
@@ -99,8 +99,8 @@ def _is_own(place: Path) -> bool:
         return False
     if status.st_uid in (os.geteuid(), 0) and not status.st_mode & 0o022:
         return True
-    if place not in _SAID:
-        _SAID.add(place)
+    if place not in _WARNED:
+        _WARNED.add(place)
         warnings.warn(
             f"hoof-env: {place} belongs to others, or others may write there: machine code in it is not"
             f" used, and kernels are compiled in each process; run `chmod go-w {place}` if it is yours, or"
@@ -111,9 +111,9 @@ def _is_own(place: Path) -> bool:
 
 
 def _make_room(place: Path) -> None:
-    """Remove the least recently used half of too many files; others in the folder stay."""
+    """Remove the least recently used half of too many files of machine code; leave all other files."""
     files = [entry for entry in os.scandir(place) if _NAME.fullmatch(entry.name)]
-    if len(files) <= MOST_FILES:
+    if len(files) <= MAX_FILES:
         return
     used = sorted(files, key=lambda entry: entry.stat().st_mtime)
     for entry in used[: len(used) // 2]:

@@ -1,5 +1,5 @@
-"""Kernels on several threads. Each call works on columns of its own, so that any number of threads returns
-the same bits."""
+"""Kernels on several threads. Each call works on separate columns, so that the bits do not depend on the
+number of threads."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from typing import Any
 from hoof_env.errors import ParameterError, count
 from hoof_env.simd.compile import Kernel, is_on_machine
 
-MOST_THREADS = 1024
+MAX_THREADS = 1024
 """Largest number of threads."""
 
 PARTS = 8
@@ -32,7 +32,7 @@ def check_threads(num_threads: Any) -> int:
     """Return the number of threads; raise `ParameterError` if it is below 1 or above the number of
     processors."""
     threads = count("num_threads", num_threads)
-    most = min(available(), MOST_THREADS)
+    most = min(available(), MAX_THREADS)
     if threads > most:
         raise ParameterError(
             f"num_threads: expected 1 to {most}, the processors that there are, got {threads}"
@@ -46,7 +46,7 @@ def limit_threads(num_threads: int) -> int:
 
 
 def blocks(columns: int, lanes: int, num_threads: int) -> list[range]:
-    """Return columns in equal parts that begin with a group of lanes: one part for a single thread, else
+    """Return columns in equal parts of whole groups of lanes: one part for a single thread, else
     `PARTS` for each thread if there are enough, because the processors of a busy machine are not equally
     fast."""
     groups = -(-columns // lanes)
@@ -58,10 +58,10 @@ def blocks(columns: int, lanes: int, num_threads: int) -> list[range]:
 @cache
 def _workers() -> ThreadPoolExecutor:
     """Return the threads of this process, each started when it is needed; they stay."""
-    return ThreadPoolExecutor(MOST_THREADS, "hoof-env")
+    return ThreadPoolExecutor(MAX_THREADS, "hoof-env")
 
 
-if hasattr(os, "register_at_fork"):  # a child has none of its parent's threads
+if hasattr(os, "register_at_fork"):  # a child process does not inherit its parent's threads
     os.register_at_fork(after_in_child=_workers.cache_clear)
 
 
@@ -77,7 +77,7 @@ def run_together(kernel: Any, calls: Sequence[tuple[Any, ...]], num_threads: int
     # one thread compiles a kernel, not each of them
     if isinstance(kernel, Kernel) and kernel.call is None:
         kernel.compile()
-    # `list` and `starmap` take a call and make it without bytecode between, so that no other thread takes it
+    # `list` and `starmap` take and make a call without bytecode in between, so that no other thread takes it
     waiting = starmap(kernel, iter(calls))
     with _interrupts_wait():
         helpers = [_workers().submit(list, waiting) for _ in range(min(num_threads, len(calls)) - 1)]

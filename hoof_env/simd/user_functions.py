@@ -1,4 +1,4 @@
-"""Plain functions from outside this package inside kernels: checks of what they are and return, and error
+"""Plain functions from outside this package inside kernels: checks of their form and results, and error
 messages for their authors."""
 
 from __future__ import annotations
@@ -27,13 +27,13 @@ PACKAGE = Path(__file__).parents[1]
 NUMPY = Path(np.__file__).parent
 LIBRARIES = tuple(Path(sysconfig.get_path(name)) for name in ("stdlib", "purelib", "platlib"))
 
-MOST_OPERATIONS = 200_000
-"""Largest number of instructions of a user's function, some thousand times those of a term."""
+MAX_OPERATIONS = 200_000
+"""Largest number of instructions of a user's function, some thousand times as many as a term has."""
 
-MOST_PARTS = 10_000
-"""Largest number of parts of a variable in which a value is looked for."""
+MAX_PARTS = 10_000
+"""Largest number of parts of a variable that are searched for a value."""
 
-MOST_WORDS = 400
+MAX_LETTERS = 400
 """Largest number of letters of an error that a user's function raises."""
 
 PLAIN_FLAGS = 0x0C | 0x20 | 0x80 | 0x200
@@ -45,23 +45,22 @@ class UserFunctionError(ParameterError):
 
 
 def foreign(
-    what: str, function: Callable[..., Any], count: int | None = None, keeps: str = "", legs: int = 1
+    what: str, function: Callable[..., Any], count: int | None = None, stateful: str = "", legs: int = 1
 ) -> Callable[..., Any]:
-    """Return a function from outside this package as a part of kernels: it cannot write what it takes, which
-    enters sums rounded, as does what it returns; what it raises while a kernel is traced becomes a
-    `UserFunctionError`.
+    """Return a function from outside this package as a part of kernels: it cannot write its arguments; these
+    and its results enter sums rounded; an exception while a kernel is traced becomes a `UserFunctionError`.
 
     Args:
-        what: the function, for messages.
+        what: title of the function in messages.
         function: the function.
         count: number of numbers that it returns as a tuple; None for one number.
-        keeps: name of the term whose rows, `episode.own.<term>`, it may set.
-        legs: number of legs behind the field `leg` of what it takes.
+        stateful: name of the term whose state, `episode.own.<term>`, it may set.
+        legs: number of legs in the field `leg` of its arguments.
     """
 
     @wraps(function)
     def part(*arguments: Any) -> Any:
-        own = ("own", keeps) if keeps else ()
+        own = ("own", stateful) if stateful else ()
         given = tuple(locked(rounded(argument), own, legs) for argument in arguments)
         check_imports(what, function, UserFunctionError)
         try:
@@ -71,8 +70,8 @@ def foreign(
         except Exception as error:  # the user's code may raise anything
             if CURRENT.machine.runs_now:  # a debugger wants to know where
                 raise
-            raise UserFunctionError(f"{what}: {_said(error)}{_place(error)}") from None
-        wrong = _wrong(found, count) or _kept_value(function)
+            raise UserFunctionError(f"{what}: {_message_of(error)}{_place(error)}") from None
+        wrong = _wrong(found, count) or _leaked_value(function)
         if wrong:
             raise UserFunctionError(f"{what} {wrong}, in {_where(function.__name__, function.__code__)}")
         return found
@@ -81,13 +80,13 @@ def foreign(
 
 
 def _steady(function: Callable[..., Any], arguments: tuple[Any, ...]) -> Any:
-    """Return the result of a function; raise TraceError if a second call gives other instructions, as random
-    numbers do, or a clock: a kernel would repeat those of the first call for ever."""
+    """Return the result of a function; raise TraceError if a second call gives different instructions, for
+    example because of random numbers or a clock: a kernel would repeat the first call for ever."""
     machine = CURRENT.machine
     if machine.runs_now:
         return function(*arguments)
     slots, lines, count, most = len(machine.slots), len(machine.lines), machine.count, machine.most
-    machine.most = count + MOST_OPERATIONS
+    machine.most = count + MAX_OPERATIONS
     try:
         first = _text(function(*arguments)), machine.slots[slots:], machine.lines[lines:]
         del machine.slots[slots:], machine.lines[lines:]
@@ -108,7 +107,7 @@ class _Unsteady(TraceError):
 
 
 def _text(x: Any) -> Any:
-    """Return what tells results of two calls apart."""
+    """Return a fingerprint of a result, to compare the results of two calls."""
     if isinstance(x, (Lanes, Mask)):
         return x.x
     if isinstance(x, Plane):
@@ -122,7 +121,7 @@ def _text(x: Any) -> Any:
 
 
 def _wrong(x: Any, count: int | None) -> str:
-    """Return what is wrong with the result of a function; nothing if it is right."""
+    """Return a complaint about the result of a function; "" if it is valid."""
     if count is None:
         return f"returns {_result(x)}; expected a number" if _is_wrong(x) else ""
     expected = f"expected a tuple of {count} numbers"
@@ -163,21 +162,21 @@ def _result(x: Any) -> str:
     return words if len(words) < 80 else f"{words[:80]}..."
 
 
-def _kept_value(function: Any) -> str:
-    """Return a complaint if a variable outside a function has kept a value of the kernel: the next kernel
+def _leaked_value(function: Any) -> str:
+    """Return a complaint if a variable outside a function holds a value of the kernel: the next kernel
     would read it."""
     for each in _reached(function):
         for name, x in each.variables:
             if _holds_value(x):
                 return (
-                    f"keeps a value in {name!r}, which another kernel would read; a term keeps numbers from"
-                    " step to step with `keeps`"
+                    f"keeps a value in {name!r}, which another kernel would read; for numbers that last from"
+                    " step to step, declare the term's `state`"
                 )
     return ""
 
 
 def _holds_value(x: Any) -> bool:
-    """Return True if a variable, or what is in it, is a value or memory of a kernel."""
+    """Return whether a variable, or a part of it, is a value or memory of a kernel."""
     waiting, seen = [x], {id(x)}
     for part in waiting:  # which grows
         if isinstance(part, (Value, Rows)):
@@ -190,14 +189,14 @@ def _holds_value(x: Any) -> bool:
             inside = ()
         else:
             inside = vars(part).values()
-        if len(waiting) + len(inside) < MOST_PARTS:
+        if len(waiting) + len(inside) < MAX_PARTS:
             new = {id(one): one for one in inside if id(one) not in seen}
             waiting += new.values()
             seen |= new.keys()
     return False
 
 
-# Words and places
+# Messages and positions
 
 
 NAMES = {
@@ -206,13 +205,13 @@ NAMES = {
     "Pointer": "an array", "Matrix": "an array", "Record": "the record", "Field": "an array of the record",
     "NoneType": "nothing",
 }  # fmt: skip
-"""Names of types in Python's messages, in the words of users."""
+"""Users' names of the types in Python's messages."""
 
 
-def _said(error: Exception) -> str:
-    """Return what an error says, in one line, for the author of the function."""
+def _message_of(error: Exception) -> str:
+    """Return the message of an error in one line, for the author of the function."""
     words = " ".join(str(error).split())
-    words = words if len(words) <= MOST_WORDS else f"{words[:MOST_WORDS]}..."
+    words = words if len(words) <= MAX_LETTERS else f"{words[:MAX_LETTERS]}..."
     if isinstance(error, RecursionError):
         return "a recursion, or a loop, whose end is not known when the kernel is made: write it without"
     if isinstance(error, TraceError):
@@ -255,11 +254,11 @@ def _at(function: Any) -> str:
     return f", in {_where(function.__name__, function.__code__)}"
 
 
-# What a function is, and what it reaches
+# Functions and their helpers
 
 
 class Reached(NamedTuple):
-    """Function that another one reaches by its names, and the variables around it that it reads."""
+    """Function that another function reaches by its names, and the outer variables that it reads."""
 
     function: FunctionType
     variables: list[tuple[str, Any]]
@@ -311,7 +310,7 @@ def _variables(function: FunctionType) -> Iterator[tuple[str, Any]]:
 
 
 def check_imports(name: str, function: Any, error: type[ParameterError] = ParameterError) -> None:
-    """Raise ParameterError, or the given kind of it, if a function or a helper of it imports something."""
+    """Raise ParameterError, or the given kind of it, if a function or one of its helpers imports a module."""
     for each, _ in _reached(function):
         for line in _imports(each.__code__):
             raise error(
@@ -321,8 +320,7 @@ def check_imports(name: str, function: Any, error: type[ParameterError] = Parame
 
 
 def check_function(name: str, function: Any, arguments: int) -> None:
-    """Raise ParameterError unless something is a plain function of `arguments` arguments that imports
-    nothing."""
+    """Raise ParameterError unless `function` is a plain function of `arguments` arguments without imports."""
     if not isinstance(function, FunctionType) or function.__code__.co_flags & PLAIN_FLAGS:
         raise ParameterError(
             f"{name}: expected a plain function of {arguments} arguments, got {function!r};"
@@ -337,7 +335,7 @@ def check_function(name: str, function: Any, arguments: int) -> None:
 
 
 def _imports(code: CodeType) -> Iterator[int]:
-    """Yield the lines of a function, and of those inside it, that import something."""
+    """Yield the lines with an import in a function and in the functions inside it."""
     line = code.co_firstlineno
     for instruction in dis.get_instructions(code):
         if isinstance(instruction.starts_line, int) and not isinstance(instruction.starts_line, bool):
@@ -350,11 +348,11 @@ def _imports(code: CodeType) -> Iterator[int]:
             yield from _imports(part)
 
 
-# What functions take, and messages
+# Arguments of functions, and messages
 
 
 def inputs(kind: Any) -> Any:
-    """Let a named tuple that users' functions take refuse unknown fields, and assignments, in words."""
+    """Make a named tuple, an argument of users' functions, refuse unknown fields and assignments."""
 
     def unknown(self: Any, name: str) -> Any:
         raise AttributeError(f"no field {name!r}; {kind.__name__} has {', '.join(kind._fields)}")
@@ -371,7 +369,7 @@ def user_error(name: str, error: UserFunctionError) -> ParameterError:
 
     Args:
         name: of the task or setting.
-        error: what was wrong.
+        error: the error.
     """
     return ParameterError(f"{name}: {error}")
 

@@ -101,7 +101,8 @@ class Value:
 
 UFUNCS: dict[Any, Callable[..., Any]] = {}
 FUNCTIONS: dict[Any, Callable[..., Any]] = {}
-"""NumPy's functions of numbers that work on values, and its other functions that do: `numpy_functions`."""
+"""NumPy's universal functions that work on values, and NumPy's further functions that do:
+`numpy_functions`."""
 
 
 def known_functions() -> str:
@@ -110,7 +111,8 @@ def known_functions() -> str:
 
 
 def _single(x: Any) -> Any:
-    """Return an array of no axes, such as np.where makes of two numbers, as a number; refuse others."""
+    """Return an array of no axes, such as np.where makes of two numbers, as a number; refuse any other
+    array."""
     if isinstance(x, np.ndarray):
         if x.ndim:
             raise TraceError(
@@ -122,7 +124,7 @@ def _single(x: Any) -> Any:
 
 
 def kind_of(x: Any) -> str:
-    """Return what something is, for messages."""
+    """Return the kind of an object, for messages."""
     if isinstance(x, np.ndarray):
         return f"an array of NumPy, of shape {x.shape}"
     kind = getattr(type(x), "kind", None)
@@ -270,7 +272,7 @@ class Mask(Value):
         return self ^ other if isinstance(other, (bool, np.bool_, Mask)) else self.to_real() != other
 
     def to_real(self) -> Lanes:
-        """Return 1.0 where it holds, else 0.0: what NumPy makes of a truth in arithmetic."""
+        """Return 1.0 where it holds, else 0.0, like NumPy's arithmetic with truths."""
         return where(self, 1.0, 0.0)
 
     def _sum(self, sign: str, one: Any, other: Any) -> Any:
@@ -587,19 +589,20 @@ def compare(symbol: str, one: Any, other: Any) -> Any:
     return Mask(CURRENT.machine.compare(symbol, payload(one, n), payload(other, n), n), n)
 
 
-MOST_PRODUCTS = 16
-"""Largest whole power that is made of products."""
+MAX_PRODUCTS = 16
+"""Largest whole power that is computed by products."""
 
 
 def power(base: Any, exponent: Any) -> Any:
-    """Return a power: a small whole exponent by products, one half by a root, any other by the C library."""
+    """Return a power: a small whole exponent by products, one half by a root, any other exponent by the C
+    library."""
     if isinstance(exponent, (int, float, np.integer, np.floating)):
         exponent = float(exponent)
         if exponent == 2.0:
             return base * base
         if exponent == 0.5:
             return sqrt(base)
-        if exponent.is_integer() and 0 < exponent <= MOST_PRODUCTS:
+        if exponent.is_integer() and 0 < exponent <= MAX_PRODUCTS:
             half = rounded(power(base, exponent // 2)) if exponent > 1 else None
             if half is None:
                 return base
@@ -714,7 +717,7 @@ def where(condition: Any, yes: Any, no: Any) -> Any:
     if not isinstance(condition, Mask):
         if isinstance(condition, Value):
             raise TraceError(f"where() of {condition.kind}: expected a condition, such as x > 0.0")
-        if isinstance(yes, Value) or isinstance(no, Value):  # NumPy would ask these again
+        if isinstance(yes, Value) or isinstance(no, Value):  # NumPy would call these again
             return yes if _single(condition) else no
         return np.where(condition, yes, no)
     if isinstance(yes, Plane) or isinstance(no, Plane):
@@ -778,7 +781,7 @@ def _chosen(symbol: str, x: Any, y: Any) -> Any:
 
 
 def clip(x: Any, a_min: Any = None, a_max: Any = None, *, min: Any = None, max: Any = None) -> Any:
-    """Return a number limited to [a_min, a_max], of which None is no limit; arguments as NumPy's."""
+    """Return a number limited to [a_min, a_max], where None is no limit; arguments like NumPy's."""
     low, high = (a_min if min is None else min), (a_max if max is None else max)
     x = x if low is None else maximum(x, low)
     return x if high is None else minimum(x, high)
@@ -807,8 +810,8 @@ def lane_sum(start: Any, x: Any) -> Any:
 
 
 def steady(x: V) -> V:
-    """Return x, which does not change with small changes of what it was computed from: a number that was
-    rounded by adding a large constant. A machine that rearranges or differentiates must leave it alone."""
+    """Return x, a number that is constant under small changes of its inputs because it was rounded by adding
+    a large constant. A machine that rearranges or differentiates must leave it alone."""
     if isinstance(x, Lanes):
         return Lanes(CURRENT.machine.steady(x.x), x.n, x.factors)  # type: ignore[return-value]
     return x
@@ -820,8 +823,8 @@ def whole(x: Any) -> Any:
 
 
 def quarter_turns(cosine: Lanes, sine: Lanes, shifted: Lanes) -> tuple[Lanes, Lanes]:
-    """Return (cosine, sine) of an angle plus some quarter turns: as many as the last two bits of `shifted`
-    say. Bits are moved, nothing is rounded or compared."""
+    """Return (cosine, sine) of an angle plus quarter turns, whose number is the last two bits of
+    `shifted`. Bits are moved, without rounding or comparison."""
     machine = CURRENT.machine
     n = shifted.n
     c, s, quarters = (machine.bits(value.x, n) for value in (cosine, sine, shifted))

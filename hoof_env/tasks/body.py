@@ -37,7 +37,7 @@ class BodyKernels(NamedTuple):
         on_switch: inlined function of task, episode and the mask of rows in which another speed is commanded.
     """
 
-    # Functions and plain values only: kernels are kept under the hash of this tuple.
+    # Functions and plain values only: kernels are cached under the hash of this tuple.
     legs: int
     episode: Any
     task_fields: tuple[Any, ...]

@@ -1,5 +1,4 @@
-"""Settings of what moves and of the ground under it, the first part of `settings.Settings`, and the
-description that each setting carries."""
+"""Settings of the body and of the ground, the base of `settings.Settings`, and their descriptions."""
 
 from __future__ import annotations
 
@@ -13,19 +12,19 @@ Range = float | Sequence[float]
 """Lowest and highest value, or one number for both."""
 
 GIVEN = ("given",)
-"""Stand-in for all values of a setting but None, in `About.needs`."""
+"""Placeholder in `About.needs` for any value except None."""
 
 
 class About(NamedTuple):
     """Description of a setting.
 
     Attributes:
-        unit: unit of the value, "" for none.
+        unit: unit of the value; "" if it has no unit.
         text: meaning, for the manual; $names stand for numbers and choices, see `envs.manual.choices`.
         of_horse: meaning for a horse, if it differs.
         per_episode: True if `reset(options={"parameters": ...})` and `randomize` can change the setting.
-        needs: another setting, and the values of it with which this one has an effect; () for any range,
-            `GIVEN` for all but None.
+        needs: another setting and its values with which this one has an effect; () for any range, `GIVEN` for
+            any value except None.
         span: values that a slider offers; None for a setting without one.
     """
 

@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 from hoof_env.errors import ParameterError, check_number, count
 from hoof_env.tasks.parameters import check_range
 
-MOST_KEPT = 1000
+MAX_DELAY = 1000
 """Largest number of control steps that a delay lasts, and of observations and actions that are observed."""
 
 
@@ -39,7 +39,7 @@ def check_delay(name: str, given: Any, substeps: int, steps: int) -> Delay:
         ParameterError: a delay is negative, no whole number of substeps, or lasts a whole episode; or a range
             has ends that are not whole.
     """
-    most = min(steps - 1, MOST_KEPT)
+    most = min(steps - 1, MAX_DELAY)
     if isinstance(given, (list, tuple)):
         low, high = check_range(name, given, 0.0, most)
         if low != round(low) or high != round(high):
@@ -59,18 +59,18 @@ def check_kept(name: str, given: Any, low: int) -> int:
     """Return a number of observations or actions that are observed.
 
     Raises:
-        ParameterError: it is not a whole number from `low` to `MOST_KEPT`.
+        ParameterError: it is not a whole number from `low` to `MAX_DELAY`.
     """
-    return count(name, given, low=low, most=MOST_KEPT)
+    return count(name, given, low=low, most=MAX_DELAY)
 
 
 class Parts(NamedTuple):
-    """Parts of a control step between which an action begins to act, or an observation is made.
+    """Parts of a control step, at whose boundaries an action takes effect or an observation is taken.
 
     Attributes:
         substeps: substeps of `sim_dt` of each part.
-        acting: number of the part at whose begin an action acts.
-        seeing: number of the part after which an observation is made, -1 if it is made at the step's end.
+        acting: number of the part at whose start an action takes effect.
+        seeing: number of the part after which an observation is taken, -1 for the end of the step.
     """
 
     substeps: tuple[int, ...]
@@ -83,8 +83,8 @@ def parts_of(substeps: int, acts_after: int, seen_before: int) -> Parts:
 
     Args:
         substeps: substeps of the step.
-        acts_after: substeps after which an action acts.
-        seen_before: substeps before the end at which an observation is made.
+        acts_after: substeps after which an action takes effect.
+        seen_before: number of substeps before the end at which an observation is taken.
     """
     ends = sorted({acts_after, substeps - seen_before, substeps} - {0})
     begins = [0, *ends[:-1]]

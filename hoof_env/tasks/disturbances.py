@@ -7,16 +7,16 @@ from typing import Any
 
 import numpy as np
 
-from hoof_env.dynamics.parts import MOST_IMPULSE
+from hoof_env.dynamics.parts import MAX_IMPULSE
 from hoof_env.errors import ParameterError, check_number
 
-MOST_NOISE = 10.0
+MAX_NOISE = 10.0
 """Largest error of a number that is observed, of which the scale has mapped the usual range to [-1, 1]."""
 
-MOST_STRENGTH = 10.0
+MAX_STRENGTH = 10.0
 """Largest factor of all disturbances."""
 
-MOST_PUSH = MOST_IMPULSE / MOST_STRENGTH
+MAX_PUSH = MAX_IMPULSE / MAX_STRENGTH
 """Largest impulse of a planned push [N s], so that it is possible at any strength."""
 
 Push = tuple[int, float, float]
@@ -42,13 +42,13 @@ def check_noise(name: str, given: Any, groups: Sequence[str]) -> dict[str, float
             f" {given!r}"
         )
     return {
-        group: check_number(f"{name}[{group!r}]", value, low=0, high=MOST_NOISE)
+        group: check_number(f"{name}[{group!r}]", value, low=0, high=MAX_NOISE)
         for group, value in given.items()
     }
 
 
 def _listed(value: Any) -> Any:
-    """Return an array as a list; other values as they are."""
+    """Convert an array to a list; return any other value unchanged."""
     return value.tolist() if isinstance(value, np.ndarray) else value
 
 
@@ -57,12 +57,12 @@ def check_pushes(name: str, given: Any, dt: float, steps: int) -> tuple[Push, ..
 
     Args:
         name: name of the setting or option, for messages.
-        given: rows of time [s], impulse forward and impulse upward [N s]; None for none.
+        given: rows of time [s], impulse forward and impulse upward [N s]; None without pushes.
         dt: control step [s], to which times are rounded.
         steps: number of control steps of an episode.
 
     Raises:
-        ParameterError: not such rows, or a time that is not within the episode.
+        ParameterError: a row of another form, or a time outside the episode.
     """
     if given is None:
         return ()
@@ -75,15 +75,15 @@ def check_pushes(name: str, given: Any, dt: float, steps: int) -> tuple[Push, ..
         last = (steps - 1) * dt
         seconds = check_number(f"{name}[{k}], time", row[0], low=0.0, high=last)
         forward, upward = (
-            check_number(f"{name}[{k}], impulse", value, low=-MOST_PUSH, high=MOST_PUSH) for value in row[1:]
+            check_number(f"{name}[{k}], impulse", value, low=-MAX_PUSH, high=MAX_PUSH) for value in row[1:]
         )
-        # A push at the very start comes after the first step: the start has a speed of its own.
+        # A push at time 0 comes after the first step, because the start sets the speed.
         step = max(round(seconds / dt), 1)
         before = impulses.get(step, (0.0, 0.0))
         # The sum of all pushes of a step is one push, which is limited, too.
         impulses[step] = (
-            check_number(f"{name}[{k}], impulse", before[0] + forward, low=-MOST_PUSH, high=MOST_PUSH),
-            check_number(f"{name}[{k}], impulse", before[1] + upward, low=-MOST_PUSH, high=MOST_PUSH),
+            check_number(f"{name}[{k}], impulse", before[0] + forward, low=-MAX_PUSH, high=MAX_PUSH),
+            check_number(f"{name}[{k}], impulse", before[1] + upward, low=-MAX_PUSH, high=MAX_PUSH),
         )
     return tuple((step, *impulses[step]) for step in sorted(impulses))
 
@@ -94,7 +94,7 @@ ROUGHNESS = 0.05
 """Strengths of a horse's rough ground: largest push over the mass [m/s], steepest slope [-], largest bumps
 [m]. legged_gym pushes robots with hips at 0.55 m by 1 m/s (`max_push_vel_xy`), which is this push at the same
 Froude number, and its rough slopes have these bumps (`random_uniform_terrain`). The slope is that of a steep
-road. Chosen before anything was trained on them."""
+road. They were chosen before the first training."""
 
 
 def rough_ground(strength: float, mass: float) -> dict[str, Any]:
@@ -109,7 +109,7 @@ def rough_ground(strength: float, mass: float) -> dict[str, Any]:
             "kind": "hills",
             "length": 2000.0,
             "rise": 10 * ROUGH_SLOPE * strength,
-            # Hills take no slope of 0; those of no height have none.
+            # Hills require a positive slope; at strength 0 they have no height.
             "slope": max(ROUGH_SLOPE * strength, 1e-3),
             "roughness": ROUGHNESS * strength,
             "stiffness": [1.0, 1.0],

@@ -1,4 +1,4 @@
-"""Check for settings that have no effect in combination with the others."""
+"""Check for settings that have no effect under the remaining settings."""
 
 from __future__ import annotations
 
@@ -11,12 +11,12 @@ from hoof_env.tasks.settings import NEEDED, Settings
 
 
 def check_effect(name: str, settings: Settings, within: str = "") -> None:
-    """Check that a setting has an effect in combination with the others.
+    """Check that a setting has an effect under the remaining settings.
 
     Args:
         name: name of the setting.
         settings: all settings, this one included.
-        within: argument or option that contains the setting, for the message; "" for none.
+        within: argument or option that contains the setting, for the message; "" if it is passed directly.
 
     Raises:
         ParameterError: the setting has no effect.
@@ -34,23 +34,23 @@ def check_effect(name: str, settings: Settings, within: str = "") -> None:
         good = " or ".join(f"{needed}={value!r}" for value in values) or f"a range of {needed}"
         good = f"a {needed}" if values == GIVEN else good
         named = f"{within}: {name!r}" if within else name
-        # The trunk is part of the task: the message cannot ask for another one.
+        # The trunk is part of the task: the message cannot suggest another.
         if needed == "trunk" and "free" in (present, *values) and present != "fixed":
             body = "a horse" if present == "free" else "one leg"
-            raise ParameterError(f"{named}: expected none of {body}, where it has no effect")
+            raise ParameterError(f"{named}: expected none for {body}, where it has no effect")
         raise ParameterError(
-            f"{named}: expected {good} beside it, without which it has no effect, got {needed}={present!r}"
+            f"{named}: expected {good}, without which it has no effect, got {needed}={present!r}"
         )
 
 
 def _has_effect(present: Any, values: tuple[str, ...]) -> bool:
-    """True if a needed setting has one of the values that `About.needs` names."""
+    """Return whether a setting has one of the values in `About.needs`."""
     if values == GIVEN:
         return present is not None
     return present in values if values else not _is_one(present)
 
 
 def _is_one(value: Any) -> bool:
-    """True if nothing can be drawn: `value` is a single number or None, or a range with equal ends."""
+    """Return whether a value is single: a number, None, or a range with equal ends."""
     ends = tuple(value) if isinstance(value, Iterable) else (value, value)
     return len(ends) == 2 and bool(ends[0] == ends[1])

@@ -11,8 +11,8 @@ import numpy as np
 from hoof_env.dynamics.layout import PLAIN, Features, StrideSums, engine_layout, stride_peaks
 from hoof_env.gait import PARAMETERS
 from hoof_env.simd.layout import Block, Layout, Row, Size, Vector, extended
-from hoof_env.tasks.own_parts import Own
 from hoof_env.tasks.reward import TERMS
+from hoof_env.tasks.user_parts import Declarations
 
 ACTIONS = len(PARAMETERS)
 """Number of actions of one leg."""
@@ -24,10 +24,10 @@ TRUNCATED = 2
 ACTION = Size("action", ACTIONS)
 REWARD = Size("reward", len(TERMS))
 
-NOTHING = Own()
-"""Declarations of a task without any."""
+NOTHING = Declarations()
+"""Declarations of a task without constants and state."""
 
-MOST_PARTS = 3
+MAX_PARTS = 3
 """Largest number of parts of a control step: an action and an observation may each divide it."""
 
 
@@ -38,7 +38,7 @@ class Episode(Layout):
     steps: Row  # control steps so far
     allowance: Row  # impulse over the weight that bearing is still paid for [s], see `reward.BEARING`
     x_before: Row  # x of the trunk before this step [m]
-    target: Row  # commanded speed [m/s]; infinite if there is none
+    target: Row  # commanded speed [m/s]; infinite without a command
     weight: Row  # weight of trunk and leg [N]
     time: Row  # simulated time [s]
     distance: Row  # forward travel [m]
@@ -58,7 +58,7 @@ class Episode(Layout):
 
 @cache
 def episode_layout(
-    layout: Any, terms: int, features: Features = PLAIN, legs: int = 1, own: Own = NOTHING
+    layout: Any, terms: int, features: Features = PLAIN, legs: int = 1, declared: Declarations = NOTHING
 ) -> Any:
     """Return the layout of an episode's memory, sized for an engine.
 
@@ -67,12 +67,12 @@ def episode_layout(
         terms: number of the reward's terms.
         features: features of the engine.
         legs: number of legs.
-        own: what terms declare; rows that they keep are the field `own`, behind the others.
+        declared: declarations of the terms; their state is the last field, `own`.
     """
     made = features.of(layout).sized(action=legs * ACTIONS, reward=terms)
-    if not own.kept:
+    if not declared.state:
         return made
-    return extended(made, "own", {term: dict.fromkeys(names, Row) for term, names in own.kept})
+    return extended(made, "own", {term: dict.fromkeys(names, Row) for term, names in declared.state})
 
 
 class Memories(NamedTuple):
@@ -87,7 +87,7 @@ class Memories(NamedTuple):
         stride_sums: layout of `StrideSums`.
         sums: number of stride sums.
         peaks: bit mask of the stride sums that are peaks.
-        own_first, own_rows: first row that terms keep in the memory of an episode, and number of these rows.
+        own_first, own_rows: first row of the terms' state in the memory of an episode, and number of rows.
     """
 
     episode: Any
@@ -105,11 +105,13 @@ class Memories(NamedTuple):
 
 
 @cache
-def memories_of(layout: Any, terms: int, features: Features, legs: int = 1, own: Own = NOTHING) -> Memories:
+def memories_of(
+    layout: Any, terms: int, features: Features, legs: int = 1, declared: Declarations = NOTHING
+) -> Memories:
     """Return the layouts of an engine with these features and of episodes with a number of terms and legs."""
     form = engine_layout(features)
-    episode = episode_layout(layout, terms, features, legs, own)
-    kept = episode.rows("own") if own.kept else slice(0, 0)
+    episode = episode_layout(layout, terms, features, legs, declared)
+    state = episode.rows("own") if declared.state else slice(0, 0)
     return Memories(
         episode=episode,
         trunk=form.trunk_memory,
@@ -121,8 +123,8 @@ def memories_of(layout: Any, terms: int, features: Features, legs: int = 1, own:
         stride_sums=features.of(StrideSums),
         sums=form.sums,
         peaks=sum(is_peak << k for k, is_peak in enumerate(stride_peaks(features))),
-        own_first=kept.start,
-        own_rows=kept.stop - kept.start,
+        own_first=state.start,
+        own_rows=state.stop - state.start,
     )
 
 
@@ -153,23 +155,27 @@ def task_type(terms: int, entries: int, gait: int = ACTIONS, more: tuple[Any, ..
             ("height", "f8"),  # nominal height of the trunk [m]
             ("lowest", "f8"),  # height of the trunk at or below which an episode fails [m]
             ("highest", "f8"),  # height of the trunk at or above which an episode fails [m]
-            ("stays", "?"),  # True for a fixed trunk
+            ("is_fixed", "?"),  # True if the trunk cannot move
             ("observation_size", "i8"),
             ("observation_columns", "i8", (entries,)),  # column of the entry in each slot; -1: not observed
             ("frame_size", "i8"),  # numbers that are observed of one instant, a frame
-            ("frames", "i8"),  # frames that are kept of a row; 0: none, frames are the observation
-            ("first_frame", "i8"),  # kept frame that is observed without delay, 1 if it is one within a step
+            ("frames", "i8"),  # frames stored of a row; 0: the observation is the present frame
+            ("first_frame", "i8"),  # stored frame that is observed without delay, 1 for a frame within a step
             ("history", "i8"),  # frames that are observed
-            ("keeps_actions", "?"),
+            ("has_actions", "?"),
             ("action_size", "i8"),  # numbers of an action
-            ("kept_actions", "i8"),  # actions that are kept of a row
+            ("kept_actions", "i8"),  # actions stored of a row
             ("last_actions", "i8"),  # actions that are observed
             ("has_privileged", "?"),
-            ("privileged_columns", "i8", (entries,)),  # column of the true number of each slot; -1: none
+            (
+                "privileged_columns",
+                "i8",
+                (entries,),
+            ),  # column of the true number of each slot; -1: not observed
             ("parts", "i8"),  # parts of a control step, see `tasks.delays.Parts`
-            ("part_substeps", "i8", (MOST_PARTS,)),
-            ("acting_part", "i8"),  # part at whose begin an action acts
-            ("seeing_part", "i8"),  # part after which a frame within the step is observed; -1: none
+            ("part_substeps", "i8", (MAX_PARTS,)),
+            ("acting_part", "i8"),  # part at whose start an action takes effect
+            ("seeing_part", "i8"),  # part after which a frame within the step is observed; -1: no such frame
             ("is_noisy", "?"),  # True with noise or bias
             ("noise", "f8", (entries,)),  # largest error of each slot in a step
             ("bias", "f8", (entries,)),  # largest error of each slot that stays for an episode

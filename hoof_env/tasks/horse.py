@@ -1,4 +1,4 @@
-"""Body of `Horse-v0`: a trunk on four legs, in the plane. The other body is in `one_leg`.
+"""Body of `Horse-v0`: a trunk on four legs, in the plane. The body of one leg is in `one_leg`.
 
 The horse has a mass of 475 kg and its hips are 1.4 m high. Its legs are the linkage of the preset, scaled,
 with the segment masses of Buchner and others (1997, see `leg.limb_masses`). Springs of 24 kN/m at toe and
@@ -37,7 +37,7 @@ from hoof_env.leg.presets import Preset, preset_label
 from hoof_env.record.surroundings import Hips
 from hoof_env.simd.layout import Block
 from hoof_env.tasks.body import BodyKernels
-from hoof_env.tasks.disturbances import MOST_STRENGTH
+from hoof_env.tasks.disturbances import MAX_STRENGTH
 from hoof_env.tasks.episode import ACTION, Episode
 from hoof_env.tasks.horse_gaits import (
     ACTED,
@@ -110,10 +110,10 @@ OPTIONS = {
     "pitch": (-0.4, 0.4),
     "x": (-1e5, 1e5),
     "target_speed": (0.1, 20.0),
-    "strength": (0.0, MOST_STRENGTH),
+    "strength": (0.0, MAX_STRENGTH),
 }
 """Numeric reset options and their ranges [strides, m/s, rad, m, m/s, -]; "gait", "parameters" and "pushes"
-are the others."""
+are not numeric."""
 
 COMMAND_STEP = 0.5
 """Largest change from one commanded speed to the next [m/s]: the reference gait changes at once with the
@@ -129,8 +129,8 @@ of each crank [strides]."""
 class HorseEpisode(Episode):
     """Memory of an episode of a horse."""
 
-    gait: GaitRows  # gait from which actions make offsets
-    offset: Annotated[Block, ACTION]  # offsets that actions have made so far, in units of `SPANS`
+    gait: GaitRows  # gait to which actions add offsets
+    offset: Annotated[Block, ACTION]  # sum of the actions' offsets so far, in units of `SPANS`
 
 
 HORSE_KERNELS = BodyKernels(
@@ -153,18 +153,18 @@ class Horse:
         size: length over that of a horse of 475 kg [-].
         speed_scale: speed over that of a horse of 475 kg, the root of the size [-].
         gaits: stored gaits by name, converted to the size of the animal.
-        gait: gait from which actions make offsets at all commanded speeds; None for `reference_gaits`.
+        gait: gait to which actions add offsets at all commanded speeds; None for `reference_gaits`.
         lowest, highest: heights of the trunk beyond which the animal has fallen [m].
 
     Raises:
-        ParameterError: a setting is out of range, or one that a horse does not accept.
+        ParameterError: a setting is out of range, or a horse does not accept it.
     """
 
     kernels = HORSE_KERNELS
     picture = "horse"
     finite_fields: tuple[str, ...] = ("gait",)
     action_names: tuple[str, ...] = tuple(f"{leg}_{name}" for leg, name in product(LEGS, PARAMETERS))
-    # The spans are in the tag, so that policies, states and datasets of other spans are refused.
+    # The spans are in the tag, so that policies, states and datasets with different spans are refused.
     action_form = f"offsets of {SPANS[0]:g} and {SPANS[1]:g} rad"
     step_error = STEP_ERROR
     start_names: tuple[str, ...] = ("phase", "speed", "pitch", "x")
@@ -188,12 +188,12 @@ class Horse:
         self.filters = FILTERS[filters].sped_up(1 / self.speed_scale)
         if s.hip_height is not None:
             raise ParameterError(
-                f"hip_height: expected none of a horse, whose `size` it is, got {s.hip_height!r}"
+                f"hip_height: expected `size` in place of it for a horse, got {s.hip_height!r}"
             )
         self.command_step = COMMAND_STEP * self.speed_scale
         self.lowest, self.highest = (self.size * height for height in HEIGHT)
         spring = self._spring(s)
-        # A start sags in proportion to it; 0 stands for rigid hooves.
+        # The sag at a start is proportional to it; 0 for rigid hooves.
         self._softness = 0.0 if spring is None else HOOF_STIFFNESS * self.size**2 / spring.stiffness
         self.limits: Limits | None = Limits(
             (-PITCH, PITCH), (self.lowest, self.highest), CLEARANCE * self.size
@@ -329,7 +329,7 @@ class Horse:
         hoof = (y * np.cos(slope) - x * np.sin(slope)).min((0, 1))
         # Height of the lowest hoof over the slope; below it is the compression of the springs.
         lift = hoof + self.height * motion["y"] if is_known else np.full(len(hoof), -SAG * self.size)
-        # A rigid hoof starts above the ground: no contact begins inside it.
+        # A rigid hoof starts above the ground, so that no episode starts in contact.
         lift = np.where(lift < 0, self._softness * lift, lift) + (0 if self._softness else GAP * self.size)
         ground = engine.terrain.height_at(values["x"] + x)
         rate = start.gaits[:, 0]
@@ -405,7 +405,7 @@ def _leg_of(preset: Preset, size: float) -> Geometry:
     return geometry.scaled(HIP_HEIGHT * size / geometry.hip_height)
 
 
-# Kept, because `parts` is called for every drawn set of parameters.
+# Cached, because `parts` is called for every drawn set of parameters.
 @cache
 def _limb(geometry: Geometry, pair: str, mass: float) -> Geometry:
     """Return a leg with the segment masses of a fore or hind limb, for a mass of the animal [kg]."""

@@ -141,7 +141,7 @@ class HorseGait:
 
 
 def checked_size(given: float | None) -> float:
-    """Return the setting `size`, 1 for None; raise `ParameterError` for a size outside `SIZES`."""
+    """Return the setting `size`, or 1 if it is None; raise `ParameterError` for a size outside `SIZES`."""
     return check_number("size", 1.0 if given is None else given, low=SIZES[0], high=SIZES[1])
 
 
@@ -374,10 +374,10 @@ mean of the last actions, and decays under zero actions."""
 def command_gait(
     task: Any, actions: Pointer, episode: Any, first_leg: Any, parameters: int, n: Whole, scratch: Any
 ) -> None:
-    """Command the gait of the episode with the offsets that actions make; `scratch` has room for
+    """Command the gait of the episode plus the offsets of the actions; `scratch` has room for
     `SCRATCH_SIZE` numbers. See `body.BodyKernels.command`.
 
-    The first action of a leg scales its crank's speed, the others are added to the swing's first three
+    The first action of a leg scales its crank's speed, the remaining three are added to the swing's first
     coefficients. The first loop finds the phase of every leg, which the coupling in the second one needs."""
     gait = episode.gait
     together = vector(full_like(episode, 0.0), 0.0)

@@ -1,5 +1,5 @@
-"""Entries of the observation and terms of the reward of `Horse-v0`; `observation` and `reward` have those of
-one leg."""
+"""Entries of the observation and terms of the reward of `Horse-v0`; `observation` and `reward` have the
+entries and terms of one leg."""
 
 from __future__ import annotations
 
@@ -148,7 +148,7 @@ def alive(step: Outcome, weight: Number) -> Lanes:
 
 def tracking(step: Outcome, weight: Number) -> Lanes:
     """Return the reward for speed: 1 at the commanded speed, less twice the relative error, at least -1."""
-    # Twice the error: with less, a policy gains by sliding less and staying behind the command.
+    # Twice the error: with a smaller factor, a policy gains by sliding less and lagging the command.
     asked = maximum(step.commanded_progress, 1e-9)
     error = absolute(step.progress - asked) / asked
     return where(step.seconds > 0.0, weight * step.seconds * maximum(1.0 - 2.0 * error, -1.0), 0.0)

@@ -15,14 +15,14 @@ from hoof_env.errors import ParameterError, check_choice, check_number
 from hoof_env.gait import GaitParameters, gait_array, paper_gaits
 from hoof_env.ground.terrain import Terrain
 from hoof_env.leg.profile import LegProfile, by_name
-from hoof_env.tasks.disturbances import MOST_STRENGTH
+from hoof_env.tasks.disturbances import MAX_STRENGTH
 from hoof_env.tasks.parameters import check_parameters
 from hoof_env.tasks.settings import Settings
 
 Floats = NDArray[np.float64]
 
-LOWEST = 0.6
-HIGHEST = 2.0
+MIN_HEIGHT = 0.6
+MAX_HEIGHT = 2.0
 """Heights of the trunk at which an episode fails, over its nominal height [-]."""
 
 START_SPEED = 1.0
@@ -34,12 +34,12 @@ OPTIONS = {
     "height": (0.0, np.inf),
     "x": (-1e5, 1e5),
     "target_speed": (-20.0, 20.0),
-    "strength": (0.0, MOST_STRENGTH),
+    "strength": (0.0, MAX_STRENGTH),
 }
-"""Numeric reset options and their ranges [rad, m/s, m, m, m/s, -]; "gait", "parameters" and "pushes" are the
-others."""
+"""Numeric reset options and their ranges [rad, m/s, m, m, m/s, -]; "gait", "parameters" and "pushes" are
+not numeric."""
 
-# Minari passes its own option on to the environment.
+# Minari passes its option on to the environment.
 FOREIGN_OPTIONS = ("minari_autoseed",)
 """Options of other libraries, which are ignored."""
 
@@ -49,7 +49,7 @@ REACH = 1.0
 """Level ground; least distance of a start from the ends of a terrain [m], as an episode travels; largest
 distance from O, forward and back, at which a hoof can touch down [m]."""
 
-MOST_TRIES = 100  # draws of a crank angle until the hoof is above the ground
+MAX_TRIES = 100  # draws of a crank angle until the hoof is above the ground
 
 
 @dataclass
@@ -112,8 +112,8 @@ def draw_starts(
 ) -> Start:
     """Draw random starts, one for each generator. Options set values (see `check_options`).
 
-    No contact begins with a hoof inside the ground: a suspended trunk then starts higher, and under any other
-    trunk the crank angle is drawn again.
+    No episode starts with a hoof inside the ground: a suspended trunk starts higher instead, and under any
+    other trunk the crank angle is drawn again.
 
     Args:
         options: checked reset options.
@@ -126,7 +126,7 @@ def draw_starts(
         own_gait: gait of all starts; None for one between walk and run.
     """
     n = len(generators)
-    # Always three numbers, whatever the options are, so that an option does not change the others.
+    # Always three numbers, so that an option does not change the remaining draws.
     drawn = np.array([generator.random(3) for generator in generators])
     ends = [end.to_array() for end in paper_gaits(gaits).values()]
     mixed = ends[0] + drawn[:, :1] * (ends[-1] - ends[0])
@@ -146,7 +146,7 @@ def draw_starts(
             height = np.maximum(height, ground - hoof_height(profile, chosen, theta))
     elif "crank_angle" not in options:
         # Only rows with a hoof inside the ground draw again, so that neighbours do not change a row's bits.
-        for _ in range(MOST_TRIES):
+        for _ in range(MAX_TRIES):
             below = np.flatnonzero(height + hoof_height(profile, chosen, theta) < ground)
             if not below.size:
                 break
@@ -192,7 +192,7 @@ def checked_options(options: Any, numbers: Mapping[str, tuple[float, float]]) ->
     """Check the names of reset options and the values of the numeric ones.
 
     Args:
-        options: options of `reset`; None for none.
+        options: options of `reset`, or None.
         numbers: ranges of the numeric options by name.
 
     Raises:
@@ -245,9 +245,9 @@ def _check_trunk(options: Mapping[str, float], trunk: Trunk) -> None:
         raise ParameterError(
             f"options['height']: a {trunk.kind} trunk is at {trunk.height:g} m, got {height:g} m"
         )
-    if not LOWEST * trunk.height < height < HIGHEST * trunk.height:
+    if not MIN_HEIGHT * trunk.height < height < MAX_HEIGHT * trunk.height:
         raise ParameterError(
-            f"options['height']: expected {LOWEST:g} to {HIGHEST:g} times {trunk.height:g} m, "
+            f"options['height']: expected {MIN_HEIGHT:g} to {MAX_HEIGHT:g} times {trunk.height:g} m, "
             f"outside which an episode fails, got {height:g}"
         )
     if trunk.kind == "fixed" and speed != 0.0:
@@ -258,7 +258,7 @@ def _gait(value: Any, gaits: Mapping[str, GaitParameters]) -> GaitParameters:
     """Convert the option "gait": a name, `GaitParameters`, or a mapping of their values.
 
     Raises:
-        ParameterError: anything else.
+        ParameterError: a value of another form.
     """
     if isinstance(value, GaitParameters):
         gait_array(value, 1)  # refuses harmonics that no environment of one leg takes

@@ -15,7 +15,7 @@ from hoof_env.ground.terrain import surface
 from hoof_env.simd import Lanes, Number, where
 from hoof_env.simd.math import cos_sin
 from hoof_env.simd.user_functions import check_function, inputs
-from hoof_env.tasks.own_parts import Constant, check_arguments, check_parts
+from hoof_env.tasks.user_parts import Constant, check_arguments, check_parts
 
 if TYPE_CHECKING:
     from hoof_env.dynamics.layout import ContactMemory, LegMemory, TrunkMemory
@@ -55,7 +55,7 @@ class Scale:
 
     Attributes:
         text: formula, for the manual page.
-        apply: function of the number and the `ObservationInputs`; None for the number itself.
+        apply: function of the number and the `ObservationInputs`; None for the identity.
         saturates: True if the hyperbolic tangent of the result is taken.
 
     Raises:
@@ -183,14 +183,14 @@ def in_contact(memory: ContactMemory) -> Lanes:
 def _approach_speed(memory: ContactMemory) -> Lanes:
     """Return the approach speed of a hoof point in contact [m/s], else 0."""
     inverse = memory.inverse_approach_speed
-    # The inner choice avoids a division by 0 in lanes that take the other value.
+    # The inner `where` avoids a division by 0 in lanes out of contact.
     return where(inverse > 0.0, 1.0 / where(inverse > 0.0, inverse, 1.0), 0.0)
 
 
 def _ahead(distance: float) -> Callable[[Any], Any]:
     """Return a function that measures the height of the ground at a distance ahead of O [m]."""
 
-    # Relative to the ground under O: heights in the world say nothing after hundreds of metres.
+    # Relative to the ground under O: after hundreds of metres a height in the world is meaningless.
     def rise(scene: ObservationInputs) -> Lanes:
         x = scene.trunk.report.place.real
         here = surface(x, scene.ground, scene.ground_origin, scene.ground_per_metre)[0]
@@ -207,7 +207,7 @@ _UNITS = ("rad/s", "rad", "rad", "rad")
 IN_RANGE = tuple(map(_in_range, range(4)))
 IN_RATE = tuple(map(_in_rate, range(4)))
 """Scales of the gait parameters and their rates. They use the limits and bounds of the leg; their texts show
-those of the published one, see `envs.manual_bodies.LegTables.scaling`."""
+the limits and bounds of the published leg, see `envs.manual_bodies.LegTables.scaling`."""
 
 ENTRIES = (
     Entry("sin(crank angle)", "crank", "-", _sine, PLAIN),

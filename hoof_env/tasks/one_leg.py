@@ -1,4 +1,4 @@
-"""Body of all ids except `Horse-v0`: a trunk that one leg carries or pulls. The other body is in `horse`."""
+"""Body of all ids except `Horse-v0`: a trunk that one leg carries or pulls; see `horse` for the horse."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ from hoof_env.simd import Mask, Pointer, Whole, maximum, minimum, read
 from hoof_env.simd.math import clip
 from hoof_env.tasks.body import BodyKernels
 from hoof_env.tasks.episode import ACTIONS, Episode
-from hoof_env.tasks.leg_starts import HIGHEST, LOWEST, OPTIONS, Start, check_options, draw_starts
+from hoof_env.tasks.leg_starts import MAX_HEIGHT, MIN_HEIGHT, OPTIONS, Start, check_options, draw_starts
 from hoof_env.tasks.parameters import check_range, drive_of, ground_of, hoof_spring
 from hoof_env.tasks.settings import ResolvedSettings, Settings
 
@@ -53,7 +53,7 @@ def check_rates(s: Settings, speed_scale: float = 1.0) -> Floats:
     """Return the rates at which an action of 1 changes the gait, shape (4,) [rad/s^2, rad/s, rad/s, rad/s].
 
     Args:
-        s: settings; their rates are those of the published leg.
+        s: settings; their rates are for the size of the published leg.
         speed_scale: see `gait.speed_scale_of`.
 
     Raises:
@@ -142,7 +142,7 @@ def heading_now(engine: TrunkEngine, dt: float) -> Floats:
 def command_rates(
     task: Any, actions: Pointer, episode: Episode, leg: Any, parameters: int, n: Whole, scratch: Any
 ) -> None:
-    """Command the rates that an action asks for, relative to where the gait is heading and within the limits;
+    """Command the rates that an action requests, relative to the gait's heading and within the limits;
     see `body.BodyKernels.command`."""
     for k in range(ACTIONS):
         action = clip(read(actions, n * ACTIONS + k, ACTIONS, leg.lanes), 1.0)
@@ -222,7 +222,7 @@ class OneLeg:
         self.rates = check_rates(s, self.speed_scale)
         nominal = self.geometry.hip_height
         height = nominal if s.hip_height is None else s.hip_height
-        self.height = check_number("hip_height", height, low=LOWEST * nominal, high=HIGHEST * nominal)
+        self.height = check_number("hip_height", height, low=MIN_HEIGHT * nominal, high=MAX_HEIGHT * nominal)
 
     def parts(self, s: ResolvedSettings) -> tuple[Trunk, Ground, tuple[Limb, ...]]:
         """Make trunk, ground and legs from settings, see `Body.parts`."""
@@ -239,7 +239,7 @@ class OneLeg:
         return trunk, ground_of(s, s.trunk_mass), (limb,)
 
     def commanded_speeds(self, s: Settings) -> tuple[float, float] | None:
-        """Return the lowest and highest commanded speed [m/s], None for no command."""
+        """Return the lowest and highest commanded speed [m/s]; None without a command."""
         if s.target_speed is None:
             return None
         return check_range("target_speed", s.target_speed, *OPTIONS["target_speed"])
@@ -284,8 +284,8 @@ class OneLeg:
             "low": self.low,
             "high": self.high,
             "height": self.height,
-            "lowest": LOWEST * self.height,
-            "highest": HIGHEST * self.height,
+            "lowest": MIN_HEIGHT * self.height,
+            "highest": MAX_HEIGHT * self.height,
         }
 
     def check_options(self, options: Any, trunk: Trunk, settings: Settings) -> dict[str, Any]:
@@ -304,10 +304,10 @@ class OneLeg:
         )
 
     def complete_start(self, start: Start, targets: Floats, options: Any, engine: TrunkEngine) -> None:
-        """Do nothing: no start depends on the commanded speeds."""
+        """Do nothing: starts do not depend on the commanded speeds."""
 
     def begin_episodes(self, episode: Any, which: NDArray[np.int64], start: Start) -> None:
-        """Do nothing: an episode of one leg has no fields of its own."""
+        """Do nothing: an episode of one leg has no further fields."""
 
     @property
     def policy_names(self) -> list[str]:

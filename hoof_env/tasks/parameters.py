@@ -17,15 +17,15 @@ from hoof_env.leg.presets import preset_error_type, preset_label, read_preset
 from hoof_env.tasks.effects import check_effect
 from hoof_env.tasks.settings import PER_EPISODE, SOLVERS, ResolvedSettings, Settings
 
-MOST_SUBSTEPS = 100_000  # largest number of substeps of a control step
+MAX_SUBSTEPS = 100_000  # largest number of substeps of a control step
 
 
 def resolved(settings: Settings) -> ResolvedSettings:
-    """Return the settings with values for None: the ground of the preset, the solver's own scheme and step.
+    """Return the settings with defaults in place of None: the preset's ground, the solver's scheme and step.
 
     Raises:
         ParameterError: an unknown solver.
-        Exception: the preset's own type of error, if it has no ground and the settings lack one.
+        Exception: the preset has no ground and the settings lack one; of the type of the preset's errors.
     """
     is_paper = check_choice("solver", settings.solver, SOLVERS) == "paper"
     values = dict(vars(settings))
@@ -57,7 +57,7 @@ def check_range(
         or_one: True if one number is accepted.
 
     Raises:
-        ParameterError: anything else.
+        ParameterError: a value of another form.
     """
     if or_one and not isinstance(value, (list, tuple)):
         value = value, value
@@ -73,16 +73,16 @@ def substeps_of(dt: float, sim_dt: float) -> int:
     """Return the number of substeps of `sim_dt` [s] in a control step of `dt` [s].
 
     Raises:
-        ParameterError: the ratio is not a whole number, or above `MOST_SUBSTEPS`.
+        ParameterError: the ratio is not a whole number, or above `MAX_SUBSTEPS`.
     """
     check_number("sim_dt", sim_dt, low=0, exclusive_low=True)
     check_number("dt", dt, low=0, exclusive_low=True)
     # With a tolerance: 0.02 / 0.001 is not a whole number in binary.
     ratio = dt / sim_dt
-    if not 0.5 < ratio <= MOST_SUBSTEPS or abs(ratio - round(ratio)) > 1e-6:
+    if not 0.5 < ratio <= MAX_SUBSTEPS or abs(ratio - round(ratio)) > 1e-6:
         raise ParameterError(
             f"dt: expected a whole multiple of sim_dt = {sim_dt:g} s, got {dt:g} s "
-            f"(ratio {ratio:g}; at most {MOST_SUBSTEPS})"
+            f"(ratio {ratio:g}; at most {MAX_SUBSTEPS})"
         )
     return round(ratio)
 
@@ -109,13 +109,13 @@ def drive_of(s: Settings) -> Drive:
     """Make the drive of the cranks from settings."""
     if s.drive == "prescribed":
         return Prescribed()
-    # The settings are those of the motor at the crank: a gear ratio of 1.
+    # The settings describe the motor at the crank: a gear ratio of 1.
     return Motor(s.motor_gain, s.motor_torque, s.motor_inertia, 1.0)
 
 
 def hoof_spring(settings: Settings) -> HoofSpring | None:
-    """Make the spring at toe and heel, None for a rigid hoof. The default damping is a tenth of the critical
-    one under the trunk mass of the settings, even if a reset draws another mass.
+    """Make the spring at toe and heel, or None for a rigid hoof. The default damping is a tenth of critical
+    damping under the trunk mass of the settings, even if a reset draws another mass.
 
     Raises:
         ParameterError: a value is out of range, or there is a damping without a stiffness.
@@ -166,14 +166,14 @@ def check_parameters(name: str, given: Any, settings: Settings) -> dict[str, flo
 
 
 def extremes(given: Mapping[str, float | tuple[float, float]]) -> list[dict[str, float]]:
-    """Return the corners of the ranges that can be invalid or ask for short steps: all lowest, all highest,
+    """Return the corners of the ranges that can be invalid or need short steps: all lowest, all highest,
     closest friction thresholds, and the stiffest contact under a light and a heavy trunk."""
     # Not all 2^n corners: these few bound the limits of the step.
     pairs = {name: value if isinstance(value, tuple) else (value, value) for name, value in given.items()}
     low, high = ({name: ends[k] for name, ends in pairs.items()} for k in (0, 1))
 
     def mixed(base: dict[str, float], other: dict[str, float], *names: str) -> dict[str, float]:
-        """Return a corner with some parameters of another one."""
+        """Return a corner with some parameters of another corner."""
         return base | {name: other[name] for name in names if name in other}
 
     # The lower threshold at its highest, the upper one at its lowest: they may cross.
@@ -196,13 +196,13 @@ def draw_parameters(
 
 STRETCH = 10.0
 DRIFT = 0.03
-HIGHEST_HILLS = 0.2
+MAX_HILLS = 0.2
 """Limits of ground under a trunk that does not follow it: the mean height over `STRETCH` [m] stays within
 `DRIFT` times the hip height of y = 0. At that height the suspension of `HorseLeg-v0` loads or unloads the leg
-by 1.1 times the weight. Hills rise and fall about y = 0, so that they may be as high as `HIGHEST_HILLS` times
+by 1.1 times the weight. Hills rise and fall about y = 0, so that they may be as high as `MAX_HILLS` times
 the hip height."""
 
-HELD = ("suspended", "rail")
+WORLD_FIXED_HEIGHT = ("suspended", "rail")
 """Kinds of trunks that travel and keep their height in the world."""
 
 
@@ -211,14 +211,14 @@ def check_drift(terrain: Terrain, description: Any, trunk: str, hip_height: floa
 
     Args:
         terrain: terrain.
-        description: setting `terrain` that it was made from.
+        description: setting `terrain` that describes it.
         trunk: kind of trunk.
         hip_height: nominal height of the trunk [m].
 
     Raises:
         ParameterError: the ground drifts too far from y = 0.
     """
-    if trunk not in HELD or terrain == Terrain.flat():
+    if trunk not in WORLD_FIXED_HEIGHT or terrain == Terrain.flat():
         return
     remedy = (
         f"under a {trunk} trunk, which keeps its height in the world: the leg would climb into a wall or lose"
@@ -227,7 +227,7 @@ def check_drift(terrain: Terrain, description: Any, trunk: str, hip_height: floa
     if isinstance(description, Mapping) and description.get("kind") == "hills":
         hills = {**HILLS, **description}
         rise = float(hills["rise"] + hills["roughness"]) * max(float(hills["begin"]), 1.0)
-        most = HIGHEST_HILLS * hip_height
+        most = MAX_HILLS * hip_height
         if rise > most:
             raise ParameterError(f"terrain['rise']: expected at most {most:.3g} m {remedy}; got {rise:.3g} m")
         return
@@ -282,7 +282,7 @@ HILLS: dict[str, Any] = {
 }
 """Defaults of `hills`: seed; length [m]; largest absolute height [m]; steepest slope [-]; mean length of a
 patch [m]; ranges of the factors of stiffness and friction; largest height of bumps on the hills [m]; factor
-of all heights at the begin, from which it goes steadily to 1 at the end [-]."""
+of all heights at the start, which rises linearly to 1 at the end [-]."""
 
 BUMPS = 0.5
 """Distance of the random heights of bumps, between which the ground is straight [m]."""
@@ -292,7 +292,7 @@ def make_terrain(description: Any) -> Terrain:
     """Make a terrain from the setting `terrain`.
 
     Hills are straight from one random height to the next, each with its own slope, over patches of random
-    stiffness and friction. The same seed gives the same hills. They begin at x = 0. Under a suspended trunk
+    stiffness and friction. The same seed gives the same hills. They start at x = 0. Under a suspended trunk
     they must be low, because the rest of the animal does not follow them (`check_drift`).
 
     Args:
@@ -300,7 +300,7 @@ def make_terrain(description: Any) -> Terrain:
             "angle": rad}, or the mapping that `Terrain.to_dict` returns.
 
     Raises:
-        ParameterError: anything else.
+        ParameterError: a value of another form.
     """
     if description is None:
         return Terrain.flat()
@@ -365,7 +365,7 @@ def _draw(hills: _Hills) -> Terrain:
     height = 0.0
     row = np.zeros(knots)
     k = 1
-    # The order of the draws is part of what a seed means.
+    # Results of a seed depend on the order of the draws.
     while k < knots:
         target = generator.uniform(-hills.rise, hills.rise)
         slope = generator.uniform(0.2, 1.0) * hills.slope

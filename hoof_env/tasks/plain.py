@@ -21,7 +21,7 @@ def to_json(settings: Settings) -> dict[str, Any]:
 
 def as_plain(name: str, value: Any) -> Any:
     """Convert a value to plain Python: numbers of NumPy and pandas to numbers, arrays and other sequences to
-    lists, paths to text, enumerations to their value. Other objects are returned as they are.
+    lists, paths to text, enumerations to their value. Other objects are returned unchanged.
 
     Args:
         name: name of the value in messages.
@@ -45,14 +45,14 @@ def as_plain(name: str, value: Any) -> Any:
     if isinstance(value, Sequence) and not isinstance(value, (str, bytes)):
         plain = (as_plain(f"{name}[{k}]", inner) for k, inner in enumerate(value))
         return tuple(plain) if isinstance(value, tuple) else list(plain)
-    # Subclasses of other libraries, which JSON and pickles of this package should not depend on.
+    # JSON and pickles must not depend on other libraries' subclasses.
     if isinstance(value, (int, float, str)):
         return next(kind(value) for kind in (int, float, str) if isinstance(value, kind))
     if hasattr(type(value), "__float__"):
         raise ParameterError(
             f"{name}: expected a number of Python or NumPy, which JSON can hold, got {value!r}"
         )
-    return value  # the check of the setting says what is wrong
+    return value  # the setting's check raises the error
 
 
 def json_value(value: Any) -> Any:

@@ -28,14 +28,14 @@ from hoof_env.tasks.horse_gaits import checked_size
 from hoof_env.tasks.horse_terms import HORSE_ENTRIES, HORSE_TERMS
 from hoof_env.tasks.observation import ENTRIES, Entry, check_groups, groups_of
 from hoof_env.tasks.one_leg import OneLeg
-from hoof_env.tasks.own_parts import ActionMap, check_constants, constants_of
 from hoof_env.tasks.plain import as_plain, json_value
 from hoof_env.tasks.reward import TERMS, Term, check_weights
 from hoof_env.tasks.schedules import SPEED, check_unscheduled
 from hoof_env.tasks.settings import SETTINGS, Settings
+from hoof_env.tasks.user_parts import ActionMap, check_constants, constants_of
 
 ANY_SPEED = (0.0, 1.0)
-"""Range that stands for a scheduled one where it matters only that speeds are drawn."""
+"""Placeholder for a scheduled range, where it matters only that speeds are drawn."""
 
 
 @dataclass(frozen=True)
@@ -47,7 +47,7 @@ class Task:
         summary: one line for the manual page.
         about: description for the manual page.
         defaults: settings that differ from the defaults of `Settings`.
-        start: reset options that are used unless others are given.
+        start: default reset options.
         reference: name of the scripted gait with a score that simple policies must not reach.
         terms: terms of the reward.
         entries: entries that can be observed.
@@ -55,8 +55,8 @@ class Task:
         speeds: range of commanded speeds for a `target_speed` of None, of a horse of size 1; proportional to
             the root of the size [m/s].
         contact_law: user's law instead of `normal_law`, see `dynamics.hoof.contact_force`.
-        action_map: map from actions to those of the body.
-        module: module that registers the task, which other processes import.
+        action_map: map from the task's actions to the body's.
+        module: module that registers the task; worker processes import it.
     """
 
     name: str
@@ -100,12 +100,12 @@ class Task:
         return self
 
     def settings(self, changes: Mapping[str, Any]) -> Settings:
-        """Return the task's settings with changes. Reward weights and constants that are not named keep the
-        task's values.
+        """Return the task's settings with changes. Reward weights and constants not in `changes`
+        have the task's values.
 
         Raises:
             UnknownArgumentError: an unknown setting.
-            ParameterError: a change has no effect with the other settings.
+            ParameterError: a change has no effect under the remaining settings.
         """
         settings = self.chosen(changes)
         if self.speeds is None or settings.target_speed is not None:
@@ -114,7 +114,7 @@ class Task:
         return replace(settings, target_speed=(speed_scale * self.speeds[0], speed_scale * self.speeds[1]))
 
     def chosen(self, changes: Mapping[str, Any]) -> Settings:
-        """Return the settings as `settings` does, but with a `target_speed` of None where it was not set."""
+        """Return the settings like `settings`, but leave `target_speed` None if it was not set."""
         for name in changes:
             if name not in SETTINGS:
                 near = difflib.get_close_matches(name, SETTINGS, 1)
@@ -131,7 +131,7 @@ class Task:
             raise UnknownArgumentError(f"{self.id}: unknown settings {', '.join(unknown)}")
         plain = replace(Settings(), **self.defaults)
         settings = replace(plain, **changes)
-        # `target_seconds` has an effect with the range that None stands for.
+        # A `target_speed` of None means the task's range, with which `target_seconds` has an effect.
         is_ranged = self.speeds is not None and settings.target_speed is None
         in_effect = replace(settings, target_speed=self.speeds) if is_ranged else settings
         if isinstance(settings.schedule, Mapping) and SPEED in settings.schedule:
@@ -139,7 +139,7 @@ class Task:
             in_effect = replace(settings, target_speed=ANY_SPEED)
         for name, value in changes.items():
             usual = json_value(getattr(plain, name))
-            # A default that is passed explicitly asks for nothing, with or without an effect.
+            # An explicit default value is accepted even where the setting has no effect.
             if not np.array_equal(json_value(value), usual):
                 check_effect(name, in_effect)
                 # A scheduled speed needs a target_speed, which gives the environment a command at all.
@@ -319,7 +319,7 @@ def task_of(name: Any) -> Task:
         ParameterError: there is no such task.
     """
     module, _, env_id = name.rpartition(":") if isinstance(name, str) else ("", "", name)
-    # A spawned process has registered nothing: the module does so when it is imported.
+    # A spawned process registers the tasks of a module by importing it.
     if module and env_id not in _OWN:
         try:
             import_module(module)
@@ -333,7 +333,7 @@ def _task_like(name: str, names: tuple[list[str], ...]) -> Task:
     """Return the task of a pickle: this process's task of that name.
 
     Raises:
-        ParameterError: there is none, or it has other terms, entries or another law than the pickled one.
+        ParameterError: there is no such task, or its terms, entries or law differ from the pickled task's.
     """
     task = task_of(name)
     if task.names() != names:
@@ -364,7 +364,7 @@ def _check_twice(env_id: str, names: list[str]) -> None:
 
 
 def _check_laws(env_id: str, contact_law: Any, action_map: Any) -> None:
-    """Check a contact law and a map of actions of one's own, each None for none."""
+    """Check a user-defined contact law and action map; each may be None."""
     if contact_law is not None:
         check_function(f"{env_id}: contact_law", contact_law, 4)
     if action_map is not None:
@@ -372,7 +372,7 @@ def _check_laws(env_id: str, contact_law: Any, action_map: Any) -> None:
 
 
 def _checked(task: Task, changes: Mapping[str, Any]) -> Settings:
-    """Return the settings of a task with changes, of which those that name its parts are checked."""
+    """Return the settings of a task with changes, after checking the names of groups, terms and constants."""
     settings = task.chosen(changes)
     check_groups(settings.observation, groups_of(task.entries))
     check_weights(settings.reward_weights, task.terms)
@@ -390,25 +390,25 @@ def register(
     action_map: ActionMap | None = None,
     **defaults: Any,
 ) -> None:
-    """Register an id of one's own, for `gymnasium.make` and `make_vec`: a task of this package with more
-    terms of the reward, more entries of the observation, another law of contact and other settings.
+    """Register a new id for `gymnasium.make` and `make_vec`: a task of this package with further reward terms
+    and observation entries, or with another contact law, action map or settings.
 
-    An id that is registered already is replaced, with Gymnasium's warning. Other processes import the module
+    An id that is already registered is replaced, with Gymnasium's warning. Worker processes import the module
     that calls this function, so the call belongs at the top level of a module; see docs/own_task.md.
 
     Args:
         env_id: "namespace/Name-v0".
-        base: name in `TASKS`, or an id of one's own, from which settings, terms and entries are taken.
-        terms: terms of the reward, behind those of the base; one with the same name replaces its term.
-        entries: entries of the observation, behind those of the base; their groups are observed by default.
+        base: name in `TASKS` or a registered id, the source of settings, terms and entries.
+        terms: reward terms, appended to the base's; a term of the same name replaces the base's.
+        entries: observation entries, appended to the base's; their groups are observed by default.
         contact_law: function of penetration [m], its rate [m/s], inverse approach speed [s/m] and the
             ground's constants, which returns the normal force [N]; see `dynamics.hoof.contact_force`.
-        action_map: actions of one's own, from which those of the body follow.
+        action_map: map from user-defined actions to body actions.
         defaults: settings, see the manual pages.
 
     Raises:
-        ParameterError: an unknown base, a name that occurs twice, an id of another form, a term, entry or law
-            of another type, or a setting without effect. Nothing is registered then.
+        ParameterError: an unknown base, a name that occurs twice, a malformed id, a term, entry or law of the
+            wrong type, or a setting without effect. The id is then not registered.
         UnknownArgumentError: an unknown setting.
     """
     new_terms = _several(f"{env_id}: terms", terms, Term)
@@ -426,7 +426,7 @@ def register(
     task = replace(
         old,
         name=env_id,
-        module="" if caller in ("__main__", "__mp_main__") else caller,  # other processes import it
+        module="" if caller in ("__main__", "__mp_main__") else caller,  # worker processes import it
         summary=f"{old.summary} With terms, entries or laws from outside this package.",
         about=old.about + law,
         terms=(*kept, *added.values()),

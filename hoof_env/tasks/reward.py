@@ -15,7 +15,7 @@ import numpy as np
 from hoof_env.errors import ParameterError, check_choice, check_number
 from hoof_env.simd import Lanes, Number, absolute, maximum, minimum, where
 from hoof_env.simd.user_functions import inputs
-from hoof_env.tasks.own_parts import Constant, Kept, check_arguments, check_parts
+from hoof_env.tasks.user_parts import Constant, TermState, check_arguments, check_parts
 
 if TYPE_CHECKING:
     from hoof_env.dynamics.layout import LegMemory, StrideSums, TrunkMemory
@@ -24,8 +24,8 @@ if TYPE_CHECKING:
 
 @inputs
 class Outcome(NamedTuple):
-    """Outcome of a control step, the argument of the terms. Where the engine failed, `failed` is 1 and what
-    the step added is 0.
+    """Outcome of a control step, the argument of the terms. Where the engine failed, `failed` is 1 and the
+    step's sums are 0.
 
     Attributes:
         seconds: simulated time [s].
@@ -56,18 +56,18 @@ class Outcome(NamedTuple):
 
 
 BEARING = 0.9
-"""Largest part of the weight for which bearing is rewarded, in the mean [-]: between the part that the leg
-must bear, by default 0.8, and the whole weight, beyond which the suspension would pull the animal down."""
+"""Largest mean share of the weight for which bearing is rewarded [-]: between the share that the leg must
+bear, by default 0.8, and 1, above which the suspension would pull the animal down."""
 
-LONGEST_STRIDE = 1.0
-"""Time over which that mean is taken [s]: what was not borne for longer cannot be made up for."""
+MAX_STRIDE = 1.0
+"""Time over which that mean is taken [s]: an older deficit cannot be made up for."""
 
 STEPPING = 0.5
 """Rate of the crank from which a leg counts as stepping [rad/s], a twelfth of that of the paper's gaits:
-agents slow the crank down in a stance, and a leg can only oscillate its swing while its crank stands."""
+agents slow the crank down in a stance, and with a stopped crank a leg can only oscillate its swing."""
 
 
-# Arguments of all terms: an `Outcome`, and the weight of the term in the unit that `TERMS` says.
+# Arguments of all terms: an `Outcome`, and the weight of the term in the unit of its row in `TERMS`.
 
 
 def progress(step: Outcome, weight: Number) -> Lanes:
@@ -136,7 +136,7 @@ class Term:
         compute: plain function of an `Outcome` and the weight that returns the term, in Python's operators
             and NumPy's functions, with np.where instead of `if`; see docs/own_task.md.
         constants: further arguments of `compute`, which the setting `constants` changes.
-        keeps: numbers that the term keeps in an episode: `compute` reads and sets them, as
+        state: numbers that last from step to step of an episode: `compute` reads and sets them, as
             `step.episode.own.<term>.<name>`; entries read them, too.
         objective: one of `OBJECTIVES`, to which `HorseLegMO-v0` adds the term; None divides it among all in
             equal parts.
@@ -155,7 +155,7 @@ class Term:
     compute: Callable[..., Any]
     objective: str | None = None
     constants: Sequence[Constant] = ()
-    keeps: Sequence[Kept] = ()
+    state: Sequence[TermState] = ()
 
     def __post_init__(self) -> None:
         if not isinstance(self.name, str) or not self.name:
@@ -164,12 +164,12 @@ class Term:
         # Without one the term is divided among all objectives.
         if self.objective is not None:
             check_choice(f"{self.title}: objective", self.objective, OBJECTIVES)
-        # Tuples, because kernels are found by the hash of their terms.
+        # Tuples, because kernels are looked up by a hash of their terms.
         constants = check_parts(f"{self.title}: constants", Constant, self.constants)
         object.__setattr__(self, "constants", constants)
-        object.__setattr__(self, "keeps", check_parts(f"{self.title}: keeps", Kept, self.keeps))
-        if self.keeps and not self.name.isidentifier():
-            raise ParameterError(f"{self.title}: expected the name of a variable of a term that keeps rows")
+        object.__setattr__(self, "state", check_parts(f"{self.title}: state", TermState, self.state))
+        if self.state and not self.name.isidentifier():
+            raise ParameterError(f"{self.title}: a term with state: expected the name of a variable")
         check_arguments(f"{self.title}: compute", self.compute, 2, constants)
 
     @property
@@ -247,7 +247,7 @@ TERMS = (
 
 
 def check_weights(changes: Mapping[str, float] | None, terms: tuple[Term, ...] = TERMS) -> dict[str, float]:
-    """Return the weights of all terms by name, with the defaults of those that `changes` does not name.
+    """Return the weights of all terms by name: `changes` over the terms' defaults.
 
     Raises:
         ParameterError: an unknown term, or a weight out of range.

@@ -11,11 +11,11 @@ from numpy.typing import NDArray
 
 from hoof_env.errors import ParameterError, check_number, count
 from hoof_env.tasks.body import Body
-from hoof_env.tasks.disturbances import MOST_STRENGTH
+from hoof_env.tasks.disturbances import MAX_STRENGTH
 from hoof_env.tasks.parameters import check_parameters
 from hoof_env.tasks.settings import PER_EPISODE, Settings
 
-MOST_STEPS = 10**12
+MAX_STEPS = 10**12
 """Largest number of control steps of a schedule."""
 
 STRENGTH = "strength"
@@ -23,41 +23,41 @@ SPEED = "target_speed"
 SCHEDULED = (STRENGTH, SPEED, *PER_EPISODE)
 """Settings that can be scheduled."""
 
-Ends = tuple[float, float]
+Range = tuple[float, float]
 Floats = NDArray[np.float64]
 
 
-class Course(NamedTuple):
-    """Course of a setting.
+class Ramp(NamedTuple):
+    """Ramp of a setting from one range to another; a single value is a range of width 0.
 
     Attributes:
-        first, last: lowest and highest value at the begin and from `steps` on.
-        steps: control steps between.
-        is_range: True if an episode draws between both values.
+        first, last: lowest and highest value at the start and after `steps`.
+        steps: number of control steps.
+        is_range: True if an episode draws between lowest and highest value.
     """
 
-    first: Ends
-    last: Ends
+    first: Range
+    last: Range
     steps: int
     is_range: bool
 
     @property
-    def hull(self) -> Ends:
+    def bounds(self) -> Range:
         """Lowest and highest value at any time."""
         return min(self.first[0], self.last[0]), max(self.first[1], self.last[1])
 
-    def after(self, steps: Any) -> tuple[Floats, Floats]:
-        """Return the lowest and highest value after a number of control steps, or each of several."""
+    def range_at(self, steps: Any) -> tuple[Floats, Floats]:
+        """Return the lowest and highest value after a number of control steps, or after each of an array."""
         part = np.clip(np.asarray(steps) / self.steps, 0.0, 1.0)
         low, high = (
             (1.0 - part) * first + part * last for first, last in zip(self.first, self.last, strict=True)
         )
-        # No rounding leaves the range that was checked.
-        return np.clip(low, *self.hull), np.clip(high, *self.hull)
+        # Rounding may leave the range that was checked.
+        return np.clip(low, *self.bounds), np.clip(high, *self.bounds)
 
 
 def check_unscheduled(name: str, settings: Settings) -> None:
-    """Check that a setting is not one that a schedule sets.
+    """Check that no schedule sets a setting.
 
     Args:
         name: name of the setting.
@@ -73,17 +73,17 @@ def check_unscheduled(name: str, settings: Settings) -> None:
         )
 
 
-def check_schedule(given: Any, settings: Settings, body: Body) -> dict[str, Course]:
-    """Return the courses of scheduled settings, by name.
+def check_schedule(given: Any, settings: Settings, body: Body) -> dict[str, Ramp]:
+    """Return the ramps of scheduled settings, by name.
 
     Args:
-        given: the setting `schedule`; None for none.
+        given: the setting `schedule`; None without a schedule.
         settings: settings of the environment.
         body: its body, which knows the range of commanded speeds.
 
     Raises:
         ParameterError: not a mapping of settings that can be scheduled to [first, last, control steps], a
-            value out of range, or a setting that is drawn, too.
+            value out of range, or a setting that `randomize` draws, too.
     """
     if given is None:
         return {}
@@ -91,29 +91,29 @@ def check_schedule(given: Any, settings: Settings, body: Body) -> dict[str, Cour
         raise ParameterError(
             f"schedule: expected a mapping with some of {', '.join(SCHEDULED)}, got {given!r}"
         )
-    return {name: _course(name, each, settings, body) for name, each in given.items()}
+    return {name: _ramp(name, each, settings, body) for name, each in given.items()}
 
 
-def _course(name: str, given: Any, settings: Settings, body: Body) -> Course:
-    """Return the course of one setting."""
+def _ramp(name: str, given: Any, settings: Settings, body: Body) -> Ramp:
+    """Return the ramp of one setting."""
     title = f"schedule[{name!r}]"
     if not isinstance(given, (list, tuple)) or len(given) != 3:
         raise ParameterError(f"{title}: expected [first, last, control steps], got {given!r}")
-    steps = count(f"{title}, control steps", given[2], most=MOST_STEPS)
+    steps = count(f"{title}, control steps", given[2], most=MAX_STEPS)
     if name in (settings.randomize or {}):
         raise ParameterError(f"{title}: expected none beside randomize[{name!r}], got {given!r}")
     first, last = (
-        _ends(name, f"{title}, {which}", value, settings, body)
+        _range(name, f"{title}, {which}", value, settings, body)
         for which, value in zip(("first", "last"), given, strict=False)
     )
     is_range = any(low < high for low, high in (first, last))
-    return Course(first, last, steps, is_range)
+    return Ramp(first, last, steps, is_range)
 
 
-def _ends(name: str, title: str, value: Any, settings: Settings, body: Body) -> Ends:
-    """Return the lowest and highest of a value of the course, a number or a range."""
+def _range(name: str, title: str, value: Any, settings: Settings, body: Body) -> Range:
+    """Return the range of one end of a ramp, from a number or a range."""
     if name == STRENGTH:
-        number = check_number(title, value, low=0.0, high=MOST_STRENGTH)
+        number = check_number(title, value, low=0.0, high=MAX_STRENGTH)
         return number, number
     if name == SPEED:
         if settings.target_speed is None:
@@ -129,6 +129,6 @@ def _ends(name: str, title: str, value: Any, settings: Settings, body: Body) -> 
     return checked if isinstance(checked, tuple) else (checked, checked)
 
 
-def drawn_names(schedule: Mapping[str, Course]) -> list[str]:
+def drawn_names(schedule: Mapping[str, Ramp]) -> list[str]:
     """Return the names of the scheduled physical parameters, which an episode draws."""
     return [name for name in schedule if name in PER_EPISODE]

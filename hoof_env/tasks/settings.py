@@ -1,4 +1,4 @@
-"""Settings of environments: default, type, meaning, and the other settings with which each has an effect."""
+"""Settings of environments: default, type, meaning, and the settings on which the effect of each depends."""
 
 from __future__ import annotations
 
@@ -255,7 +255,7 @@ class Settings(TaskSettings):
         float, About("-", "factor of noise, bias and pushes, 0 to 10; a reset option, too")
     ] = 1.0
 
-    # What a policy knows late, and what it knows of before
+    # Delays, and the observed past
     observation_delay: Annotated[
         Range,
         About(
@@ -302,5 +302,5 @@ PER_EPISODE = tuple(name for name, about in ABOUT.items() if about.per_episode)
 NEEDED: Mapping[str, tuple[str, tuple[str, ...]]] = MappingProxyType(
     {name: about.needs for name, about in ABOUT.items() if about.needs}
 )
-"""Settings that have an effect only with certain values of another one; () stands for any range, `GIVEN` for
-whatever is not None."""
+"""Settings that have an effect only with certain values of another setting; () for any range, `GIVEN` for any
+value except None."""

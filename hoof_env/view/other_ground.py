@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from hoof_env.ground.laws import REGULAR_LAWS, SMALLEST_RESTITUTION
+from hoof_env.ground.laws import MIN_RESTITUTION, REGULAR_LAWS
 from hoof_env.record.columns import Columns
 from hoof_env.record.instant import POINTS
 
@@ -24,7 +24,7 @@ class OtherGround:
 
     A rigid hoof is where its leg has it, and the force is Eq. 14 there. A spring in the hoof gives way to the
     force: the leg's motion stays, and the sole's follows from the balance of spring, damper and ground, as in
-    `dynamics.hoof.press_through_spring`. Approach speeds are those of the simulated touch-downs. An episode
+    `dynamics.hoof.spring_contact`. Approach speeds are those of the simulated touch-downs. An episode
     may start with hooves in the ground and springs without load, which elastic ground would throw out: with
     springs, forces are NaN until a hoof has been in the air.
 
@@ -47,7 +47,7 @@ class OtherGround:
     def set_ground(self, parameters: Mapping[str, float]) -> None:
         """Take the ground of the settings, some of which have other values from now on."""
         _, ground, limbs = self._env.body.parts(replace(self._env.resolved_settings, **parameters))
-        lowest = 0.0 if ground.normal_law in REGULAR_LAWS else SMALLEST_RESTITUTION
+        lowest = 0.0 if ground.normal_law in REGULAR_LAWS else MIN_RESTITUTION
         laws = [replace(ground, restitution=max(cr, lowest)).damping for cr in self._restitutions]
         self._chi, self._dashpot = np.array(laws).T[:, :, None, None]
         self._ground = ground

@@ -101,7 +101,7 @@ def write_references():
 
 
 def read_references(path=PATH):
-    """What `write_references` kept; refused where a leg, a gait or a ground has changed since."""
+    """References that `write_references` stored; refused if a leg, a gait or a ground has changed since."""
     kept = {}
     for entry in json.loads(path.read_text(encoding="utf-8"))["cases"]:
         case = Case(entry["preset"], entry["ground"])

@@ -1,5 +1,5 @@
-"""Audit of an engine: momentum, spin and energy, added up from the motion of all bodies, not from what is
-integrated."""
+"""Audit of an engine: momentum, angular momentum and energy, summed over the motion of all bodies,
+independently of the integrated quantities."""
 
 from __future__ import annotations
 
@@ -18,13 +18,13 @@ class Tally(NamedTuple):
 
     centre: Any  # common centre of mass, complex [m]
     momentum: Any  # complex [kg m/s]
-    spin: Any  # angular momentum about the centre [kg m^2/s]
+    angular_momentum: Any  # about the centre [kg m^2/s]
     kinetic: Any  # rotors included [J]
     potential: Any  # of weight and, on a suspended trunk, of spring and support [J]
 
 
 def tally_of(engine: TrunkEngine) -> Tally:
-    """Return momentum, spin and energy of all bodies at the present instant of an engine."""
+    """Return momentum, angular momentum and energy of all bodies at the present instant of an engine."""
     r = engine.report
     s = engine.state
     trunk = engine.trunk

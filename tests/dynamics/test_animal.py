@@ -150,7 +150,7 @@ def test_height_is_above_the_ground_below():
 
 
 def test_slip_is_what_the_soles_slide_in_stance():
-    """To and fro adds up; impulses are those of the horizontal force."""
+    """Motion to and fro adds up; impulses are of the horizontal force."""
     h = 2e-4
     engine = animal(Limits(), ground=replace(NATURAL, friction=0.1), sim_dt=h, substeps=1)
     engine.reset(WALK, THETA, vx=0.5)
@@ -205,7 +205,7 @@ def test_a_leg_of_another_size_moves_like_one_that_was_made_so(num_envs):
 
 
 def test_commands_after_a_partial_reset():
-    """Those of the others stay, and looking changes nothing but the report."""
+    """The remaining environments do not change, and `observe` changes only the report."""
     engine, gait = animal(Limits(), 9, harmonics=2), HarmonicGait(5.0, 0.4, 0.1, 0.0, (0.1, 0.0))
     engine.reset(gait, THETA)
     engine.advance(np.tile(gait.to_array(), (4, 1)), 20)

@@ -15,7 +15,7 @@ from hoof_env.simd.layout import Row
 def run(steps, part=None, monkeypatch=None, mass=100.0, **options):
     if part:
         monkeypatch.setattr(engine_module, "PART", part)
-        monkeypatch.setattr(engine_module, "LEAST_PART", part)
+        monkeypatch.setattr(engine_module, "MIN_PART", part)
     leg = load_geometry("identified")
     engine = TrunkEngine(
         [Limb(leg)], Trunk("rail", mass=mass, height=leg.hip_height), strides=True, **options

@@ -39,7 +39,8 @@ def in_stance(leg):
 
 
 def check_eq_2(leg, theta):
-    """The closed form satisfies Eq. 2 and its rate, and its Jacobian and gamma are those of differences."""
+    """The closed form satisfies Eq. 2 and its rate, and its Jacobian and gamma agree with finite
+    differences."""
     constraints = Constraints(leg)
     motion = Motion(theta, 4.0, 1.5, 0.2, -0.7, 0.4)
     q, qd = closed_form(leg, motion)

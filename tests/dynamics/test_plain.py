@@ -1,4 +1,4 @@
-"""The oracle of the engines against what is older than it: `pose` and Lagrange, conservation."""
+"""The oracle of the engines against independent knowledge: `pose` and Lagrange, conservation."""
 
 import numpy as np
 import pytest

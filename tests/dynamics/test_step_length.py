@@ -10,7 +10,7 @@ import pytest
 from hoof_env.constants import GRAVITY
 from hoof_env.dynamics.engine import TrunkEngine
 from hoof_env.dynamics.parts import TRUNKS, HoofSpring, Limb, Motor, Prescribed, Trunk
-from hoof_env.dynamics.step_length import MOST_SUBSTEPS, StepWarning
+from hoof_env.dynamics.step_length import MAX_SUBSTEPS, StepWarning
 from hoof_env.dynamics.stepping import SCHEMES
 from hoof_env.gait import GaitParameters
 from hoof_env.ground.contact import Ground
@@ -44,7 +44,7 @@ def walk(engine):
 @pytest.mark.filterwarnings("ignore::hoof_env.dynamics.step_length.StepWarning")
 def test_slow_touch_downs_get_the_substeps_that_they_need():
     chosen = many(1e-2)
-    assert 5 < chosen.substeps < MOST_SUBSTEPS
+    assert 5 < chosen.substeps < MAX_SUBSTEPS
     assert chosen.step_limits["damping"] * chosen.substeps >= 1e-3
     assert walk(chosen).max() < 1e-4
     assert walk(many(1e-2, substeps=1)).max() > 0.1
@@ -53,12 +53,12 @@ def test_slow_touch_downs_get_the_substeps_that_they_need():
 def test_a_floor_too_low_for_any_substeps_is_named_with_one_that_would_do():
     with pytest.warns(StepWarning, match=r"damping of this ground") as caught:
         engine = many(1e-4)
-    assert engine.substeps == MOST_SUBSTEPS
+    assert engine.substeps == MAX_SUBSTEPS
     found = re.search(r"or an approach_floor of (\S+) m/s, not 0.0001$", str(caught[0].message))
     assert walk(engine).max() > 0.1  # the warning is true
     with warnings.catch_warnings():
         warnings.simplefilter("error", StepWarning)
-        assert horse(damped(float(found[1]))).substeps <= MOST_SUBSTEPS
+        assert horse(damped(float(found[1]))).substeps <= MAX_SUBSTEPS
 
 
 def test_without_damping_a_floor_asks_for_nothing():

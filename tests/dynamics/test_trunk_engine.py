@@ -98,7 +98,7 @@ def put_somewhere(engine, rng, depth):
     for point in ("toe", "heel"):
         rows[f"{point}_penetration"][:] = 1.0
         rows[f"{point}_inverse_approach_speed"][:] = 1 / rng.uniform(0.1, 1.5, (legs, n))
-        if engine.features.springs:
+        if engine.features.has_springs:
             rows[f"{point}_deflection_normal"][:] = rng.uniform(-0.02, 0.04, (legs, n))
             rows[f"{point}_deflection_tangential"][:] = rng.uniform(-0.03, 0.03, (legs, n))
     engine.set_state(state)
@@ -124,7 +124,7 @@ def oracle(engine, horse, e):
     place = r["x"][e], r["y"][e], s["pitch"][e]
     velocity = r["vx"][e], r["vy"][e], r["pitch_rate"][e]
     give = None
-    if engine.features.springs:
+    if engine.features.has_springs:
         axes = ("normal", "tangential")
         give = np.array(
             [[s[f"{point}_deflection_{axis}"][:, e] for axis in axes] for point in ("toe", "heel")]
@@ -247,14 +247,14 @@ def _tallied(tally, now, e):
     return (
         ("centre", tally.centre[e], now.centre, 1.0),
         ("momentum", tally.momentum[e], now.momentum, np.abs(now.momentum) + 1.0),
-        ("angular momentum", tally.spin[e], now.angular_momentum, np.abs(now.momentum) + 1.0),
+        ("angular momentum", tally.angular_momentum[e], now.angular_momentum, np.abs(now.momentum) + 1.0),
         ("kinetic", tally.kinetic[e], now.kinetic, now.kinetic),
         ("potential", tally.potential[e], now.potential, abs(now.potential) + now.kinetic),
     )
 
 
 def _soles(engine, horse, now, e):
-    """Sliding speeds are those of the soles."""
+    """Sliding speeds are the soles' speeds."""
     ahead = (now.hoof_velocity * (normals(horse, now) / 1j).conj()).real
     found = np.stack([engine.report["toe_slide"], engine.report["heel_slide"]], 1)[..., e]
     return (("slide", found, ahead - now.give_rate[..., 1], max(1.0, np.abs(now.give_rate).max())),)

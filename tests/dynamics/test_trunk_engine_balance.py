@@ -1,4 +1,4 @@
-"""Momentum, spin, weight and energy of the engine of several legs: what nature keeps."""
+"""Momentum, angular momentum, weight and energy of the engine of several legs: what nature keeps."""
 
 import numpy as np
 import pytest
@@ -36,11 +36,11 @@ def test_flight(scheme):
         pitches.append(engine.state["pitch"][0])
     now, last, t = engine.state, tally_of(engine), 2.0
     assert now["momentum_x"] == start["momentum_x"]
-    assert now["spin"] == start["spin"]
+    assert now["angular_momentum"] == start["angular_momentum"]
     fallen = last.momentum[0] - first.momentum[0] + 1j * engine.weight * t
     assert abs(fallen) < 1e-11 * abs(first.momentum[0])
-    assert last.spin[0] == pytest.approx(first.spin[0], rel=1e-11)
-    late = engine.substep if SCHEMES[scheme].new_rates else 0.0  # the new rates lead by a step
+    assert last.angular_momentum[0] == pytest.approx(first.angular_momentum[0], rel=1e-11)
+    late = engine.substep if SCHEMES[scheme].uses_new_rates else 0.0  # the new rates lead by a step
     parabola = first.momentum[0] / engine.total_mass * t - 0.5j * GRAVITY * t * (t + late)
     assert last.centre[0] - first.centre[0] == pytest.approx(parabola, rel=1e-11)
     assert np.ptp(np.diff(pitches)) > 0.01  # the legs turn the trunk

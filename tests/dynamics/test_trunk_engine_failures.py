@@ -1,4 +1,4 @@
-"""How runs end that go wrong: what is no number, dead points, falls; and that neighbours do not notice."""
+"""Ends of runs that fail: NaN, dead points, falls; neighbours are not affected."""
 
 import numpy as np
 import pytest

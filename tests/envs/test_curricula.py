@@ -12,7 +12,7 @@ from family import HORSE, actions, same
 from hoof_env import Sb3VecEnv
 from hoof_env.errors import FixedSettingError, ParameterError, UnknownArgumentError
 from hoof_env.tasks.plain import to_json
-from hoof_env.tasks.schedules import Course
+from hoof_env.tasks.schedules import Ramp
 
 LEG, SPEED = (f"hoof_env/HorseLeg{name}-v0" for name in ("", "Speed"))
 SHORT = {"episode_seconds": 0.2}
@@ -151,22 +151,22 @@ def test_refused_changes_change_nothing(words, kind, changes):
 # Schedules
 
 
-def test_a_course_stays_within_its_ends_and_reaches_them():
+def test_a_ramp_stays_within_its_bounds_and_reaches_them():
     generator = np.random.default_rng(0)
     for _ in range(200):
         first, last = (tuple(np.sort(generator.uniform(-5, 5, 2))) for _ in range(2))
-        course = Course(first, last, int(generator.integers(1, 100)), True)
-        low, high = course.after(np.arange(200))
+        ramp = Ramp(first, last, int(generator.integers(1, 100)), True)
+        low, high = ramp.range_at(np.arange(200))
         assert (low[0], high[0]) == first
         assert (low[-1], high[-1]) == last
         assert (low <= high).all()
-        assert min(low) >= course.hull[0]
-        assert max(high) <= course.hull[1]
+        assert min(low) >= ramp.bounds[0]
+        assert max(high) <= ramp.bounds[1]
         assert (np.sign(np.diff(low)) * np.sign(last[0] - first[0]) >= 0).all()
         # A number goes from itself to itself, whatever is rounded; nothing is before the first step.
         number = first[0], first[0]
-        assert {*np.ravel(Course(number, number, 997, False).after(np.arange(1000)))} == {first[0]}
-        assert (*course.after(-7),) == first
+        assert {*np.ravel(Ramp(number, number, 997, False).range_at(np.arange(1000)))} == {first[0]}
+        assert (*ramp.range_at(-7),) == first
 
 
 SCHEDULE = {
@@ -224,21 +224,21 @@ def test_options_go_before_a_schedule():
 
 
 @pytest.mark.parametrize(
-    ("name", "value", "course"),
+    ("name", "value", "ramp"),
     [
         ("friction", 0.3, [0.8, 0.2, 30]),
         ("strength", 2.0, [0.0, 1.0, 9]),
         ("target_speed", 1.5, [1.0, 2.0, 9]),
     ],
 )
-def test_a_setting_that_a_schedule_sets_is_refused(name, value, course):
-    env = gym.make(SPEED, schedule={name: course}).unwrapped
+def test_a_setting_that_a_schedule_sets_is_refused(name, value, ramp):
+    env = gym.make(SPEED, schedule={name: ramp}).unwrapped
     words = rf"{name}: expected none beside schedule\['{name}'\], which sets it, got .*schedule=None"
     with pytest.raises(ParameterError, match=words):
         env.change_settings(**{name: value})
     if name != "target_speed":  # without which there is no commanded speed
         with pytest.raises(ParameterError, match=words):
-            gym.make(SPEED, schedule={name: course}, **{name: value})
+            gym.make(SPEED, schedule={name: ramp}, **{name: value})
     env.change_settings(**{name: value}, schedule=None)
     env.reset(seed=0)
     assert env.get_wrapper_attr("settings").schedule is None

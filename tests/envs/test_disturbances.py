@@ -121,11 +121,13 @@ def test_a_push_adds_its_impulse_to_the_momentum_and_turns_motors_alone(env_id, 
     if drive == "motor":
         expected.add("crank_angle_rate")
     if env_id == HORSE:
-        expected.add("spin")
+        expected.add("angular_momentum")
         # About the centre of mass of all, which is not the trunk's.
         off = [place[axis] - before[f"centre_{axis}"] for axis in "xy"]
         moment = off[0] * upward - off[1] * 20.0
-        np.testing.assert_allclose((after["spin"] - before["spin"])[pushed], moment[pushed], rtol=1e-9)
+        np.testing.assert_allclose(
+            (after["angular_momentum"] - before["angular_momentum"])[pushed], moment[pushed], rtol=1e-9
+        )
     assert changed == expected
     for name, impulse in (("momentum_x", 20.0), ("momentum_y", upward)):
         np.testing.assert_allclose((after[name] - before[name]), impulse * pushed, atol=1e-9)

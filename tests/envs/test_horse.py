@@ -272,7 +272,7 @@ def test_commands_are_drawn_as_numbers_between_their_bounds():
 
 def test_kernels_are_others_where_the_number_of_stored_gaits_is(monkeypatch):
     def kernels():
-        task, features = TASKS["horse"], Features(2, springs=True, has_limits=True)
+        task, features = TASKS["horse"], Features(2, has_springs=True, has_limits=True)
         body = HORSE_KERNELS._replace(task_fields=tuple(reference.reference_type()))
         engine = EngineKind(features, None, known=())
         return step_kernels(TaskKind(task.terms, task.entries, body, None, engine, known=()), is_scalar=False)

@@ -20,7 +20,7 @@ from hoof_env.tasks.horse_gaits import FOLLOWED, LEGS
 from hoof_env.tasks.one_leg import OneLeg
 from hoof_env.tasks.plain import to_json
 from hoof_env.tasks.registry import TASKS
-from hoof_env.tasks.reward import BEARING, LONGEST_STRIDE
+from hoof_env.tasks.reward import BEARING, MAX_STRIDE
 from hoof_env.tasks.settings import Settings
 
 HORSES = "horse", "rough"  # tasks of a horse
@@ -129,11 +129,11 @@ def test_observations_are_scaled_as_the_table_says(task):
     env.reset(seed=5, options={"speed": 1.0} if leg.settings.trunk != "fixed" else {})
     leg.record()
     table = {cells[0]: cells[1] for cells in observed(TASKS[task])}
-    checked, landed, allowance = set(), False, BEARING * LONGEST_STRIDE
+    checked, landed, allowance = set(), False, BEARING * MAX_STRIDE
     for _ in range(60):
         observation, *_, info = env.step(leg.action_for(load_gait("run", leg.settings.preset)))
         measured = info["measured"]
-        allowance = min(allowance + BEARING * leg.dt, BEARING * LONGEST_STRIDE)
+        allowance = min(allowance + BEARING * leg.dt, BEARING * MAX_STRIDE)
         allowance -= min(allowance, measured["normal_impulse"] / leg.weight)
         now = {name: float(values[-1].ravel()[0]) for name, values in leg.record().items()}
         there = {

@@ -346,7 +346,7 @@ NO_GAITS = (
     {"crank_speed": 1.0},
 )  # fmt: skip
 OF_ONE = "state: expected what get_state gives of one"
-BESIDE = r"options\['parameters'\]: 'trunk_damping': expected trunk='suspended' beside it"
+BESIDE = r"options\['parameters'\]: 'trunk_damping': expected trunk='suspended'"
 CALLS = [
     # gaits to go to
     *(

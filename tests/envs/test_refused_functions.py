@@ -16,7 +16,7 @@ import numpy as np
 import pytest
 
 import hoof_env
-from hoof_env import ActionMap, Constant, Entry, Kept, Scale, Term, TrunkEngine, register
+from hoof_env import ActionMap, Constant, Entry, Scale, Term, TermState, TrunkEngine, register
 from hoof_env.dynamics.parts import Limb, Trunk
 from hoof_env.errors import ParameterError
 from hoof_env.simd.values import perpendicular
@@ -55,10 +55,10 @@ def defined(kind, text):
     return space["compute"], rf"{name} ({file}, line {where + 1})"
 
 
-def registration(kind, function, keeps=()):
+def registration(kind, function, state=()):
     """Arguments of `register` with a function."""
     if kind == "term":
-        return {"terms": [Term("mine", 1.0, "-", "a test's", function, keeps=keeps)]}
+        return {"terms": [Term("mine", 1.0, "-", "a test's", function, state=state)]}
     if kind == "entry":
         return {"entries": [Entry("mine", "mine", "-", function, PLAIN)]}
     if kind == "scale":
@@ -220,7 +220,7 @@ CASES = [
     ("term", "count = 0\ndef compute(step, weight):\n    global count\n    count += 1\n    return step.progress * count",
      "counters"),
     ("term", "last = {}\ndef compute(step, weight):\n    return last.setdefault('x', step.progress)",
-     "keeps a value in 'last' | keeps"),
+     "keeps a value in 'last' | state"),
     ("term", "def helper(x, kept=[]):\n    kept[:] = [x]\ndef compute(step, weight):\n    helper(step.progress)\n"
      "    return weight", "keeps a value in 'kept'"),
     ("term", "class State:\n    x = 0.0\ndef compute(step, weight):\n    State.x = step.progress\n    return weight",
@@ -235,10 +235,10 @@ CASES = [
     ("term", "return compute(step, weight) #!", "a recursion, or a loop, whose end is not known"),
     ("term", "x = step.progress\nwhile True:\n    x = 0.5 * x #!", "a loop, whose end is not known"),
     # what is given is not written
-    ("term", "step.progress = 3.0 #!", "assignment to 'progress' | `keeps`"),
+    ("term", "step.progress = 3.0 #!", "assignment to 'progress' | `state`"),
     ("term", "step.leg = None #!", "assignment to 'leg'"),
     ("term", "step.speed = 3.0 #!", "assignment to 'speed'"),
-    ("term", "step.trunk.result = 0.0 #!", "assignment to 'result' | `keeps`"),
+    ("term", "step.trunk.result = 0.0 #!", "assignment to 'result' | `state`"),
     ("term", "step.leg.strides.load = 3.0 #!", "assignment to 'load'"),
     ("term", "step.leg.strides.load *= 2.0 #!", "assignment to 'load'"),
     ("term", "step.leg.lode = 3.0 #!", "no field 'lode'"),
@@ -295,8 +295,8 @@ def message(call, *arguments, **named):
     return words
 
 
-def made_from(kind, function, **keeps):
-    register(BAD, **registration(kind, function, **keeps))
+def made_from(kind, function, **declared):
+    register(BAD, **registration(kind, function, **declared))
     gym.make(BAD)
 
 
@@ -374,9 +374,9 @@ KEPT = {
 
 @pytest.mark.parametrize(("function", "words"), KEPT.items(), ids=[f.__name__ for f in KEPT])
 def test_a_term_sets_its_own_rows_alone(function, words):
-    rows = [Kept("row", 0.0, "-", "-")]
-    other = Term("other", 1.0, "-", "-", lambda step, weight: 0.0, keeps=[Kept("rows", 0.0, "-", "-")])
-    terms = [Term("mine", 1.0, "-", "-", function, keeps=rows), other]
+    rows = [TermState("row", 0.0, "-", "-")]
+    other = Term("other", 1.0, "-", "-", lambda step, weight: 0.0, state=[TermState("rows", 0.0, "-", "-")])
+    terms = [Term("mine", 1.0, "-", "-", function, state=rows), other]
     register(BAD, terms=terms)
     found = message(gym.make, BAD)
     assert words in found

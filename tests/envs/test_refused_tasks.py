@@ -73,7 +73,7 @@ REGISTRATIONS = [
     ),
     (
         lambda: {"motor_gain": 1.0},
-        "motor_gain: expected drive='motor' .*effect",
+        "motor_gain: expected drive='motor'.*effect",
     ),
     (
         lambda: {"reward_weights": {"slop": 1.0}},

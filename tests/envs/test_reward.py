@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from hoof_env.envs.policies import make_policy, start_of
-from hoof_env.tasks.reward import BEARING, LONGEST_STRIDE, STEPPING
+from hoof_env.tasks.reward import BEARING, MAX_STRIDE, STEPPING
 from hoof_env.tasks.reward import TERMS as TABLE
 
 TERMS = [term.key for term in TABLE]
@@ -62,10 +62,10 @@ def ends_of(values):
 
 def borne(impulses):
     """What bearing is paid for, from the impulse over the weight of each control step [s]: a bucket fills
-    with `BEARING` and holds that of `LONGEST_STRIDE`; an impulse that finds it empty is taken off."""
-    found, bucket = [], BEARING * LONGEST_STRIDE
+    with `BEARING` and holds that of `MAX_STRIDE`; an impulse that finds it empty is taken off."""
+    found, bucket = [], BEARING * MAX_STRIDE
     for impulse in impulses:
-        bucket = min(bucket + BEARING * DT, BEARING * LONGEST_STRIDE)
+        bucket = min(bucket + BEARING * DT, BEARING * MAX_STRIDE)
         paid = min(impulse, bucket)
         bucket -= paid
         found.append(paid - (impulse - paid))
@@ -157,7 +157,7 @@ def test_no_more_than_the_mean_allowance_is_paid_whatever_is_done(held, target, 
         _, _, terminated, truncated, info = env.step(action.astype(np.float32))
         paid = np.append(paid, paid[-1] + info["reward_support"])
         time = env.episode_summary()["seconds"]
-        assert paid.max() <= WEIGHTS["support"] * BEARING * (time + LONGEST_STRIDE) + 1e-9
+        assert paid.max() <= WEIGHTS["support"] * BEARING * (time + MAX_STRIDE) + 1e-9
         if terminated or truncated:
             break
 
@@ -176,12 +176,12 @@ def test_who_bears_too_much_has_the_excess_taken_off():
     assert truncated
     paid, impulses, allowances = np.array(paid), np.array(impulses), np.array(allowances)
     seconds, used = 20.0, (paid + impulses) / 2  # what was paid, of the impulse that was borne
-    assert impulses.sum() > 0.95 * seconds > BEARING * (seconds + LONGEST_STRIDE)
-    assert BEARING * seconds < used.sum() <= BEARING * (seconds + LONGEST_STRIDE)
+    assert impulses.sum() > 0.95 * seconds > BEARING * (seconds + MAX_STRIDE)
+    assert BEARING * seconds < used.sum() <= BEARING * (seconds + MAX_STRIDE)
     assert paid.sum() == pytest.approx(2 * used.sum() - impulses.sum())
     np.testing.assert_allclose(paid, borne(impulses), atol=1e-9)
     assert allowances.min() == 0.0
-    assert allowances.max() <= BEARING * LONGEST_STRIDE
+    assert allowances.max() <= BEARING * MAX_STRIDE
     assert (paid[allowances == 0.0] < impulses[allowances == 0.0]).any()
 
 

@@ -15,7 +15,7 @@ from hoof_env._output import markdown_table
 from hoof_env.envs.policies import heading_seen, make_policy, start_of, towards
 from hoof_env.gait import FilterSettings
 from hoof_env.tasks import registry as tasks
-from hoof_env.tasks.leg_starts import HIGHEST, LOWEST
+from hoof_env.tasks.leg_starts import MAX_HEIGHT, MIN_HEIGHT
 from hoof_env.tasks.observation import HIGH, LOW
 from hoof_env.tasks.one_leg import OneLeg
 from hoof_env.tasks.reward import STEPPING, check_weights
@@ -421,8 +421,8 @@ def test_failing_is_out_of_reach_of_wild_feedback(task):
         heights.append(np.ravel(envs.engine.report["y"])[:count] / envs.body.height)
     assert truncated.all()
     assert total.min() < -30
-    assert np.min(heights) > (1 + LOWEST) / 2
-    assert np.max(heights) < (1 + HIGHEST) / 2
+    assert np.min(heights) > (1 + MIN_HEIGHT) / 2
+    assert np.max(heights) < (1 + MAX_HEIGHT) / 2
 
 
 @pytest.mark.parametrize("task", SUSPENDED)
@@ -433,7 +433,7 @@ def test_failing_at_the_end_does_not_pay(task):
     rewards = gait_rewards(task, "run")
     losses = -np.cumsum(rewards[::-1], axis=0)[::-1]
     left = DT * np.arange(len(rewards), 0, -1)
-    fall = np.sqrt(2 * (1 - LOWEST) * env.body.height / 9.81)
+    fall = np.sqrt(2 * (1 - MIN_HEIGHT) * env.body.height / 9.81)
     spared = losses - env.weights["failure"] * left[:, None]
     assert 0.1 < fall < 1
     assert spared[left >= fall].max() < 0

@@ -112,7 +112,7 @@ def test_a_step_is_exact(sequence, gait, h):
 @given(sequence=sequences, gait=commands)
 @settings(deadline=None, max_examples=20)
 def test_the_recorded_rates_add_up_to_the_recorded_motion(sequence, gait):
-    """Trapezoidal sums over the whole history, command changes included; what is left is of order h^2."""
+    """Trapezoidal sums over the whole history, command changes included; the difference is of order h^2."""
     h = 5e-5  # with 1e-4 eight changes of the command can leave a little more than the bound
     sequence = [(command, 2 * substeps) for command, substeps in sequence]
     rows = [(m.theta, m.theta_rate, m.phi, m.phi_rate) for m, _ in play(sequence, h, gait)]

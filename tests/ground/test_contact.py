@@ -1,4 +1,4 @@
-"""The latch: how fast a point came in is taken at touch-down and kept until that point leaves."""
+"""The latch: the approach speed is taken at touch-down and held until the point leaves."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""A preset may say on which ground its leg was identified; what it leaves out is the default."""
+"""A preset may name the ground on which its leg was identified; missing entries are defaults."""
 
 import json
 

@@ -1,5 +1,5 @@
-"""Grounds, terrains and contacts that cannot be, by the words of each error: settings (`GROUNDS`), those of a
-preset (`PRESETS`), other calls (`CALLS`)."""
+"""Invalid grounds, terrains and contacts, with the text of each error: settings (`GROUNDS`), presets
+(`PRESETS`), further calls (`CALLS`)."""
 
 import json
 import math

@@ -1,4 +1,4 @@
-"""The rule for the step length against a bouncing mass: what it promises holds, and not by a wide margin."""
+"""The rule for the step length against a bouncing mass: its promise holds, and not by a wide margin."""
 
 import math
 
@@ -21,7 +21,7 @@ FLOOR = 1e-4
 
 
 def approach_speed(kept, d_before, rate_before, d, rate):
-    """At the interpolated touch-down, kept while the point stays inside; 0 outside."""
+    """At the interpolated touch-down, held while the point stays inside; 0 outside."""
     if d <= 0.0 or kept > 0.0:
         return 0.0 if d <= 0.0 else kept
     part = d_before / (d_before - d) if d_before < 0.0 else 1.0

@@ -1,4 +1,4 @@
-"""Mechanisms of other kinds than those that ship: random ones, and one with all that a list can have."""
+"""Mechanisms that the package does not ship: random ones, and one with all features of a list."""
 
 from itertools import pairwise
 

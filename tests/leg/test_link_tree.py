@@ -36,7 +36,7 @@ def test_the_papers_leg_has_nine_links():
 
 @pytest.mark.parametrize("mechanism", MECHANISMS.values(), ids=MECHANISMS)
 def test_forces_at_pins_are_sums_over_joints(mechanism):
-    """Forces on bodies that act within a link cancel, and those between links add up."""
+    """Forces on bodies inside a link cancel, and forces between links add up."""
     rng = np.random.default_rng(0)
     joints = rng.normal(size=(len(mechanism.joints), 2))
     tree = link_tree(mechanism)

@@ -149,8 +149,8 @@ def test_scaled_solids_keep_their_shape():
     [("jansen", 67.9, 22.5, -91.8, 0.58), ("klann", 64.0, 31.0, -45.7, 0.48)],
 )
 def test_feet_of_legs_with_published_lengths_keep_their_paths(name, stroke, lift, low, share):
-    """In the units of these lengths. Jansen's path is that of circles by hand, see `test_jansen`; of Klann's
-    leg no path is published, and its figures are those of our closed form, kept here."""
+    """In the units of these lengths. Jansen's path is from circles by hand, see `test_jansen`; Klann's leg
+    has no published path, and its figures are stored from our closed form."""
     leg = load_geometry(name)
     unit = leg.crank_length / {"jansen": 15.0, "klann": 17.5}[name]
     foot = solve(leg, np.linspace(0, 2 * np.pi, 720, endpoint=False))[0][:, -1] / unit

@@ -1,4 +1,4 @@
-"""Lists of a mechanism that are none of a leg, by the words of each error, which say what would mend it."""
+"""Invalid lists of a mechanism, with the text of each error and its remedy."""
 
 import copy
 

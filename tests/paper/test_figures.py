@@ -51,8 +51,8 @@ def half_bars(ax):
 
 
 def spans(ax):
-    """Intervals that are shaded over the whole height of some axes, in order, those of one point alone or
-    of both, not the ground."""
+    """Intervals that are shaded over the whole height of some axes, in order, of one point alone or of both,
+    not the ground."""
     from matplotlib.patches import Rectangle
 
     upright = [p for p in ax.patches if isinstance(p, Rectangle) and p.get_height() == 1 and p.get_y() == 0]

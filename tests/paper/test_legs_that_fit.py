@@ -1,4 +1,4 @@
-"""The leg that ships and the ensemble of others meet the published numbers."""
+"""The shipped leg and the ensemble of alternatives meet the published numbers."""
 
 import pytest
 

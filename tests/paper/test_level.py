@@ -1,4 +1,4 @@
-"""Three rows hang on micrometres of a ground level that was fitted; the others do not."""
+"""Three rows depend on micrometres of a fitted ground level; the remaining rows do not."""
 
 import pytest
 

@@ -206,7 +206,7 @@ def test_motion_does_not_depend_on_the_contact_law(reproduction):
 
 @pytest.mark.parametrize("gait", GAITS)
 def test_the_zero_action_is_the_gait(reproduction, gait):
-    """Every hoof point is where the pose has it under the motion law, and the forces are those of Eq. 14."""
+    """Every hoof point is at its place in the pose under the motion law, and forces follow Eq. 14."""
     geometry, ground, own = load_geometry(), load_ground(restitution=0.0), load_gait(gait)
     trace = reproduction.traces[gait, "inelastic", "exact"][::7]
     for point, letter in (("toe", geometry.toe), ("heel", geometry.heel)):

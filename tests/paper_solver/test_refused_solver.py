@@ -1,5 +1,4 @@
-"""What the paper's solver refuses, by the words of each error; gaits and legs that it does not take are in
-the tables of those."""
+"""Refusals of the paper's solver, with the text of each error; gaits and legs are in their own tables."""
 
 import numpy as np
 import pytest

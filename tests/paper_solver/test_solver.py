@@ -41,7 +41,7 @@ ORDERS = {"euler": 1, "semi_implicit_euler": 1, "midpoint": 2, "rk4": 4}
 AIR = 10.0
 """A height at which nothing touches [m]."""
 
-MOMENTA = ("momentum_x", "momentum_y", "spin")
+MOMENTA = ("momentum_x", "momentum_y", "angular_momentum")
 """Of the leg as a whole, which `ConstrainedLeg` does not report."""
 
 gaits = st.builds(GaitParameters, *(st.floats(low, high) for low, high in LIMITS.values()))

@@ -87,7 +87,7 @@ def test_arrows_are_as_long_for_animals_of_all_sizes(size):
 
 
 def test_curves_leave_the_names_of_the_legs_alone(played):
-    """Also those of hoofs that bear the full scale from the first instant to the last."""
+    """Also for hoofs that bear the full scale from the first instant to the last."""
     env, parts = played
     renderer = Renderer(records.surroundings(env))
     panel = renderer._panel

@@ -123,7 +123,7 @@ def test_powers(power):
 
 
 def test_a_kernel_without_an_end_is_refused_before_memory_is_gone(monkeypatch):
-    monkeypatch.setattr("hoof_env.simd.machines.MOST_LINES", 5000)  # of the machine that is made next
+    monkeypatch.setattr("hoof_env.simd.machines.MAX_INSTRUCTIONS", 5000)  # of the machine that is made next
 
     @kernel
     def endless(x: Number) -> Number:

@@ -112,7 +112,7 @@ def test_a_control_step_does_too(id, count):
 
 
 def test_machines_have_the_same_operations():
-    """But those with which control flow and text are written, and whole numbers, which are Python's own."""
+    """Except the operations that write control flow and text, and whole numbers, which are Python's own."""
 
     def operations(machine):
         return {name for name, part in vars(machine).items() if callable(part) and not name.startswith("_")}

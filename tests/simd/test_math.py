@@ -1,4 +1,4 @@
-"""Elementary functions against arbitrary precision, and their bits alone against those in a loop."""
+"""Elementary functions against arbitrary precision, and their bits alone against their bits in a loop."""
 
 import math
 import platform
@@ -14,7 +14,7 @@ from llvmlite.binding import get_host_cpu_features
 from hoof_env.simd import Matrix, loop, read, write
 from hoof_env.simd import math as exact_math
 from hoof_env.simd.compile import kernel
-from hoof_env.simd.math import LOWEST_EXPONENT
+from hoof_env.simd.math import MIN_EXPONENT
 from tests.simd.assembly import assembly_of
 
 EIGHTHS = range(8, 25)
@@ -74,7 +74,7 @@ def test_cosine_and_sine(angle):
         assert abs(mpmath.sin(angle) - sine(angle)) < 2e-16
 
 
-@given(st.floats(LOWEST_EXPONENT, 0) | st.floats(-1e-3, 0))
+@given(st.floats(MIN_EXPONENT, 0) | st.floats(-1e-3, 0))
 @settings(deadline=None, max_examples=1000)
 def test_exponential(x):
     with mpmath.workprec(120):
@@ -94,7 +94,7 @@ def test_hyperbolic_tangent(x):
 def test_the_exponential_falls_towards_its_floor(x, step):
     assert exponential(x - step) <= exponential(x) * (1 + 1e-13) <= 1 + 1e-13
     assert exponential(0.0) == 1
-    assert exponential(-1e9) == exponential(LOWEST_EXPONENT)
+    assert exponential(-1e9) == exponential(MIN_EXPONENT)
 
 
 @given(st.floats(1e-12, 10), st.sampled_from(EIGHTHS))

@@ -156,7 +156,7 @@ def test_a_matrix_on_several_threads_is_one_memory():
             columns(given.x, 8, None, n)[0] = columns(given.x, 8, None, n)[0] * 2.0
 
     arrays = Arrays({"x": "f8"})
-    run = Kernel(double, [arrays], threads=True)
+    run = Kernel(double, [arrays], is_threaded=True)
     x = np.arange(64.0).reshape(1, 64)
     run.compile()
     parts = [arrays.hold({"x": x}, range(k, k + 16)) for k in range(0, 64, 16)]

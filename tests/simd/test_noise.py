@@ -1,4 +1,4 @@
-"""Random numbers of kernels: those of splitmix64, in any lane, and spread as uniform numbers are."""
+"""Random numbers of kernels: the bits of splitmix64, in any lane, uniformly distributed."""
 
 from __future__ import annotations
 

@@ -1,4 +1,5 @@
-"""Files of machine code: written at once, never out of date, not read if others could have written them."""
+"""Files of machine code: written atomically, never out of date, not read if another user could have written
+them."""
 
 import ast
 import os
@@ -48,7 +49,7 @@ def place(tmp_path):
 def own(tmp_path, monkeypatch):
     """The folder of machine code of this process, empty."""
     monkeypatch.setenv(FOLDER, str(tmp_path / "kernels"))
-    monkeypatch.setattr(objects, "_SAID", set())
+    monkeypatch.setattr(objects, "_WARNED", set())
     return tmp_path / "kernels"
 
 
@@ -280,7 +281,7 @@ def test_a_file_that_cannot_be_finished_is_none(own, monkeypatch):
 
 
 def test_a_folder_that_cannot_be_is_none(own):
-    """A file is in its place: each process compiles for itself, and nothing is said."""
+    """A file is in its place: each process compiles for itself, without a message."""
     own.write_text("")
     with warnings.catch_warnings():
         warnings.simplefilter("error")
@@ -375,12 +376,12 @@ def test_it_is_closed_to_others_whatever_the_umask(own):
 
 @needs_modes
 def test_a_folder_inside_one_that_others_may_write_is_used(tmp_path, monkeypatch):
-    """As ~/.cache/hoof-env under umask 002, and /tmp: its owner and its mode are those of this user alone."""
+    """Folders like ~/.cache/hoof-env under umask 002, and /tmp: owner and mode are this user's alone."""
     wide = tmp_path / "wide"
     wide.mkdir()
     wide.chmod(0o1777)
     monkeypatch.setenv(FOLDER, str(wide / "kernels"))
-    monkeypatch.setattr(objects, "_SAID", set())
+    monkeypatch.setattr(objects, "_WARNED", set())
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         assert compiles()
@@ -388,7 +389,7 @@ def test_a_folder_inside_one_that_others_may_write_is_used(tmp_path, monkeypatch
 
 
 def test_the_least_recently_used_half_goes_and_other_files_stay(own, monkeypatch):
-    monkeypatch.setattr(objects, "MOST_FILES", 10)
+    monkeypatch.setattr(objects, "MAX_FILES", 10)
     own.mkdir(mode=0o700)
     (own / "letter.txt").write_text("a user's")
     (own / "lens.o").write_text("a user's")

@@ -189,7 +189,7 @@ def test_a_debugger_sees_arrays_in_the_contact_of_an_environments_step():
     seen = []
 
     def trace(frame, event, argument):
-        if frame.f_code is not hoof.press_rigidly.__code__:
+        if frame.f_code is not hoof.rigid_contact.__code__:
             return None
 
         def line(frame, event, argument):
@@ -253,13 +253,13 @@ def test_many_environments_on_threads_run_in_this_one(num_threads, monkeypatch):
     made = engine(scenes("identified")["leg"], "identified", 17, num_threads=num_threads)
     same = engine(scenes("identified")["leg"], "identified", 17, num_threads=1)
     machines = []
-    inner = hoof.meet_ground
+    inner = hoof.ground_forces
 
-    def meet_ground(*arguments):
+    def ground_forces(*arguments):
         machines.append((type(CURRENT.machine), threading.get_ident()))
         return inner(*arguments)
 
-    monkeypatch.setattr("hoof_env.dynamics.mechanics.meet_ground", meet_ground)
+    monkeypatch.setattr("hoof_env.dynamics.mechanics.ground_forces", ground_forces)
     with on_numpy():
         made.advance(steps=2)
     # three groups of eight, of which each has two stages in each substep, and one at the end

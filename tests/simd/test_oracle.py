@@ -76,13 +76,13 @@ def start(engine):
 
 
 def memory_of(engine):
-    """All numbers of the environments, not those of idle columns."""
+    """All numbers of the environments, without idle columns."""
     m = engine._memory
     return np.vstack([m.data, m.reactions.reshape(-1, m.data.shape[1])])[:, : engine.num_envs]
 
 
 def assert_same_bits(one, other):
-    """Of all numbers; what is not a number may have another sign or payload, which processors choose."""
+    """Of all numbers; NaN may have any sign or payload, which depends on the processor."""
     differ = one.view(np.int64) != other.view(np.int64)
     differ &= ~(np.isnan(one) & np.isnan(other))
     assert not differ.any(), f"{differ.sum()} numbers differ, first in row {np.argwhere(differ)[0][0]}"
@@ -168,7 +168,7 @@ def test_hooves_touch_and_leave_the_ground_meanwhile():
 
 
 def test_an_environment_that_fails_is_put_back_alike():
-    """A trunk that falls without a state to go back to, among others that go on."""
+    """A trunk that falls without a state to go back to, among trunks that go on."""
     made = []
     for _ in range(2):
         engine = new_engine(kind="free", legs=4, count=9, limits=LIMITS)

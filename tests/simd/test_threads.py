@@ -147,7 +147,7 @@ def test_a_kernel_that_is_not_compiled_is_compiled_once():
     arrays = Arrays({"x": "f8"})
     x = np.arange(64.0).reshape(1, 64)
     calls = [(arrays.hold({"x": x}, range(k, k + 8)),) for k in range(0, 64, 8)]
-    assert run_together(Kernel(work, [arrays], threads=True), calls, 3) == [None] * 8
+    assert run_together(Kernel(work, [arrays], is_threaded=True), calls, 3) == [None] * 8
     assert traces == [1]
     np.testing.assert_array_equal(x[0], 1.0 + np.arange(64))
 
@@ -186,8 +186,8 @@ def test_an_interrupt_of_a_long_call_of_an_engine_ends_it():
 
 
 def test_threads_that_trace_and_compile_at_once_do_not_mix_what_they_write():
-    """While others trace, one computes with NumPy's machine, which each thread has for itself. All meet in
-    the middle of their functions."""
+    """One thread computes with NumPy's machine, which each thread has for itself, while the remaining threads
+    trace. All meet in the middle of their functions."""
     middle = threading.Barrier(7, timeout=60)
 
     def made(k, meets=False):
@@ -244,6 +244,6 @@ def test_threads_that_trace_and_compile_at_once_do_not_mix_what_they_write():
 
 def test_more_threads_than_ever_are_refused(monkeypatch):
     monkeypatch.setattr(threads, "available", lambda: 10**6)
-    assert check_threads(threads.MOST_THREADS) == threads.MOST_THREADS
-    with pytest.raises(ParameterError, match=f"1 to {threads.MOST_THREADS}"):
-        check_threads(threads.MOST_THREADS + 1)
+    assert check_threads(threads.MAX_THREADS) == threads.MAX_THREADS
+    with pytest.raises(ParameterError, match=f"1 to {threads.MAX_THREADS}"):
+        check_threads(threads.MAX_THREADS + 1)

@@ -10,7 +10,7 @@ import pytest
 from family import actions, same
 
 import hoof_env
-from hoof_env import ActionMap, Constant, Entry, Kept, Scale, Term
+from hoof_env import ActionMap, Constant, Entry, Scale, Term, TermState
 from hoof_env.dynamics.layout import TRUNK_STATE
 from hoof_env.envs.manual import tables_of
 from hoof_env.errors import ParameterError
@@ -55,7 +55,7 @@ def test_rows_have_the_bits_of_one_with_delays_and_over_episodes(example):
 
 @pytest.mark.parametrize("free", [400.0, 1e6])
 def test_the_charges_of_an_episode_add_up_to_its_highest_force(example, free):
-    """Whatever happens between: a term that keeps its highest force charges each newton once."""
+    """Whatever happens between: a term whose state is its highest force charges each newton once."""
     env = gym.make(ID, constants={"free": free}, episode_seconds=1.5)
     for seed in (0, 1):
         env.reset(seed=seed)
@@ -164,15 +164,15 @@ LIMIT = Constant("free", 1.0, "-", "a test's", low=0.0, high=2.0)
          lambda: Term("mine", 1.0, "-", "-", with_constant, constants=[Constant("limit", 1.0, "-", "-")])),
         (r"constants: expected a list of hoof_env.Constant",
          lambda: Term("mine", 1.0, "-", "-", plain, constants=[1.0])),
-        (r"keeps: expected a list of hoof_env.Kept, names once",
-         lambda: Term("mine", 1.0, "-", "-", plain, keeps=[Kept("a", 0.0, "-", "-")] * 2)),
-        (r"expected the name of a variable of a term that keeps",
-         lambda: Term("my own", 1.0, "-", "-", plain, keeps=[Kept("a", 0.0, "-", "-")])),
+        (r"state: expected a list of hoof_env.TermState, names once",
+         lambda: Term("mine", 1.0, "-", "-", plain, state=[TermState("a", 0.0, "-", "-")] * 2)),
+        (r"a term with state: expected the name of a variable",
+         lambda: Term("my own", 1.0, "-", "-", plain, state=[TermState("a", 0.0, "-", "-")])),
         (r"constant: expected the name of a variable, got 'my own'",
          lambda: Constant("my own", 1.0, "-", "-")),
         (r"constant: expected the name of a variable, got 'lambda'",
          lambda: Constant("lambda", 1.0, "-", "-")),
-        (r"kept: expected the name of a variable, got 'class'", lambda: Kept("class", 0.0, "-", "-")),
+        (r"state: expected the name of a variable, got 'class'", lambda: TermState("class", 0.0, "-", "-")),
         (r"constant 'free': expected .*2.*, got 3", lambda: Constant("free", 3.0, "-", "-", high=2.0)),
         (r"constant 'free': expected that of another term or entry",
          lambda: hoof_env.register("my_lab/Other-v0", base=ID, terms=[
@@ -211,7 +211,7 @@ def seen(scene):
 def test_nan_of_a_failed_step_is_neither_kept_nor_observed(example):
     hoof_env.register(
         "my_lab/Spoilt-v0",
-        terms=[Term("spoiler", 1.0, "-", "-", spoils, keeps=[Kept("seen", 0.5, "-", "-")])],
+        terms=[Term("spoiler", 1.0, "-", "-", spoils, state=[TermState("seen", 0.5, "-", "-")])],
         entries=[Entry("seen", "own", "-", seen, Scale("none"))],
     )
     env = gym.make("my_lab/Spoilt-v0").unwrapped

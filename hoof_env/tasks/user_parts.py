@@ -1,4 +1,4 @@
-"""Constants and rows of memory that terms and entries declare, and maps from actions to those of a body."""
+"""Constants and state that terms and entries declare, and maps from user-defined actions to body actions."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 from hoof_env.errors import ParameterError, check_number
 from hoof_env.simd.user_functions import check_function
 
-LARGEST = 1e12
+MAX_VALUE = 1e12
 """Largest absolute value of a constant, and of a row at a start."""
 
 
@@ -25,7 +25,7 @@ def _check_name(kind: str, name: Any) -> None:
 
 
 def _is_text_by_name(pair: Any) -> bool:
-    """True if something is a name and a text."""
+    """Return whether a pair is a name and a text."""
     is_pair = isinstance(pair, tuple) and len(pair) == 2
     return is_pair and all(isinstance(text, str) for text in pair) and bool(pair[0])
 
@@ -36,22 +36,22 @@ class Constant:
 
     Attributes:
         name: name of the function's argument, and in the setting `constants`. Terms and entries with a
-            constant of one name share it.
+            constant of the same name share it.
         value: default.
         unit: unit.
         meaning: meaning, for the manual page.
         low, high: smallest and largest value.
 
     Raises:
-        ParameterError: a name that is none of a variable, or a value out of range.
+        ParameterError: the name is not an identifier, or a value out of range.
     """
 
     name: str
     value: float
     unit: str
     meaning: str
-    low: float = -LARGEST
-    high: float = LARGEST
+    low: float = -MAX_VALUE
+    high: float = MAX_VALUE
 
     def __post_init__(self) -> None:
         _check_name("constant", self.name)
@@ -59,37 +59,37 @@ class Constant:
 
 
 @dataclass(frozen=True)
-class Kept:
-    """Number that a term keeps from step to step, a row of `step.episode.own.<term>`.
+class TermState:
+    """Number that a term carries from step to step, a row of `step.episode.own.<term>`.
 
     Attributes:
         name: name of the row.
-        begin: value at the start of an episode.
+        initial: value at the start of an episode.
         unit: unit.
         meaning: meaning, for the manual page.
 
     Raises:
-        ParameterError: a name that is none of a variable, or a value out of range.
+        ParameterError: the name is not an identifier, or a value out of range.
     """
 
     name: str
-    begin: float
+    initial: float
     unit: str
     meaning: str
 
     def __post_init__(self) -> None:
-        _check_name("kept", self.name)
-        check_number(f"kept {self.name!r}", self.begin, low=-LARGEST, high=LARGEST)
+        _check_name("state", self.name)
+        check_number(f"state {self.name!r}", self.initial, low=-MAX_VALUE, high=MAX_VALUE)
 
 
 def _is_reserved(form: str) -> bool:
-    """Return whether a form of actions is one of the package, of now or before."""
+    """Return whether the package uses a form of actions, or used it before."""
     return form in ("rates", "offsets") or form.startswith("offsets of ")
 
 
 @dataclass(frozen=True)
 class ActionMap:
-    """Map from actions of one's own to those of the body.
+    """Map from user-defined actions to body actions.
 
     Attributes:
         form: tag of the meaning of actions, which states, records and policies contain.
@@ -98,7 +98,7 @@ class ActionMap:
             tuple with all actions of the body, which are clipped; see `reward.Term.compute`.
 
     Raises:
-        ParameterError: a form that the package has, no actions, or `compute` is not a function of two
+        ParameterError: a form of the package, no actions, or `compute` is not a function of two
             arguments.
     """
 
@@ -109,7 +109,7 @@ class ActionMap:
     def __post_init__(self) -> None:
         if not isinstance(self.form, str) or not self.form or _is_reserved(self.form):
             raise ParameterError(f"action_map: form: expected a text of its own, got {self.form!r}")
-        # Kernels are found by what they contain, and a mapping has no hash; a copy is given the pairs.
+        # Kernels are looked up by a hash of their parts, and a mapping has none; a copy is made of pairs.
         pairs = tuple(self.actions.items()) if isinstance(self.actions, Mapping) else self.actions
         if not isinstance(pairs, tuple) or not pairs or not all(map(_is_text_by_name, pairs)):
             raise ParameterError(f"{self.title}: actions: expected meanings by name, got {self.actions!r}")
@@ -127,11 +127,11 @@ class ActionMap:
         return tuple(dict(self.actions))
 
 
-def check_parts(title: str, kind: type[Constant] | type[Kept], parts: Any) -> tuple[Any, ...]:
-    """Return constants or rows of a term or entry as a tuple.
+def check_parts(title: str, kind: type[Constant] | type[TermState], parts: Any) -> tuple[Any, ...]:
+    """Return the constants or the state of a term or entry as a tuple.
 
     Raises:
-        ParameterError: something else, or a name twice.
+        ParameterError: an element of another class, or a name twice.
     """
     given = tuple(parts) if isinstance(parts, (list, tuple)) else (parts,)
     names = [part.name for part in given if isinstance(part, kind)]
@@ -143,10 +143,16 @@ def check_parts(title: str, kind: type[Constant] | type[Kept], parts: Any) -> tu
 
 
 def check_arguments(title: str, function: Any, first: int, constants: tuple[Constant, ...]) -> None:
-    """Check that a function takes some arguments, and constants by name behind them.
+    """Check that the last arguments of a function are its constants, by name and in order.
+
+    Args:
+        title: name of the function in messages.
+        function: the function.
+        first: number of arguments before the constants.
+        constants: the declared constants.
 
     Raises:
-        ParameterError: it does not.
+        ParameterError: they are not.
     """
     check_function(title, function, first + len(constants))
     names = function.__code__.co_varnames[first : first + len(constants)]
@@ -158,18 +164,18 @@ def check_arguments(title: str, function: Any, first: int, constants: tuple[Cons
         )
 
 
-class Own(NamedTuple):
+class Declarations(NamedTuple):
     """Declarations of the terms and entries of a task, on which its memory and its record depend.
 
     Attributes:
-        kept: names of the rows of each term that keeps some, by its name.
+        state: names of the numbers in each term's state, by the term's name.
         constants: names of all constants.
-        taken: names of those that each term and each entry takes; empty without any.
+        arguments: names of the constants that each term and each entry takes; empty without constants.
     """
 
-    kept: tuple[tuple[str, tuple[str, ...]], ...] = ()
+    state: tuple[tuple[str, tuple[str, ...]], ...] = ()
     constants: tuple[str, ...] = ()
-    taken: tuple[tuple[str, ...], ...] = ()
+    arguments: tuple[tuple[str, ...], ...] = ()
 
     @property
     def fields(self) -> tuple[Any, ...]:
@@ -181,7 +187,7 @@ def constants_of(terms: Iterable[Any], entries: Iterable[Any]) -> dict[str, Cons
     """Return the constants of terms and entries, by name.
 
     Raises:
-        ParameterError: two of one name differ.
+        ParameterError: two constants of the same name differ.
     """
     found: dict[str, Constant] = {}
     for part in (*terms, *entries):
@@ -195,14 +201,14 @@ def constants_of(terms: Iterable[Any], entries: Iterable[Any]) -> dict[str, Cons
     return found
 
 
-def own_of(terms: Iterable[Any], entries: Iterable[Any]) -> Own:
-    """Return what terms and entries declare."""
+def declared_by(terms: Iterable[Any], entries: Iterable[Any]) -> Declarations:
+    """Return the declarations of terms and entries."""
     terms = tuple(terms)
     entries = tuple(entries)
-    kept = tuple((term.name, tuple(row.name for row in term.keeps)) for term in terms if term.keeps)
+    state = tuple((term.name, tuple(row.name for row in term.state)) for term in terms if term.state)
     constants = tuple(constants_of(terms, entries))
-    taken = tuple(tuple(one.name for one in part.constants) for part in (*terms, *entries))
-    return Own(kept, constants, taken if constants else ())
+    arguments = tuple(tuple(one.name for one in part.constants) for part in (*terms, *entries))
+    return Declarations(state, constants, arguments if constants else ())
 
 
 def check_constants(given: Any, known: Mapping[str, Constant]) -> list[float]:
