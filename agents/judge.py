@@ -44,9 +44,9 @@ from hoof_env.tasks.horse_gaits import PAIRS
 ENV_ID = "hoof_env/Horse-v0"
 TROT = 0.05  # largest lag of a trot or a pace [strides]
 
-MOST_FALLS = 0.10  # share of episodes; survivors of more falls are a biased sample
-MOST_OFF = 0.15  # largest difference from the commanded speed, over that [-]
-MOST_SLIP = 0.10  # largest slip of a stance [m]
+MAX_FALLS = 0.10  # share of episodes; survivors of more falls are a biased sample
+MAX_ERROR = 0.15  # largest difference from the commanded speed, over that [-]
+MAX_SLIP = 0.10  # largest slip of a stance [m]
 TURNS = (0.95, 1.05)  # stances a turn
 NEAR = 0.1  # largest difference between the Froude numbers reached and of the horse
 
@@ -73,16 +73,16 @@ class Args:
 def rejection_reason(figures: dict[str, Any], pairs: Sequence[str]) -> str:
     """Return why the figures of these pairs of legs do not count at any speed; an empty text if they do."""
     reasons = []
-    if figures["fell"] > MOST_FALLS:
+    if figures["fell"] > MAX_FALLS:
         reasons.append(f"fell in {100 * figures['fell']:.3g} % of episodes")
     # Written so that NaN is a reason, too
     speed_ratio = figures["reached"] / figures["speed"]
-    if not abs(speed_ratio - 1) <= MOST_OFF:
+    if not abs(speed_ratio - 1) <= MAX_ERROR:
         reasons.append(f"{speed_ratio:.2f} of the commanded speed")
     for pair in pairs:
         slip = figures[f"slip_{pair}"]
         stances = figures[f"stances_per_turn_{pair}"]
-        if not slip < MOST_SLIP:
+        if not slip < MAX_SLIP:
             reasons.append(f"{pair} hooves slip {slip:.2f} m")
         if not TURNS[0] <= stances <= TURNS[1]:
             reasons.append(f"{stances:.2f} {pair} stances a turn")

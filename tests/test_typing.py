@@ -16,9 +16,8 @@ import pytest
 import hoof_env
 from hoof_env import HorseLegEnv, HorseLegMOEnv, HorseLegVectorEnv, Sb3VecEnv
 from hoof_env.envs.arguments import EnvArguments, Sb3Arguments, VectorArguments
-from hoof_env.tasks.plain import to_json
 from hoof_env.tasks.registry import TASKS
-from hoof_env.tasks.settings import SETTINGS
+from hoof_env.tasks.settings import SETTINGS, to_json
 
 ROOT = Path(__file__).parents[1]
 

@@ -29,10 +29,17 @@ from hoof_env.leg.geometry import Geometry
 from hoof_env.record.surroundings import Surroundings
 from hoof_env.render.size import check_side
 from hoof_env.tasks.body import Body
-from hoof_env.tasks.plain import as_plain, json_value, to_json
 from hoof_env.tasks.registry import Task, task_of
 from hoof_env.tasks.schedules import SPEED, check_unscheduled
-from hoof_env.tasks.settings import PER_EPISODE, SETTINGS, ResolvedSettings, Settings
+from hoof_env.tasks.settings import (
+    PER_EPISODE,
+    SETTINGS,
+    ResolvedSettings,
+    Settings,
+    as_plain,
+    json_value,
+    to_json,
+)
 
 
 def fixed_setting(name: str) -> FixedSettingError:

@@ -22,10 +22,9 @@ from hoof_env.paper_solver.integrators import INTEGRATORS
 from hoof_env.render.size import USUAL_SIZE
 from hoof_env.tasks import horse, leg_starts, observation
 from hoof_env.tasks.horse_gaits import SIZES, horse_gaits
-from hoof_env.tasks.plain import to_json
 from hoof_env.tasks.registry import TASKS, Task, task_of
 from hoof_env.tasks.reward import check_weights
-from hoof_env.tasks.settings import ABOUT
+from hoof_env.tasks.settings import ABOUT, to_json
 from hoof_env.tasks.user_parts import constants_of
 
 MULTI_OBJECTIVE = "hoof_env/HorseLegMO-v0"

@@ -14,11 +14,10 @@ from hoof_env.errors import ParameterError
 from hoof_env.gait import LIMITS, QUICK
 from hoof_env.tasks import horse, observation
 from hoof_env.tasks.body import Body
-from hoof_env.tasks.effects import check_effect
 from hoof_env.tasks.horse import Horse
 from hoof_env.tasks.horse_gaits import ACTED, COUNT, LEGS
 from hoof_env.tasks.one_leg import OneLeg
-from hoof_env.tasks.settings import Settings
+from hoof_env.tasks.settings import Settings, check_effect
 
 GAIT = [entry for entry in observation.ENTRIES if entry.group == "gait"]
 """Entries about the gait: the parameters, then their rates."""

@@ -37,9 +37,10 @@ class RowInfo(dict[str, Any]):
     __slots__ = ("_arrays", "_env")
 
     def __init__(self, arrays: Mapping[str, Any], env: int, ended: Mapping[str, Any] | None = None) -> None:
-        super().__init__(ended or {})
         self._arrays = arrays
         self._env = env
+        if ended:
+            self.update(ended)
 
     def __missing__(self, key: str) -> Any:
         if not self._is_measured(key):
@@ -56,7 +57,11 @@ class RowInfo(dict[str, Any]):
 
     def get(self, key: str, default: Any = None) -> Any:
         """Return an entry, or `default` if there is none."""
-        return self[key] if key in self else default  # noqa: SIM401
+        # Quickly for what is in no info, which learners ask of every row of every step.
+        found = super().get(key, self)
+        if found is not self:
+            return found
+        return self[key] if key in self._arrays and self._is_measured(key) else default
 
     def __iter__(self) -> Iterator[str]:
         return iter(self.keys())

@@ -32,10 +32,10 @@ from hoof_env.tasks.settings import SETTINGS
 
 Floats = NDArray[np.float64]
 
-MOST_ENVS = 1_000_000
+MAX_ENVS = 1_000_000
 """Largest number of environments."""
 
-MOST_DRAWN = 16
+MAX_DRAWN = 16
 """Largest number of environments that are drawn by default; a picture takes as long as some hundred steps."""
 
 PER_ENV = (
@@ -65,16 +65,16 @@ def check_drawn(rendered: Any, n: int, render_mode: str | None) -> int:
 
     Raises:
         ParameterError: more environments than there are, a number without a render_mode, or no number for
-            more than `MOST_DRAWN` environments.
+            more than `MAX_DRAWN` environments.
     """
     if render_mode is None:
         if rendered is not None:
             raise ParameterError(f"rendered: expected none without a render_mode, got {rendered!r}")
         return 0
-    if rendered is None and n > MOST_DRAWN:
+    if rendered is None and n > MAX_DRAWN:
         raise ParameterError(
             f"rendered: expected how many of the {n} environments to draw, as they are more than"
-            f" {MOST_DRAWN}; for Gymnasium's RecordVideo rendered=1 goes with record_first_only=True"
+            f" {MAX_DRAWN}; for Gymnasium's RecordVideo rendered=1 goes with record_first_only=True"
         )
     drawn = n if rendered is None else count("rendered", rendered)
     if drawn > n:
@@ -147,7 +147,7 @@ class HorseLegVectorEnv(LegBase, VectorEnv[NDArray[np.float32], NDArray[np.float
     ((3, 22), (3,))
 
     Args:
-        num_envs: number of environments, 1 to `MOST_ENVS`.
+        num_envs: number of environments, 1 to `MAX_ENVS`.
         num_threads: threads that share the environments in a step; their number changes no bit.
         task, settings: arguments of `HorseLegEnv`.
         autoreset_mode: an `AutoresetMode`, its name or its value: NEXT_STEP, SAME_STEP or DISABLED.
@@ -155,7 +155,7 @@ class HorseLegVectorEnv(LegBase, VectorEnv[NDArray[np.float32], NDArray[np.float
             `episode_seconds` over `dt`. None for `episode_seconds` alone.
         render_mode: "rgb_array"; `render` returns a picture of each environment.
         rendered: number of environments that are drawn, the first ones; pictures of the rest are black.
-            None draws all, if they are at most `MOST_DRAWN`.
+            None draws all, if they are at most `MAX_DRAWN`.
         width, height: size of each picture [pixels].
 
     Attributes:
@@ -190,7 +190,7 @@ class HorseLegVectorEnv(LegBase, VectorEnv[NDArray[np.float32], NDArray[np.float
         height: int = USUAL_SIZE[1],
         **settings: Any,
     ) -> None:
-        self.num_envs = count("num_envs", num_envs, most=MOST_ENVS)
+        self.num_envs = count("num_envs", num_envs, most=MAX_ENVS)
         self.autoreset_mode = mode_of(autoreset_mode)
         steps = None if max_episode_steps is None else count("max_episode_steps", max_episode_steps)
         size = width, height

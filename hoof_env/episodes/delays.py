@@ -3,17 +3,101 @@ parts a delay divides a control step. `frames_kernel` moves frames and actions."
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from hoof_env.episodes.rows import Rows
-from hoof_env.errors import ParameterError
-from hoof_env.tasks.delays import Delay, check_delay, check_kept, parts_of
+from hoof_env.errors import ParameterError, check_number, count
+from hoof_env.tasks.parameters import check_range
 from hoof_env.tasks.settings import ResolvedSettings
+
+MAX_DELAY = 1000
+"""Largest number of control steps that a delay lasts, and of observations and actions that are observed."""
+
+
+class Delay(NamedTuple):
+    """Delay in control steps: whole steps, between which each episode draws, and substeps.
+
+    Attributes:
+        least, most: whole control steps.
+        substeps: further substeps of `sim_dt`.
+    """
+
+    least: int
+    most: int
+    substeps: int
+
+
+def check_delay(name: str, given: Any, substeps: int, steps: int) -> Delay:
+    """Return a delay from a setting.
+
+    Args:
+        name: name of the setting.
+        given: the setting, one number or two whole ones [control steps].
+        substeps: substeps of `sim_dt` in a control step.
+        steps: control steps of an episode.
+
+    Raises:
+        ParameterError: a delay is negative, no whole number of substeps, or lasts a whole episode; or a range
+            has ends that are not whole.
+    """
+    most = min(steps - 1, MAX_DELAY)
+    if isinstance(given, (list, tuple)):
+        low, high = check_range(name, given, 0.0, most)
+        if low != round(low) or high != round(high):
+            raise ParameterError(f"{name}: expected whole numbers of a range, got {given!r}")
+        return Delay(round(low), round(high), 0)
+    delay = check_number(name, given, low=0.0, high=most)
+    whole = math.floor(delay + 1e-9)
+    rest = (delay - whole) * substeps
+    if abs(rest - round(rest)) > 1e-6:
+        raise ParameterError(
+            f"{name}: expected whole substeps, of which a control step has {substeps}, got {given!r}"
+        )
+    return Delay(whole, whole, round(rest))
+
+
+def check_kept(name: str, given: Any, low: int) -> int:
+    """Return a number of observations or actions that are observed.
+
+    Raises:
+        ParameterError: it is not a whole number from `low` to `MAX_DELAY`.
+    """
+    return count(name, given, low=low, most=MAX_DELAY)
+
+
+class Parts(NamedTuple):
+    """Parts of a control step, at whose boundaries an action takes effect or an observation is taken.
+
+    Attributes:
+        substeps: substeps of `sim_dt` of each part.
+        acting: number of the part at whose start an action takes effect.
+        seeing: number of the part after which an observation is taken, -1 for the end of the step.
+    """
+
+    substeps: tuple[int, ...]
+    acting: int
+    seeing: int
+
+
+def parts_of(substeps: int, acts_after: int, seen_before: int) -> Parts:
+    """Return the parts of a control step.
+
+    Args:
+        substeps: substeps of the step.
+        acts_after: substeps after which an action takes effect.
+        seen_before: number of substeps before the end at which an observation is taken.
+    """
+    ends = sorted({acts_after, substeps - seen_before, substeps} - {0})
+    begins = [0, *ends[:-1]]
+    lengths = tuple(end - begin for begin, end in zip(begins, ends, strict=True))
+    seeing = ends.index(substeps - seen_before) if seen_before else -1
+    return Parts(lengths, begins.index(acts_after), seeing)
 
 
 @dataclass(frozen=True)

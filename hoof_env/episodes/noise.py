@@ -11,8 +11,35 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hoof_env.episodes.rows import Rows
-from hoof_env.tasks.disturbances import check_noise
+from hoof_env.errors import ParameterError, check_number
 from hoof_env.tasks.settings import ResolvedSettings
+
+MAX_NOISE = 10.0
+"""Largest error of a number that is observed, of which the scale has mapped the usual range to [-1, 1]."""
+
+
+def check_noise(name: str, given: Any, groups: Sequence[str]) -> dict[str, float]:
+    """Return the largest errors of groups of the observation, by group.
+
+    Args:
+        name: name of the setting, for messages.
+        given: the setting; None for no errors.
+        groups: groups that are observed.
+
+    Raises:
+        ParameterError: not a mapping, a group that is not observed, or an error out of range.
+    """
+    if given is None:
+        return {}
+    if not isinstance(given, Mapping) or not set(given) <= set(groups):
+        raise ParameterError(
+            f"{name}: expected a mapping with some of the groups that are observed, {', '.join(groups)}; got"
+            f" {given!r}"
+        )
+    return {
+        group: check_number(f"{name}[{group!r}]", value, low=0, high=MAX_NOISE)
+        for group, value in given.items()
+    }
 
 
 @dataclass(frozen=True)

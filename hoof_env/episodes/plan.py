@@ -36,10 +36,10 @@ from hoof_env.tasks.schedules import check_schedule
 from hoof_env.tasks.settings import ResolvedSettings, Settings
 from hoof_env.tasks.user_parts import check_constants, constants_of, declared_by
 
-LONGEST_EPISODE = 1e6
+MAX_EPISODE_SECONDS = 1e6
 """Largest `episode_seconds` [s]."""
 
-MOST_BAUMGARTE = 1e6
+MAX_BAUMGARTE = 1e6
 """Largest of Baumgarte's parameters [1/s]; larger ones are unstable even with a substep of 1 us."""
 
 
@@ -198,7 +198,7 @@ def make_plan(
     dt = s.sim_dt * substeps
     # An episode of one step is allowed, whatever the rounding of dt.
     shortest = dt * (1 - 1e-9)
-    seconds = check_number("episode_seconds", s.episode_seconds, low=shortest, high=LONGEST_EPISODE)
+    seconds = check_number("episode_seconds", s.episode_seconds, low=shortest, high=MAX_EPISODE_SECONDS)
     steps = round(seconds / dt)
     groups = check_groups(s.observation, groups_of(task.entries))
     speeds = body.commanded_speeds(s)
@@ -246,7 +246,7 @@ def _check_choices(s: ResolvedSettings) -> None:
     check_choice("integrator", s.integrator, INTEGRATORS if s.solver == "paper" else SCHEMES)
     check_choice("drive", s.drive, ("prescribed", "motor"))
     for name in ("baumgarte_alpha", "baumgarte_beta"):
-        check_number(name, getattr(s, name), low=0.0, high=MOST_BAUMGARTE)
+        check_number(name, getattr(s, name), low=0.0, high=MAX_BAUMGARTE)
     for name in ("motor_gain", "motor_torque", "motor_inertia"):
         check_number(name, getattr(s, name), low=0.0, high=MAX_COEFFICIENT)
 

@@ -15,8 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hoof_env.episodes.plan import Plan
-from hoof_env.tasks.plain import to_json
-from hoof_env.tasks.settings import PER_EPISODE, Settings
+from hoof_env.tasks.settings import PER_EPISODE, Settings, to_json
 
 Index = NDArray[np.int64]
 

@@ -9,10 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hoof_env.episodes.batch import EpisodeBatch
+from hoof_env.episodes.pushes import MAX_PUSH, Push
 from hoof_env.episodes.row_plans import RowPlans
 from hoof_env.episodes.rows import repeated
 from hoof_env.errors import ParameterError
-from hoof_env.tasks.disturbances import MAX_PUSH, Push
 from hoof_env.tasks.settings import Settings
 
 Floats = NDArray[np.float64]

@@ -1,92 +1,11 @@
-"""Disturbances of an episode: checks of their settings, and when the trunk is pushed."""
+"""Strength of the disturbances of a task, and a horse's rough ground."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
-
-import numpy as np
-
-from hoof_env.dynamics.parts import MAX_IMPULSE
-from hoof_env.errors import ParameterError, check_number
-
-MAX_NOISE = 10.0
-"""Largest error of a number that is observed, of which the scale has mapped the usual range to [-1, 1]."""
 
 MAX_STRENGTH = 10.0
 """Largest factor of all disturbances."""
-
-MAX_PUSH = MAX_IMPULSE / MAX_STRENGTH
-"""Largest impulse of a planned push [N s], so that it is possible at any strength."""
-
-Push = tuple[int, float, float]
-"""Control step after which the trunk is pushed, impulse forward and upward [N s]."""
-
-
-def check_noise(name: str, given: Any, groups: Sequence[str]) -> dict[str, float]:
-    """Return the largest errors of groups of the observation, by group.
-
-    Args:
-        name: name of the setting, for messages.
-        given: the setting; None for no errors.
-        groups: groups that are observed.
-
-    Raises:
-        ParameterError: not a mapping, a group that is not observed, or an error out of range.
-    """
-    if given is None:
-        return {}
-    if not isinstance(given, Mapping) or not set(given) <= set(groups):
-        raise ParameterError(
-            f"{name}: expected a mapping with some of the groups that are observed, {', '.join(groups)}; got"
-            f" {given!r}"
-        )
-    return {
-        group: check_number(f"{name}[{group!r}]", value, low=0, high=MAX_NOISE)
-        for group, value in given.items()
-    }
-
-
-def _listed(value: Any) -> Any:
-    """Convert an array to a list; return any other value unchanged."""
-    return value.tolist() if isinstance(value, np.ndarray) else value
-
-
-def check_pushes(name: str, given: Any, dt: float, steps: int) -> tuple[Push, ...]:
-    """Return given pushes in the order of their times.
-
-    Args:
-        name: name of the setting or option, for messages.
-        given: rows of time [s], impulse forward and impulse upward [N s]; None without pushes.
-        dt: control step [s], to which times are rounded.
-        steps: number of control steps of an episode.
-
-    Raises:
-        ParameterError: a row of another form, or a time outside the episode.
-    """
-    if given is None:
-        return ()
-    given = _listed(given)
-    rows = list(given) if isinstance(given, Iterable) and not isinstance(given, (str, Mapping)) else [given]
-    impulses: dict[int, tuple[float, float]] = {}
-    for k, row in enumerate(map(_listed, rows)):
-        if not isinstance(row, (list, tuple)) or len(row) != 3:
-            raise ParameterError(f"{name}[{k}]: expected [s, N s forward, N s upward], got {row!r}")
-        last = (steps - 1) * dt
-        seconds = check_number(f"{name}[{k}], time", row[0], low=0.0, high=last)
-        forward, upward = (
-            check_number(f"{name}[{k}], impulse", value, low=-MAX_PUSH, high=MAX_PUSH) for value in row[1:]
-        )
-        # A push at time 0 comes after the first step, because the start sets the speed.
-        step = max(round(seconds / dt), 1)
-        before = impulses.get(step, (0.0, 0.0))
-        # The sum of all pushes of a step is one push, which is limited, too.
-        impulses[step] = (
-            check_number(f"{name}[{k}], impulse", before[0] + forward, low=-MAX_PUSH, high=MAX_PUSH),
-            check_number(f"{name}[{k}], impulse", before[1] + upward, low=-MAX_PUSH, high=MAX_PUSH),
-        )
-    return tuple((step, *impulses[step]) for step in sorted(impulses))
-
 
 ROUGH_PUSH = 1.5
 ROUGH_SLOPE = 0.1

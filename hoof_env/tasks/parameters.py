@@ -14,8 +14,7 @@ from hoof_env.errors import ParameterError, check_choice, check_number
 from hoof_env.ground.contact import Ground, load_ground
 from hoof_env.ground.terrain import Terrain
 from hoof_env.leg.presets import preset_error_type, preset_label, read_preset
-from hoof_env.tasks.effects import check_effect
-from hoof_env.tasks.settings import PER_EPISODE, SOLVERS, ResolvedSettings, Settings
+from hoof_env.tasks.settings import PER_EPISODE, SOLVERS, ResolvedSettings, Settings, check_effect
 
 MAX_SUBSTEPS = 100_000  # largest number of substeps of a control step
 

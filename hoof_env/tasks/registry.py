@@ -22,16 +22,14 @@ from hoof_env.errors import ParameterError, UnknownArgumentError, check_choice, 
 from hoof_env.simd.user_functions import check_function, function_name
 from hoof_env.tasks.body import Body
 from hoof_env.tasks.disturbances import rough_ground
-from hoof_env.tasks.effects import check_effect
 from hoof_env.tasks.horse import HOOF_STIFFNESS, MASS, Horse
 from hoof_env.tasks.horse_gaits import checked_size
 from hoof_env.tasks.horse_terms import HORSE_ENTRIES, HORSE_TERMS
 from hoof_env.tasks.observation import ENTRIES, Entry, check_groups, groups_of
 from hoof_env.tasks.one_leg import OneLeg
-from hoof_env.tasks.plain import as_plain, json_value
 from hoof_env.tasks.reward import TERMS, Term, check_weights
 from hoof_env.tasks.schedules import SPEED, check_unscheduled
-from hoof_env.tasks.settings import SETTINGS, Settings
+from hoof_env.tasks.settings import SETTINGS, Settings, as_plain, check_effect, json_value
 from hoof_env.tasks.user_parts import ActionMap, check_constants, constants_of
 
 ANY_SPEED = (0.0, 1.0)

@@ -1,14 +1,20 @@
-"""Settings of environments: default, type, meaning, and the settings on which the effect of each depends."""
+"""Settings of environments: default, type and meaning of each, other settings with which it has an effect, and
+conversion to plain values of Python and JSON."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, fields
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import asdict, dataclass, fields
+from enum import Enum
+from pathlib import PurePath
 from types import MappingProxyType
-from typing import Annotated, Any, get_type_hints
+from typing import Annotated, Any, NamedTuple, get_type_hints
 
-from hoof_env.tasks.body_settings import GIVEN, About, BodySettings, Range
+import numpy as np
+
+from hoof_env.errors import ParameterError
+from hoof_env.leg.presets import DEFAULT_PRESET, Preset
 
 PRINTED_BETA = math.sqrt(2 * 15.0)
 """Baumgarte's beta as the paper's Table 1 prints it, sqrt(2 alpha) [1/s]; sqrt(2) alpha = 21.2 is probably
@@ -17,9 +23,210 @@ meant."""
 SOLVERS = ("exact", "paper")  # the closed form, and Eq. 8 as the paper solves it
 
 
+Range = float | Sequence[float]
+"""Lowest and highest value, or one number for both."""
+
+GIVEN = ("given",)
+"""Placeholder in `About.needs` for any value except None."""
+
+
+class About(NamedTuple):
+    """Description of a setting.
+
+    Attributes:
+        unit: unit of the value; "" if it has no unit.
+        text: meaning, for the manual; $names stand for numbers and choices, see `envs.manual.choices`.
+        of_horse: meaning for a horse, if it differs.
+        per_episode: True if `reset(options={"parameters": ...})` and `randomize` can change the setting.
+        needs: another setting and its values with which this one has an effect; () for any range, `GIVEN` for
+            any value except None.
+        span: values that a slider offers; None for a setting without one.
+    """
+
+    unit: str
+    text: str
+    of_horse: str = ""
+    per_episode: bool = False
+    needs: tuple[str, tuple[str, ...]] | None = None
+    span: tuple[float, float] | None = None
+
+
 @dataclass(frozen=True, kw_only=True)
-class TaskSettings(BodySettings):
-    """Settings of what is asked and how it is simulated, each with its default and its `About`."""
+class Settings:
+    """Settings of an environment, plain values that JSON can hold, each with its default and its `About`.
+
+    Types are what callers may pass: the fields are keyword arguments of the environments, too, see
+    `envs.arguments`.
+    """
+
+    # Leg and gait, trunk
+    preset: Annotated[
+        Preset,
+        About(
+            "",
+            (
+                "leg and gaits: $presets, or [your own](../own_task.md#a-leg-of-your-own): a mapping or a "
+                "JSON file"
+            ),
+            of_horse=(
+                "the legs' linkage, with the paper's mechanism: $horse_presets, or [your "
+                "own](../own_task.md#a-leg-of-your-own): a mapping or a JSON file"
+            ),
+        ),
+    ] = DEFAULT_PRESET
+    gait: Annotated[
+        str | None,
+        About(
+            "",
+            "gait of the preset that episodes start in; None for one between walk and run",
+            of_horse=(
+                "gait from which actions are offsets at any commanded speed: $horse_gaits; None for the "
+                "reference gait of that speed"
+            ),
+        ),
+    ] = None
+    trunk: Annotated[str, About("", "$trunks; a fixed one stays where it is")] = "suspended"
+    hip_height: Annotated[
+        float | None,
+        About(
+            "m",
+            (
+                "nominal height of O, the crank centre, $lowest to $highest times the geometry's own; None"
+                " for that"
+            ),
+        ),
+    ] = None
+    trunk_mass: Annotated[
+        float,
+        About(
+            "kg",
+            "of the trunk on this leg",
+            of_horse="of the trunk without the limbs",
+            per_episode=True,
+            span=(10.0, 200.0),
+        ),
+    ] = 50.0
+    trunk_share: Annotated[
+        float,
+        About(
+            "-",
+            "part of the weight of trunk and leg that the leg must bear; suspended",
+            per_episode=True,
+            needs=("trunk", ("suspended",)),
+            span=(0.1, 1.0),
+        ),
+    ] = 0.8
+    trunk_stiffness: Annotated[
+        float,
+        About(
+            "N/m",
+            "of the suspension's spring; suspended",
+            per_episode=True,
+            needs=("trunk", ("suspended",)),
+        ),
+    ] = 12000.0
+    trunk_damping: Annotated[
+        float,
+        About(
+            "N s/m",
+            "of the suspension's damper; suspended",
+            per_episode=True,
+            needs=("trunk", ("suspended",)),
+        ),
+    ] = 1590.0
+    trunk_drag: Annotated[
+        float,
+        About(
+            "N s/m",
+            "resistance to forward motion",
+            per_episode=True,
+            needs=("trunk", ("suspended", "rail")),
+        ),
+    ] = 20.0
+    # Ground and hoof
+    stiffness: Annotated[
+        float | None,
+        About(
+            "N/m^n",
+            "K of the contact law (Eq. 14); None for the preset's",
+            per_episode=True,
+            span=(2e3, 1e6),
+        ),
+    ] = None
+    exponent: Annotated[
+        float | None,
+        About("-", "n of the contact law, 1 to 3 in steps of 1/8; None for the preset's", span=(1.0, 3.0)),
+    ] = None
+    normal_law: Annotated[str, About("", "$normal_laws")] = "lankarani-nikravesh"
+    restitution: Annotated[
+        float,
+        About("-", "nominal coefficient of restitution, 0 to 1", per_episode=True, span=(0.0, 1.0)),
+    ] = 0.5
+    approach_floor: Annotated[
+        float,
+        About(
+            "m/s",
+            "smallest approach speed in the damping term",
+            per_episode=True,
+        ),
+    ] = 0.1
+    friction_law: Annotated[
+        str,
+        About(
+            "",
+            "$friction_laws; of a rigid hoof",
+        ),
+    ] = "ambrosio"
+    friction: Annotated[float, About("-", "mu_k", per_episode=True, span=(0.0, 1.2))] = 0.4
+    friction_slow: Annotated[
+        float,
+        About(
+            "m/s",
+            "lower threshold of the friction law, of a rigid hoof",
+            per_episode=True,
+            needs=("friction_law", ("ambrosio",)),
+        ),
+    ] = 1e-3
+    friction_fast: Annotated[
+        float,
+        About(
+            "m/s",
+            "upper threshold of the friction law, of a rigid hoof",
+            per_episode=True,
+        ),
+    ] = 5e-2
+    hoof_stiffness: Annotated[
+        float | None,
+        About(
+            "N/m",
+            (
+                "of a spring at each hoof point, along the ground's normal and tangent, which makes friction "
+                "Coulomb's, without thresholds; None for a rigid hoof"
+            ),
+        ),
+    ] = None
+    hoof_damping: Annotated[
+        float | None,
+        About(
+            "N s/m",
+            "of its damper; None for a tenth of the critical one under the trunk; needs `hoof_stiffness`",
+            of_horse=(
+                "of its damper; None for a tenth of the critical one under a fourth of $horse_mass kg; "
+                "needs `hoof_stiffness`"
+            ),
+        ),
+    ] = None
+    terrain: Annotated[
+        Mapping[str, Any] | None,
+        About(
+            "",
+            (
+                'None for level ground, {"kind": "slope", "angle": rad}, {"kind": "hills", ...} as in '
+                "[HorseLegTerrain](HorseLegTerrain.md#terrain), or what `Terrain.to_dict` returns; a "
+                "suspended trunk and a rail keep their height, so ground that drifts from y = 0 is refused"
+            ),
+        ),
+    ] = None
 
     # Actions and drive
     crank_rate: Annotated[
@@ -201,15 +408,6 @@ class TaskSettings(BodySettings):
         About("", "physical parameters to draw at each reset, in the form of the reset option `parameters`"),
     ] = None
 
-
-@dataclass(frozen=True, kw_only=True)
-class Settings(TaskSettings):
-    """Settings of an environment, plain values that JSON can hold, each with its default and its `About`.
-
-    The types are those that callers may pass: the fields are keyword arguments of the environments, too, see
-    `envs.arguments`.
-    """
-
     # Curricula
     schedule: Annotated[
         Mapping[str, Sequence[Any]] | None,
@@ -304,3 +502,99 @@ NEEDED: Mapping[str, tuple[str, tuple[str, ...]]] = MappingProxyType(
 )
 """Settings that have an effect only with certain values of another setting; () for any range, `GIVEN` for any
 value except None."""
+
+
+def check_effect(name: str, settings: Settings, within: str = "") -> None:
+    """Check that a setting has an effect under the remaining settings.
+
+    Args:
+        name: name of the setting.
+        settings: all settings, this one included.
+        within: argument or option that contains the setting, for the message; "" if it is passed directly.
+
+    Raises:
+        ParameterError: the setting has no effect.
+    """
+    # Not in `NEEDED`, which has lists of values: here any number disables the laws that the settings are for.
+    if name in ("friction_law", "friction_slow", "friction_fast") and settings.hoof_stiffness is not None:
+        named = f"{within}: {name!r}" if within else name
+        raise ParameterError(
+            f"{named}: expected none with a hoof_stiffness, whose friction needs no sliding speed, got "
+            f"hoof_stiffness={settings.hoof_stiffness!r}"
+        )
+    needed, values = NEEDED.get(name, ("", ()))
+    present: Any = getattr(settings, needed, None)
+    if needed and not _has_effect(present, values):
+        good = " or ".join(f"{needed}={value!r}" for value in values) or f"a range of {needed}"
+        good = f"a {needed}" if values == GIVEN else good
+        named = f"{within}: {name!r}" if within else name
+        # The trunk is part of the task: the message cannot suggest another.
+        if needed == "trunk" and "free" in (present, *values) and present != "fixed":
+            body = "a horse" if present == "free" else "one leg"
+            raise ParameterError(f"{named}: expected none for {body}, where it has no effect")
+        raise ParameterError(
+            f"{named}: expected {good}, without which it has no effect, got {needed}={present!r}"
+        )
+
+
+def _has_effect(present: Any, values: tuple[str, ...]) -> bool:
+    """Return whether a setting has one of the values in `About.needs`."""
+    if values == GIVEN:
+        return present is not None
+    return present in values if values else not _is_one(present)
+
+
+def _is_one(value: Any) -> bool:
+    """Return whether a value is single: a number, None, or a range with equal ends."""
+    ends = tuple(value) if isinstance(value, Iterable) else (value, value)
+    return len(ends) == 2 and bool(ends[0] == ends[1])
+
+
+def to_json(settings: Settings) -> dict[str, Any]:
+    """Return the settings as values that JSON can hold, by name."""
+    return {key: json_value(value) for key, value in asdict(settings).items()}
+
+
+def as_plain(name: str, value: Any) -> Any:
+    """Convert a value to plain Python: numbers of NumPy and pandas to numbers, arrays and other sequences to
+    lists, paths to text, enumerations to their value. Other objects are returned unchanged.
+
+    Args:
+        name: name of the value in messages.
+        value: any object.
+
+    Raises:
+        ParameterError: another kind of number, such as a tensor.
+    """
+    # Most values are plain already; by type, because a bool is an int and subclasses are converted below.
+    if value is None or type(value) in (bool, int, float, str):
+        return value
+    if isinstance(value, (np.generic, np.ndarray)) and value.dtype != object:
+        return as_plain(name, value.tolist())
+    if isinstance(value, Enum):
+        return as_plain(name, value.value)
+    if isinstance(value, PurePath):
+        return str(value)
+    if isinstance(value, Mapping):
+        return {str(key): as_plain(f"{name}[{key!r}]", inner) for key, inner in value.items()}
+    # Any sequence, such as the lists of a configuration library.
+    if isinstance(value, Sequence) and not isinstance(value, (str, bytes)):
+        plain = (as_plain(f"{name}[{k}]", inner) for k, inner in enumerate(value))
+        return tuple(plain) if isinstance(value, tuple) else list(plain)
+    # JSON and pickles must not depend on other libraries' subclasses.
+    if isinstance(value, (int, float, str)):
+        return next(kind(value) for kind in (int, float, str) if isinstance(value, kind))
+    if hasattr(type(value), "__float__"):
+        raise ParameterError(
+            f"{name}: expected a number of Python or NumPy, which JSON can hold, got {value!r}"
+        )
+    return value  # the setting's check raises the error
+
+
+def json_value(value: Any) -> Any:
+    """Convert tuples to lists at every depth, which is the form in which JSON returns them."""
+    if isinstance(value, (list, tuple)):
+        return [json_value(inner) for inner in value]
+    if isinstance(value, Mapping):
+        return {key: json_value(inner) for key, inner in value.items()}
+    return value

@@ -16,8 +16,7 @@ from hoof_env.gait import PARAMETERS
 from hoof_env.paper.rows import load_published
 from hoof_env.policies.find import shipped_ids
 from hoof_env.policies.record import own_id
-from hoof_env.tasks.effects import check_effect
-from hoof_env.tasks.settings import ABOUT
+from hoof_env.tasks.settings import ABOUT, check_effect
 from hoof_env.view.simulation import Simulation, unit_of
 
 GROUPS = {

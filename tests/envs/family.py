@@ -10,9 +10,8 @@ import numpy as np
 from gymnasium.vector import AutoresetMode, SyncVectorEnv
 
 from hoof_env.errors import ParameterError
-from hoof_env.tasks.effects import check_effect
 from hoof_env.tasks.registry import TASKS
-from hoof_env.tasks.settings import Settings
+from hoof_env.tasks.settings import Settings, check_effect
 
 HORSE = "hoof_env/Horse-v0"
 ROUGH = "hoof_env/HorseRough-v0"

@@ -11,8 +11,8 @@ from family import HORSE, actions, same
 
 from hoof_env import Sb3VecEnv
 from hoof_env.errors import FixedSettingError, ParameterError, UnknownArgumentError
-from hoof_env.tasks.plain import to_json
 from hoof_env.tasks.schedules import Ramp
+from hoof_env.tasks.settings import to_json
 
 LEG, SPEED = (f"hoof_env/HorseLeg{name}-v0" for name in ("", "Speed"))
 SHORT = {"episode_seconds": 0.2}

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from family import HORSE, actions, make, same, steps
 
-from hoof_env.tasks.delays import Parts, parts_of
+from hoof_env.episodes.delays import Parts, parts_of
 
 LEG, FIXED = "hoof_env/HorseLeg-v0", "hoof_env/HorseLegFixed-v0"
 

@@ -10,9 +10,10 @@ import pytest
 from family import HORSE, actions, make, same, steps
 
 from hoof_env import Sb3VecEnv
+from hoof_env.episodes.pushes import check_pushes
 from hoof_env.errors import FixedSettingError, ParameterError
 from hoof_env.simd import threads
-from hoof_env.tasks.disturbances import ROUGH_PUSH, ROUGH_SLOPE, ROUGHNESS, check_pushes, rough_ground
+from hoof_env.tasks.disturbances import ROUGH_PUSH, ROUGH_SLOPE, ROUGHNESS, rough_ground
 from hoof_env.tasks.parameters import make_terrain
 
 LEG, RAIL, FIXED = (f"hoof_env/HorseLeg{name}-v0" for name in ("", "Rail", "Fixed"))

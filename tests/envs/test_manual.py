@@ -18,10 +18,9 @@ from hoof_env.gait import LIMITS, load_gait
 from hoof_env.tasks.horse import MASS
 from hoof_env.tasks.horse_gaits import FOLLOWED, LEGS
 from hoof_env.tasks.one_leg import OneLeg
-from hoof_env.tasks.plain import to_json
 from hoof_env.tasks.registry import TASKS
 from hoof_env.tasks.reward import BEARING, MAX_STRIDE
-from hoof_env.tasks.settings import Settings
+from hoof_env.tasks.settings import Settings, to_json
 
 HORSES = "horse", "rough"  # tasks of a horse
 OF_LEGS = [name for name, task in TASKS.items() if task.body is OneLeg]

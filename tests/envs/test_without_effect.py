@@ -16,10 +16,9 @@ from hoof_env.dynamics.parts import ONE_LEG
 from hoof_env.episodes.batch import EpisodeBatch
 from hoof_env.errors import FixedSettingError, ParameterError
 from hoof_env.ground.laws import FRICTION_LAWS, NORMAL_LAWS
-from hoof_env.tasks.effects import check_effect
 from hoof_env.tasks.registry import TASKS
 from hoof_env.tasks.reward import check_weights
-from hoof_env.tasks.settings import NEEDED, PER_EPISODE, Settings
+from hoof_env.tasks.settings import NEEDED, PER_EPISODE, Settings, check_effect
 
 LEG, RAIL, FIXED, SPEED, TERRAIN = (
     f"hoof_env/HorseLeg{name}-v0" for name in ("", "Rail", "Fixed", "Speed", "Terrain")
