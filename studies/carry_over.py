@@ -32,7 +32,7 @@ from hoof_env.evaluation.episodes import score_vector
 from hoof_env.policies.find import read_policy_record
 from hoof_env.policies.onnx_file import FILE
 from hoof_env.policies.saved import own_id
-from hoof_env.tasks.disturbances import MAX_STRENGTH, ROUGH_PUSH, ROUGH_SLOPE, ROUGHNESS, rough_ground
+from hoof_env.tasks.disturbances import MOST_STRENGTH, ROUGH_PUSH, ROUGH_SLOPE, ROUGHNESS, rough_ground
 
 FIRST_SEED = 3_000_000  # on which nothing else is played
 TABLE = "figures.csv"
@@ -317,7 +317,7 @@ def main(argv: list[str] | None = None) -> None:
     args = tyro.cli(Args, args=argv, prog="python -m agents.carry_over", description=__doc__)
     count("--episodes", args.episodes)
     for strength in args.strengths:
-        check_number("--strengths", strength, low=0.0, high=MAX_STRENGTH, exclusive_low=True)
+        check_number("--strengths", strength, low=0.0, high=MOST_STRENGTH, exclusive_low=True)
     check_folder(args.out)
     args.out.mkdir(parents=True, exist_ok=True)
     found = play_all(args, args.policies or shipped())

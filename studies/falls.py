@@ -30,7 +30,7 @@ from hoof_env.film import frames, write_film
 from hoof_env.policies.find import find_policy, read_policy_record
 from hoof_env.policies.saved import own_id
 from hoof_env.render.renderer import Renderer
-from hoof_env.tasks.disturbances import MAX_STRENGTH, rough_ground
+from hoof_env.tasks.disturbances import MOST_STRENGTH, rough_ground
 from hoof_env.tasks.horse import MASS
 
 ENV_ID = "hoof_env/Horse-v0"
@@ -64,7 +64,7 @@ def played(policy: str, strength: float, seeds: range) -> list[dict[str, float]]
 
 def falls_of(policy: str, strength: float, episodes: int) -> tuple[float, float]:
     """Return the share of episodes in which a policy falls, and that of those which succeed, see
-    `hoof_env.episodes.summaries.is_success`.
+    `hoof_env.envs.batch_reports.is_success`.
 
     Args:
         policy: name or path of the policy.
@@ -143,7 +143,7 @@ def main(argv: list[str] | None = None) -> None:
 
     args = tyro.cli(Args, args=argv, prog="python -m agents.falls", description=__doc__)
     for strength in args.strengths:
-        check_number("--strengths", strength, low=0.0, high=MAX_STRENGTH)
+        check_number("--strengths", strength, low=0.0, high=MOST_STRENGTH)
     episodes = count("--episodes", args.episodes)
     if args.film:
         film_of(args.policies, args.strengths[-1], episodes, args.film)

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from functools import cache
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from hoof_env.dynamics.state import MAX_NUMBER
 from hoof_env.episodes.batch import EpisodeBatch
 from hoof_env.episodes.pushes import MAX_PUSH, Push
 from hoof_env.episodes.row_plans import RowPlans
@@ -16,6 +18,10 @@ from hoof_env.errors import ParameterError
 from hoof_env.tasks.settings import Settings
 
 Floats = NDArray[np.float64]
+
+UNBOUNDED = frozenset({"target", "switch", "next_target", "commanded", "push_at", "own"})
+"""Fields of `episode.Episode` that are infinite where there is no command and no push, and rows of users'
+terms, which may have any value."""
 
 
 def state_of(batch: EpisodeBatch) -> dict[str, Any]:
@@ -140,11 +146,19 @@ def _read_episode(batch: EpisodeBatch, given: Any) -> Floats:
 
 
 def _is_possible(batch: EpisodeBatch, episode: Floats) -> bool:
-    """True if all rows of the episodes' memory have positive weights, and finite gaits of horses."""
+    """True if the episodes' memory has positive weights, and infinite numbers only where they are usual."""
     layout = batch.rows.layout
-    weight = episode[layout.rows("weight")]
-    rows = [episode[layout.rows(name)] for name in batch.plan.body.finite_fields]
-    return bool((weight > 0).all() and all(np.isfinite(values).all() for values in rows))
+    bounded = np.abs(episode[_bounded_rows(layout)]) <= MAX_NUMBER
+    speeds = episode[layout.rows("target")] if batch.plan.commands.speeds else np.zeros(1)
+    weights = episode[layout.rows("weight")]
+    return bool(bounded.all() and np.isfinite(speeds).all() and (weights > 0).all())
+
+
+@cache
+def _bounded_rows(layout: Any) -> NDArray[np.int64]:
+    """Return the rows of a layout of episodes that are not in `UNBOUNDED`."""
+    rows = [layout.rows(name) for name in layout.fields if name not in UNBOUNDED]
+    return np.concatenate([np.arange(part.start, part.stop) for part in rows])
 
 
 def _read_steps(batch: EpisodeBatch, given: Any) -> Floats:

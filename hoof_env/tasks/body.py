@@ -62,7 +62,6 @@ class Body(Protocol):
         start_names, gait_names: names of the numbers with which infos describe an episode's start.
         action_names: names of the actions, leg after leg.
         action_form: tag of the meaning of actions, "rates", or of a horse offsets and their spans.
-        finite_fields: fields of the episode's memory that must be finite in a state; the weight always must.
     """
 
     # Fixed when a body is made: settings that change later (`conditions.CHANGEABLE`) do not affect them.
@@ -81,7 +80,6 @@ class Body(Protocol):
     gait_names: tuple[str, ...]
     action_names: tuple[str, ...]
     action_form: str
-    finite_fields: tuple[str, ...]
 
     @property
     def policy_names(self) -> list[str]:

@@ -172,7 +172,7 @@ def task_type(terms: int, entries: int, gait: int = ACTIONS, more: tuple[Any, ..
                 "i8",
                 (entries,),
             ),  # column of the true number of each slot; -1: not observed
-            ("parts", "i8"),  # parts of a control step, see `tasks.delays.Parts`
+            ("parts", "i8"),  # parts of a control step, see `episodes.delays.Parts`
             ("part_substeps", "i8", (MAX_PARTS,)),
             ("acting_part", "i8"),  # part at whose start an action takes effect
             ("seeing_part", "i8"),  # part after which a frame within the step is observed; -1: no such frame

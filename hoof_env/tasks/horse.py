@@ -162,7 +162,6 @@ class Horse:
 
     kernels = HORSE_KERNELS
     picture = "horse"
-    finite_fields: tuple[str, ...] = ("gait",)
     action_names: tuple[str, ...] = tuple(f"{leg}_{name}" for leg, name in product(LEGS, PARAMETERS))
     # The spans are in the tag, so that policies, states and datasets with different spans are refused.
     action_form = f"offsets of {SPANS[0]:g} and {SPANS[1]:g} rad"

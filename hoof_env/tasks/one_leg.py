@@ -184,7 +184,6 @@ class OneLeg:
     """
 
     kernels = LEG_KERNELS
-    finite_fields: tuple[str, ...] = ()
     harmonics = 1
     limits: Limits | None = None
     action_names: tuple[str, ...] = tuple(f"rate_of_{name}" for name in PARAMETERS)

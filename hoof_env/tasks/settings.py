@@ -1,4 +1,4 @@
-"""Settings of environments: default, type and meaning of each, other settings with which it has an effect, and
+"""Settings of environments: default, type and meaning of each, the settings with which it has an effect, and
 conversion to plain values of Python and JSON."""
 
 from __future__ import annotations

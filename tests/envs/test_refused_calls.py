@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import collections.abc
 import copy
+import itertools
 
 import gymnasium as gym
 import numpy as np
@@ -237,9 +238,12 @@ def test_states(kind, name):
     check_nothing_lost(env, twin, lambda e: e.set_state(given), message)
 
 
-@pytest.mark.parametrize(("row", "value"), [("weight", 0.0), ("gait", np.inf)])
+@pytest.mark.parametrize(
+    ("row", "value"),
+    [("weight", 0.0), ("gait", np.inf), ("x_before", np.inf), ("target", np.inf), ("time", 1e200)],
+)
 def test_states_of_a_horse_that_cannot_be(row, value):
-    """Of no weight, or of a gait without end, which would be found only as a failure of the next step."""
+    """A weight of 0 or a number without end would be found only as a failure of the next step."""
     env = gym.make(HORSE).unwrapped
     env.reset(seed=0)
     state, before = env.get_state(), env.get_state()
@@ -519,3 +523,34 @@ def test_any_sequence_is_as_good_as_a_list():
     made, same_with_lists = (gym.make("hoof_env/HorseLeg-v0", **each).unwrapped for each in (given, listed))
     assert made.settings == same_with_lists.settings
     assert made.observation_names == same_with_lists.observation_names
+
+
+@pytest.mark.parametrize("env_id", [LEG, HORSE])
+def test_a_damaged_number_is_refused_or_steps_stay_finite(env_id):
+    """Each number of a state in turn: too large, infinite, or 0."""
+    env = gym.make(env_id).unwrapped
+    env.reset(seed=0)
+    idle = np.zeros(env.action_space.shape, np.float32)
+    for _ in range(9):
+        env.step(idle)
+    state = env.get_state()
+    generator = np.random.default_rng(0)
+    refused = 0
+    for part in ("trunk", "limbs", "command", "trunk_settings", "limb_settings", "episode"):
+        values = (state if part == "episode" else state["engine"])[part].reshape(-1)
+        rows = range(values.size) if values.size < 40 else generator.choice(values.size, 40, replace=False)
+        for row, value in itertools.product(rows, (0.0, 1e150, np.inf)):
+            before, values[row] = values[row], value
+            try:
+                seen = [env.set_state(state)]
+                for _ in range(2):
+                    observation, reward, terminated, *_ = env.step(idle)
+                    seen += [observation, reward]
+                    if terminated:
+                        break
+            except ParameterError:
+                refused += 1
+            else:
+                assert all(np.isfinite(each).all() for each in seen), (part, row, value)
+            values[row] = before
+    assert refused > 100
