@@ -1,8 +1,9 @@
 """Checkpoints: all that a training goes on from, in a folder that is whole or does not exist.
 
 `checkpoints/N/`, after N steps and between two rollouts, holds model.zip (weights, optimisers, counters,
-schedules, action noise), policy.*, where they exist vecnormalize.pkl and replay.pkl, and state.pkl:
-environments, generators, length of monitor.csv.
+schedules, action noise), policy.*, where they exist vecnormalize.pkl and replay.pkl, state.pkl
+(environments, generators, length of monitor.csv), and digests.json: a damaged pickle may be readable and go on
+with other numbers.
 
 A resumed run has the bits of a run that was never stopped: on the same machine, on the CPU, with the same
 number of threads, with environments that have `get_state` and `set_state`, and without max_episode_steps
@@ -13,6 +14,8 @@ first ones. These files are pickles: resume only runs that you trust.
 from __future__ import annotations
 
 import copy
+import hashlib
+import json
 import os
 import pickle
 import random
@@ -33,6 +36,8 @@ from hoof_env.errors import DataFileError, OutputError
 KEPT = 2
 REPLAY = "replay.pkl"
 STATE = "state.pkl"
+DIGESTS = "digests.json"
+"""File with the SHA-256 of every other file of a checkpoint, by name."""
 COUNTED = ("episode_returns", "episode_lengths", "episode_count")  # counters of a `VecMonitor`
 EXPLORATION = ("exploration_mat", "exploration_matrices")
 """Attributes with the exploration noise that gSDE drew for a rollout, before its first callback."""
@@ -104,7 +109,26 @@ def save(model: Any, run: Path, seconds: float) -> None:
         if getattr(model, "replay_buffer", None) is not None:
             model.save_replay_buffer(stage / REPLAY)
         (stage / STATE).write_bytes(pickle.dumps(state))
+        (stage / DIGESTS).write_text(json.dumps(_digests(stage), indent=1), encoding="utf-8")
     tidy(run)
+
+
+def _digests(folder: Path) -> dict[str, str]:
+    """Return the SHA-256 of each file of a checkpoint, but for `DIGESTS`, by name."""
+    files = sorted(path for path in folder.iterdir() if path.name != DIGESTS)
+    return {path.name: hashlib.sha256(path.read_bytes()).hexdigest() for path in files}
+
+
+def _check_digests(checkpoint: Path) -> None:
+    """Check that the files of a checkpoint are as they were written.
+
+    Raises:
+        ValueError: a file is damaged, missing, or of another checkpoint.
+    """
+    written = json.loads((checkpoint / DIGESTS).read_text(encoding="utf-8"))
+    present = _digests(checkpoint)
+    if unlike := sorted(name for name in {*written, *present} if written.get(name) != present.get(name)):
+        raise ValueError(f"{', '.join(unlike)}: not as written, by {DIGESTS}")
 
 
 def write_episodes(envs: Any, path: Path, go_on: bool = False) -> None:
@@ -138,6 +162,7 @@ class Resumed:
         from stable_baselines3.common.vec_env import VecMonitor, VecNormalize
 
         try:
+            _check_digests(checkpoint)
             self._state = pickle.loads((checkpoint / STATE).read_bytes())
             self.seconds: float = self._state["seconds"]
             monitor = VecMonitor(many)

@@ -202,8 +202,17 @@ def test_a_damaged_checkpoint_is_named_and_an_earlier_one_serves(stopped, tmp_pa
     folder = tmp_path / "run"
     shutil.copytree(stopped, folder)
     last, earlier = checkpoints(folder)
-    (last / REPLAY).write_bytes(b"no pickle")
-    with pytest.raises(DataFileError, match=rf"checkpoints/{last.name}: "):
+    for file in last.iterdir():
+        # One flipped bit, with which a pickle may well be readable.
+        content = bytearray(file.read_bytes())
+        content[len(content) // 2] ^= 1
+        file.write_bytes(content)
+        with pytest.raises(DataFileError, match=rf"checkpoints/{last.name}: "):
+            train(arguments("sac", folder, resume=True))
+        content[len(content) // 2] ^= 1
+        file.write_bytes(content)
+    (last / REPLAY).unlink()
+    with pytest.raises(DataFileError, match=rf"checkpoints/{last.name}: .*{REPLAY}"):
         train(arguments("sac", folder, resume=True))
     shutil.rmtree(last)
     assert train(arguments("sac", folder, resume=True)).steps == 160
