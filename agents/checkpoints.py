@@ -2,8 +2,8 @@
 
 `checkpoints/N/`, after N steps and between two rollouts, holds model.zip (weights, optimisers, counters,
 schedules, action noise), policy.*, where they exist vecnormalize.pkl and replay.pkl, state.pkl
-(environments, generators, length of monitor.csv), and digests.json: a damaged pickle may be readable and go on
-with other numbers.
+(environments, generators, length of monitor.csv), and digests.json, because a damaged pickle may be readable
+and go on with other numbers.
 
 A resumed run has the bits of a run that was never stopped: on the same machine, on the CPU, with the same
 number of threads, with environments that have `get_state` and `set_state`, and without max_episode_steps
