@@ -116,7 +116,11 @@ def save(model: Any, run: Path, seconds: float) -> None:
 def _digests(folder: Path) -> dict[str, str]:
     """Return the SHA-256 of each file of a checkpoint, but for `DIGESTS`, by name."""
     files = sorted(path for path in folder.iterdir() if path.name != DIGESTS)
-    return {path.name: hashlib.sha256(path.read_bytes()).hexdigest() for path in files}
+    digests = {}
+    for path in files:
+        with path.open("rb") as file:
+            digests[path.name] = hashlib.file_digest(file, "sha256").hexdigest()
+    return digests
 
 
 def _check_digests(checkpoint: Path) -> None:

@@ -42,7 +42,7 @@ CHILDREN = {
     "docs/agents": ("/agents/policies/README",),
     "docs/environments/README": ("HorseLeg", "HorseLeg*", "*"),
     "docs/api/README": ("environments", "engine", "leg", "task", "lab", "errors"),
-    "docs/evidence/README": ("*", "*/README", "/benchmarks/results/**"),
+    "docs/evidence/README": ("*", "*/README", "/benchmarks/results/**", "/studies/README"),
     "agents/policies/README": ("*/card",),
 }
 """Pages below a page, in the side bar. The pages themselves lack them: only Sphinx can read a toctree."""
@@ -50,6 +50,7 @@ CHILDREN = {
 root_doc = "docs/index"
 include_patterns = [
     "docs/**", "CHANGELOG.md", "agents/policies/**.md", "hoof_env/simd/README.md", "benchmarks/results/**.md",
+    "studies/README.md",
 ]  # fmt: skip
 exclude_patterns = [".*", "runs", "build", "dist", "**/__pycache__"]
 

@@ -328,7 +328,7 @@ class TrunkEngine:
             contact_law=self.contact_law,
         )
 
-    # What a batch of episodes asks of its engine. `paper_solver.engine.PaperEngine` has other answers.
+    # What a batch of episodes asks of its engine. `paper_solver.episodes.PaperEngine` has other answers.
 
     in_kernels: ClassVar[bool] = True
     """True if kernels of control steps contain the engine; else its `take_step` runs between two kernels."""
@@ -336,6 +336,9 @@ class TrunkEngine:
     def take_step(self, steps: int) -> None:
         """Take a control step of `steps` times `sim_dt` under the commands in memory."""
         self.advance(None, steps)
+
+    def adopt(self, envs: NDArray[np.int64]) -> None:
+        """Simulate environments with the present mechanics from now on; kernels always do."""
 
     @contextmanager
     def only(self, envs: NDArray[np.int64]) -> Iterator[None]:

@@ -86,6 +86,11 @@ def longer_limit(given: int, steps: int, dt: float) -> str:
     )
 
 
+def _times(arguments: Mapping[str, Any]) -> tuple[Any, ...]:
+    """Return the arguments of an environment from which its limit follows."""
+    return arguments.get("episode_seconds"), arguments.get("dt")
+
+
 class LimitedSpec(EnvSpec):
     """Specification of which `max_episode_steps` is at most the environment's own limit.
 
@@ -95,9 +100,10 @@ class LimitedSpec(EnvSpec):
     """
 
     # Slots are no fields, which JSON would hold.
-    __slots__ = ("dt", "own_limit")
+    __slots__ = ("dt", "own_limit", "times")
     own_limit: int
     dt: float
+    times: tuple[Any, ...]
 
     @classmethod
     def of(cls, spec: EnvSpec, own_limit: int, dt: float) -> LimitedSpec:
@@ -105,16 +111,19 @@ class LimitedSpec(EnvSpec):
         made = cls.__new__(cls)
         made.own_limit = own_limit
         made.dt = dt
-        for name, value in vars(spec).items():
+        made.times = _times(spec.kwargs)
+        for name, value in {**vars(spec), "max_episode_steps": None}.items():
             setattr(made, name, value)
+        made.max_episode_steps = spec.max_episode_steps
         return made
 
     def __setattr__(self, name: str, value: Any) -> None:
         """Set a field; a longer limit becomes the environment's own, with a warning."""
-        limit = getattr(self, "own_limit", None)
-        if name == "max_episode_steps" and limit is not None and value is not None and value > limit:
-            gym.logger.warn(longer_limit(value, limit, self.dt))
-            value = limit
+        # A copy with other times is of another environment.
+        is_limit = name == "max_episode_steps" and _times(getattr(self, "kwargs", {})) == self.times
+        if is_limit and isinstance(value, int) and value > self.own_limit:
+            gym.logger.warn(longer_limit(value, self.own_limit, self.dt))
+            value = self.own_limit
         super().__setattr__(name, value)
 
 
@@ -280,7 +289,7 @@ class LegBase:
     def commanded_speed(self) -> Any:
         """Present commanded speed [m/s]; in a vector environment of shape (num_envs,). None where no speed is
         commanded."""
-        if not self.batch.plan.commands.speeds:
+        if not any(plan.commands.speeds for plan in self.batch.row_plans.in_use()):
             return None
         return self._each(self.batch.rows.named.target[: self.batch.num_envs])
 
@@ -295,7 +304,7 @@ class LegBase:
             ResetNeeded: there is no episode yet.
         """
         self._check_started("command_speed")
-        if not self.batch.plan.commands.speeds:
+        if self.commanded_speed is None:
             raise ParameterError(f"target_speed: expected an id with a commanded speed, got {self.task.id}")
         number = check_number("target_speed", speed, low=0.1, high=20.0)
         self.batch.plan.commands.command(self.batch.rows, slice(self.batch.num_envs), number)
@@ -311,6 +320,11 @@ class LegBase:
         Raises:
             ParameterError: an unknown parameter, one without effect, or one out of range.
         """
+        (is_done,) = self.batch.under_each(np.array([0]), lambda group: self._touch(parameters))
+        return bool(is_done)
+
+    def _touch(self, parameters: Mapping[str, float]) -> bool:
+        """Change physical parameters of the first environment under its own plan, see `touch`."""
         plan = self.batch.plan
         plan.body.check_options({"parameters": dict(parameters)}, self.engine.trunk, plan.settings)
         if not plan.randomization.fits(parameters, self.engine):
@@ -550,10 +564,10 @@ class LegBase:
         if SPEED in new and "schedule" not in new:
             for settings in asked:
                 check_unscheduled(SPEED, settings)
+        of_rows = {row: each for each, group in zip(given, groups.values(), strict=True) for row in group}
+        kept = [of_rows.get(row, each) for row, each in enumerate(self._given)]
         self.batch.change(asked, [*groups.values()])
-        for each, group in zip(given, groups.values(), strict=True):
-            for row in group:
-                self._given[row] = each
+        self._given = kept
 
     def _take_given(self) -> None:
         """Go on, after a state, from the settings of its rows."""

@@ -1,4 +1,4 @@
-"""Generators of the rows of a vector environment, seeded as in Gymnasium's `SyncVectorEnv`."""
+"""Generators and their states; those of a vector environment are seeded as in Gymnasium's `SyncVectorEnv`."""
 
 from __future__ import annotations
 

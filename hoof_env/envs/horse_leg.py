@@ -122,9 +122,9 @@ class HorseLegEnv(LegBase, gym.Env[NDArray[np.float32], NDArray[np.float32]]):
         checked = self.batch.check_options(options)  # first, so that a refused reset changes nothing
         super().reset(seed=None if seed is None else count("seed", seed, low=0))
         self.batch.restart_schedules([] if seed is None else [0])
-        before = self.batch.calls
         parameters = self.batch.reset([0], [self.np_random], checked)
-        if self.batch.calls is not before:  # `change_settings` took effect: other arrays
+        # `change_settings` took effect, perhaps in a reset that Ctrl-C ended: other arrays
+        if self._views[2] is not self.batch.calls.held:
             self._attach()
         self._phase = "running"
         if self._watched:

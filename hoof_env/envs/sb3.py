@@ -88,7 +88,19 @@ class RowInfo(dict[str, Any]):
     def __eq__(self, other: object) -> bool:
         return self.copy() == (other.copy() if isinstance(other, RowInfo) else other)
 
+    def __ne__(self, other: object) -> bool:
+        return not self == other
+
     __hash__ = None
+
+    def __or__(self, other: Any) -> Any:
+        return self.copy() | other
+
+    def __reversed__(self) -> Iterator[str]:
+        return reversed(self.keys())
+
+    def __repr__(self) -> str:
+        return repr(self.copy())
 
     def __reduce__(self) -> Any:
         return dict, (self.copy(),)

@@ -196,7 +196,7 @@ class HorseLegVectorEnv(LegBase, VectorEnv[NDArray[np.float32], NDArray[np.float
         size = width, height
         spaces = self._make(task, settings, self.num_envs, render_mode, size, num_threads, steps)
         if steps is not None and steps > self.steps_per_episode:
-            raise ParameterError(longer_limit(steps, self.steps_per_episode, self.dt))
+            gym.logger.warn(longer_limit(steps, self.steps_per_episode, self.dt))
         self.single_observation_space, self.single_action_space = spaces
         self.observation_space = batch_space(self.single_observation_space, self.num_envs)
         self.action_space = batch_space(self.single_action_space, self.num_envs)
@@ -463,9 +463,9 @@ class HorseLegVectorEnv(LegBase, VectorEnv[NDArray[np.float32], NDArray[np.float
             return [None] * len(chosen)
         if name == "settings":
             return [self.batch.row_plans.pending_of(env).asked for env in chosen]
-        # Only environments that are asked for keep their substeps.
-        if name == "record":
-            return [self.record(env) for env in chosen]
+        # Of the environments that are asked for; only these keep their substeps.
+        if name in ("record", "surroundings"):
+            return [getattr(self, name)(env, *args, **kwargs) for env in chosen]
         name = SINGLE_SPACES.get(name, name)
         if name.startswith("_") or not hasattr(self, name):
             raise AttributeError(f"{type(self).__name__}: the environments have no attribute {name!r}")

@@ -155,8 +155,11 @@ class EpisodeBatch:
         plans = [self.plan_of(settings) for settings in asked]
         for plan in plans:
             self._compile(self._kernels_of(plan))
+        # A copy, which takes effect as a whole or, after Ctrl-C, not at all.
+        row_plans = self.row_plans.copy()
         for plan, group in zip(plans, groups, strict=True):
-            self.row_plans.add(plan, np.array(group))
+            row_plans.add(plan, np.array(group))
+        self.row_plans = row_plans
 
     def plan_of(self, settings: Settings) -> Plan:
         """Return the plan of some settings, one that rows have already if there is one."""
@@ -165,39 +168,43 @@ class EpisodeBatch:
 
     def enter(self, plan: Plan) -> None:
         """Work under a plan."""
-        self.plan = plan
-        self.engine.mechanics = plan.mechanics
-        self.calls = self._calls_of(plan)
+        calls = self._calls_of(plan)
+        self.plan, self.engine.mechanics, self.calls = plan, plan.mechanics, calls
 
     def put_under(self, row_plans: RowPlans) -> None:
         """Work under plans of the rows."""
+        plan = row_plans.newest
+        calls = self._calls_of(plan)
+        names, values = self._drawn_under(row_plans)
+        # No call in between: Ctrl-C comes before all of these assignments or after them.
         self.row_plans = row_plans
+        self.plan, self.engine.mechanics, self.calls = plan, plan.mechanics, calls
+        self.drawn_names, self.rows.start_values = names, values
         self._calls = {plan: calls for plan, calls in self._calls.items() if plan in row_plans.plans}
-        self.enter(row_plans.newest)
-        self._name_drawn()
 
     def _adopt(self, which: Index) -> None:
         """Put rows under their pending plans."""
-        plans = self.row_plans
+        plans = self.row_plans.copy()
         # The engine's constants of these rows follow from their old settings.
         self.rows.has_overrides[which[plans.present[which] != plans.pending[which]]] = True
         plans.start(which)
         self.put_under(plans)
 
-    def _name_drawn(self) -> None:
-        """Give `start_values` a row for each parameter that any row draws, NaN where one does not."""
+    def _drawn_under(self, row_plans: RowPlans) -> tuple[list[str], Floats]:
+        """Return `drawn_names` under plans, and `start_values` with a row for each of these names, NaN where
+        a row does not draw it."""
         old, old_values = self.drawn_names, self.rows.start_values
-        ranges = [plan.randomization.ranges for plan in self.row_plans.in_use()]
-        self.drawn_names = [*dict.fromkeys(name for each in ranges for name in each)]
-        if self.drawn_names == old:
-            return
+        ranges = [plan.randomization.ranges for plan in row_plans.in_use()]
+        names = [*dict.fromkeys(name for each in ranges for name in each)]
+        if names == old:
+            return old, old_values
         first = len(self.plan.start_names)
-        values = np.full((first + len(self.drawn_names), self.num_envs), np.nan)
+        values = np.full((first + len(names), self.num_envs), np.nan)
         values[:first] = old_values[:first]
-        for k, name in enumerate(self.drawn_names):
+        for k, name in enumerate(names):
             if name in old:
                 values[first + k] = old_values[first + old.index(name)]
-        self.rows.start_values = values
+        return names, values
 
     def under_each(
         self, which: Index, act: Callable[[Index], Any], *, for_kernels: bool = False
@@ -244,6 +251,8 @@ class EpisodeBatch:
             ParameterError: an unknown option, or one that some of the episodes cannot have.
         """
         plans = self.row_plans
+        if len(plans.plans) == 1:
+            return self._check_options(options)
         which = np.arange(self.num_envs) if which is None else which
         if not plans.are_due(which) and not plans.are_mixed:
             return self._check_options(options)

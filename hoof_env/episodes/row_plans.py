@@ -71,22 +71,27 @@ class RowPlans:
     """
 
     def __init__(self, plans: list[Plan], rows: int) -> None:
-        self.plans = plans
+        self.plans: list[Plan] = []
         self.marks: list[object] = []
+        for plan in plans:
+            self._append(plan)
         self.present = np.full(rows, len(plans) - 1)
         self.pending = self.present.copy()
-        self._mark()
+        self._compare()
 
-    def _mark(self) -> None:
-        """Find the marks of all plans, and what follows from them."""
-        marks: list[object] = []
-        for k, plan in enumerate(self.plans):
-            pairs = zip(marks, self.plans[:k], strict=True)
-            marks.append(next((mark for mark, other in pairs if _act_alike(other, plan)), object()))
-        self.marks = marks
+    def _append(self, plan: Plan) -> None:
+        """Add a plan, with the mark of an earlier one that acts alike, if there is one."""
+        known = {id(mark): (mark, other) for mark, other in zip(self.marks, self.plans, strict=True)}
+        mark = next((mark for mark, other in known.values() if _act_alike(other, plan)), object())
+        # New lists: copies share the old ones.
+        self.plans = [*self.plans, plan]
+        self.marks = [*self.marks, mark]
+
+    def _compare(self) -> None:
+        """Find out whether rows are under several plans."""
         present = np.unique(self.present).tolist()
         self.are_mixed = len({id(self.plans[k]) for k in present}) > 1
-        self.differ = len({id(marks[k]) for k in present}) > 1
+        self.differ = len({id(self.marks[k]) for k in present}) > 1
 
     def find(self, settings: Settings) -> Plan | None:
         """Return the plan of settings, if rows have one; else None."""
@@ -101,13 +106,13 @@ class RowPlans:
             plan = self.plans[known[0]]
             self.present[np.isin(self.present, known)] = last
             self.pending[np.isin(self.pending, known)] = last
-        self.plans = [*self.plans, plan]
+        self._append(plan)
         self.pending[rows] = last
-        self._mark()
+        self.place(self.present, self.pending)
 
     def are_due(self, rows: Index) -> bool:
         """True if some rows start under another plan than the one that they are under."""
-        return bool((self.present[rows] != self.pending[rows]).any())
+        return len(self.plans) > 1 and bool((self.present[rows] != self.pending[rows]).any())
 
     def start(self, rows: Index) -> None:
         """Put rows under their pending plans."""
@@ -119,9 +124,10 @@ class RowPlans:
         """Put all rows under plans, see `present` and `pending`; remove plans that no row needs any more."""
         used = np.union1d(present, pending)
         self.plans = [self.plans[k] for k in used.tolist()]
+        self.marks = [self.marks[k] for k in used.tolist()]
         self.present = np.searchsorted(used, present)
         self.pending = np.searchsorted(used, pending)
-        self._mark()
+        self._compare()
 
     @property
     def newest(self) -> Plan:

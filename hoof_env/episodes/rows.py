@@ -104,6 +104,13 @@ class Rows:
         """Write all rows of an array, but for idle columns."""
         self._used(name)[...] = values
 
+    def take(self, other: Rows) -> None:
+        """Write the arrays of other rows of this batch into these, at their addresses."""
+        for name in ARRAYS:
+            array = getattr(self, name)
+            if array is not None:
+                array[...] = getattr(other, name)
+
     def _used(self, name: str) -> NDArray[Any]:
         array: NDArray[Any] = getattr(self, name)
         return array[: self.num_envs] if ARRAYS[name].axis == 0 else array[..., : self.num_envs]

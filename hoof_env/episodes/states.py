@@ -9,17 +9,17 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from hoof_env.dynamics.state import MAX_NUMBER
+from hoof_env.dynamics.layout import TrunkSettings
 from hoof_env.episodes.batch import EpisodeBatch
-from hoof_env.episodes.pushes import MAX_PUSH, Push
-from hoof_env.episodes.row_plans import RowPlans
+from hoof_env.episodes.pushes import MAX_PUSH
+from hoof_env.episodes.row_plans import CHANGEABLE, RowPlans
 from hoof_env.episodes.rows import repeated
 from hoof_env.errors import ParameterError
-from hoof_env.tasks.settings import Settings
+from hoof_env.tasks.settings import Settings, to_json
 
 Floats = NDArray[np.float64]
 
-UNBOUNDED = frozenset({"target", "switch", "next_target", "commanded", "push_at", "own"})
+UNBOUNDED = frozenset({"target", "switch", "next_target", "commanded", "push_at", "own", "terms"})
 """Fields of `episode.Episode` that are infinite where there is no command and no push, and rows of users'
 terms, which may have any value."""
 
@@ -34,7 +34,7 @@ def state_of(batch: EpisodeBatch) -> dict[str, Any]:
         state["observations"] = rows.get("observations")
     if any(rows.pushes):
         state["pushes"] = rows.pushes.tolist()
-    if batch.row_plans.are_mixed or batch.row_plans.are_due(np.arange(batch.num_envs)):
+    if len(batch.row_plans.plans) > 1:
         state["rows"] = batch.row_plans.to_plain()
     return state
 
@@ -84,13 +84,54 @@ def set_state(batch: EpisodeBatch, state: Mapping[str, Any]) -> None:
     """
     before = batch.row_plans, batch.plan, batch.drawn_names, batch.rows.start_values
     row_plans = _read_row_plans(batch, state.get("rows"))
-    batch.put_under(row_plans)
+    if row_plans is not batch.row_plans:
+        batch.put_under(row_plans)
+    memory, rows = batch.engine.arrays[0].copy(), batch.rows.copy()
     try:
         _set_state(batch, state)
+        _check_settings(state["engine"])
+        _check_observed(batch)
     except BaseException:
+        batch.engine.arrays[0][:] = memory
+        batch.rows.take(rows)
         batch.row_plans, plan, batch.drawn_names, batch.rows.start_values = before
         batch.enter(plan)
         raise
+
+
+MAX_SETTING = 1e15
+"""Largest absolute value of a leg's setting in a state: products of larger ones may overflow in a step."""
+
+
+def _check_settings(engine: Mapping[str, Any]) -> None:
+    """Check the masses and settings in the state of an engine.
+
+    Raises:
+        ParameterError: a mass is not positive, or a setting of a leg is beyond `MAX_SETTING`.
+    """
+    masses = np.asarray(engine["trunk_settings"])[TrunkSettings.rows("total_mass")]
+    if not (masses > 0.0).all():
+        raise ParameterError(f"state['trunk_settings']: expected positive masses, got {masses.min():g}")
+    largest = np.abs(engine["limb_settings"]).max()
+    if largest > MAX_SETTING:
+        raise ParameterError(
+            f"state['limb_settings']: expected numbers within +-{MAX_SETTING:g}, got {largest:g}"
+        )
+
+
+def _check_observed(batch: EpisodeBatch) -> None:
+    """Check that a state gives observations; users' entries are checked where they are returned.
+
+    Raises:
+        ParameterError: an observation is not finite.
+    """
+    seen = batch.rows.observations[: batch.num_envs]
+    if not batch.plan.observed.has_user_entries and not np.isfinite(seen).all():
+        env, column = np.argwhere(~np.isfinite(seen))[0].tolist()
+        raise ParameterError(
+            "state: expected numbers of a motion that can be simulated, got some of which"
+            f" {batch.plan.observation_names[column]!r} is {seen[env, column]} in environment {env}"
+        )
 
 
 def _set_state(batch: EpisodeBatch, state: Mapping[str, Any]) -> None:
@@ -111,6 +152,8 @@ def _set_state(batch: EpisodeBatch, state: Mapping[str, Any]) -> None:
     observed = {name: _read_seen(batch, name, state.get(name)) for name in seen}
     steps_before = _read_steps(batch, state.get("steps_before"))
     batch.engine.set_state(state["engine"])
+    if not batch.engine.in_kernels:
+        batch.under_each(np.arange(batch.num_envs), batch.engine.adopt)
     rows.put("episode", episode)
     rows.put("start_values", start_values)
     rows.put("steps_before", steps_before)
@@ -148,7 +191,7 @@ def _read_episode(batch: EpisodeBatch, given: Any) -> Floats:
 def _is_possible(batch: EpisodeBatch, episode: Floats) -> bool:
     """True if the episodes' memory has positive weights, and infinite numbers only where they are usual."""
     layout = batch.rows.layout
-    bounded = np.abs(episode[_bounded_rows(layout)]) <= MAX_NUMBER
+    bounded = np.isfinite(episode[_bounded_rows(layout)])
     speeds = episode[layout.rows("target")] if batch.plan.commands.speeds else np.zeros(1)
     weights = episode[layout.rows("weight")]
     return bool(bounded.all() and np.isfinite(speeds).all() and (weights > 0).all())
@@ -187,6 +230,8 @@ def _read_row_plans(batch: EpisodeBatch, given: Any) -> RowPlans:
         ParameterError: not such plans.
     """
     n = batch.num_envs
+    if given is None and len(batch.row_plans.plans) == 1:
+        return batch.row_plans
     if given is None:
         row_plans = batch.row_plans.copy()
         row_plans.place(np.full(n, row_plans.present.max()), row_plans.pending)
@@ -195,6 +240,9 @@ def _read_row_plans(batch: EpisodeBatch, given: Any) -> RowPlans:
         plans = [batch.plan_of(Settings(**settings)) for settings in given["settings"]]
         present, pending = (np.asarray(given[name], np.int64) for name in ("which", "coming"))
         is_whole = present.shape == pending.shape == (n,) and bool(plans)
+        # Kernels under other settings than these would read and write beyond the arrays.
+        fixed = _fixed(batch.plan.asked)
+        is_whole = is_whole and all(_fixed(plan.asked) == fixed for plan in plans)
     except (KeyError, TypeError, ValueError):
         is_whole = False
     if (
@@ -207,25 +255,31 @@ def _read_row_plans(batch: EpisodeBatch, given: Any) -> RowPlans:
     return row_plans
 
 
+def _fixed(settings: Settings) -> dict[str, Any]:
+    """Return the settings that no row can have of its own, by name."""
+    return {name: value for name, value in to_json(settings).items() if name not in CHANGEABLE}
+
+
 def _read_pushes(batch: EpisodeBatch, given: Any) -> NDArray[Any]:
     """Return the pushes that are given in a state for each row, tuples as objects, shape (num_envs,).
 
     Raises:
         ParameterError: not such pushes.
     """
-    pushes: list[tuple[Push, ...]] = [()] * batch.num_envs
-    if given is not None:
-        try:
-            pushes = [tuple((int(at), float(x), float(y)) for at, x, y in row) for row in given]
-        except (TypeError, ValueError, OverflowError):
-            pushes = []
+    found = np.empty(batch.num_envs, object)
+    if given is None:
+        found[:] = [()] * batch.num_envs
+        return found
+    try:
+        pushes = [tuple((int(at), float(x), float(y)) for at, x, y in row) for row in given]
+    except (TypeError, ValueError, OverflowError):
+        pushes = []
     impulses = np.abs([push[1:] for row in pushes for push in row])
     if len(pushes) != batch.num_envs or not (impulses <= MAX_PUSH).all():
         raise ParameterError(
             f"state['pushes']: expected the pushes of each environment, up to {MAX_PUSH:g} N s, got"
             f" {given!r:.60}"
         )
-    found = np.empty(batch.num_envs, object)
     found[:] = pushes
     return found
 

@@ -135,15 +135,21 @@ class PaperEngine(TrunkEngine):
         super().reset(gaits, crank_angle, x=x, envs=envs, **trunk)
         where = env_indices(envs, self.num_envs)
         memory = self._memory
+        self.adopt(where)
         angles = np.broadcast_to(crank_angle, (1, where.size))[0].tolist()
         places = np.broadcast_to(x, where.shape).tolist()
         for env, angle, place in zip(where.tolist(), angles, places, strict=True):
             gait = GaitParameters.from_array(memory.command[0, :, env])
-            # Anew, because other settings may have another ground.
-            self.legs[env] = self._new_leg()
             self.traces[env] = self.legs[env].reset(gait, angle, x=place)
             self._accounts[env] = np.zeros((), ACCOUNT)
             self._write(env)
+
+    def adopt(self, envs: NDArray[np.int64]) -> None:
+        """Solve environments on the present ground from now on, each from its present state."""
+        for env in envs.tolist():
+            leg = self._new_leg()
+            leg.state = self.legs[env].state
+            self.legs[env] = leg
 
     def take_step(self, steps: int) -> None:
         """Take a control step of `steps` time steps of all legs, under the commands in memory."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 import pickle
 import warnings
 
@@ -11,8 +12,6 @@ import pytest
 from family import FALLS, IDS, same
 from gymnasium.envs.registration import EnvSpec
 from gymnasium.wrappers import TimeAwareObservation
-
-from hoof_env.errors import ParameterError
 
 LEG, MO = "hoof_env/HorseLeg-v0", "hoof_env/HorseLegMO-v0"
 STILL = np.zeros(4, np.float32)
@@ -147,8 +146,13 @@ def test_a_longer_limit_is_not_silently_shorter():
     for _ in range(500):
         observation, *_, truncated, _ = env.step(STILL)
     assert (observation[-1], truncated) == (1.0, True)
-    with pytest.raises(ParameterError, match=r"expected at most 500, .* give episode_seconds=20"):
-        gym.make_vec(LEG, num_envs=2, max_episode_steps=1000)
+    with pytest.warns(UserWarning, match=r"expected at most 500, .* give episode_seconds=20"):
+        many = gym.make_vec(LEG, num_envs=2, max_episode_steps=1000)
+    assert many.spec.max_episode_steps == 500
+    other = copy.deepcopy(env.spec)  # of another environment as soon as its times are other ones
+    other.kwargs["episode_seconds"] = 30.0
+    other.max_episode_steps = 1200
+    assert gym.make(other).spec.max_episode_steps == 1200
     longer = gym.make(LEG, max_episode_steps=1000, episode_seconds=20.0)
     assert EnvSpec.from_json(longer.spec.to_json()).max_episode_steps == 1000
     assert pickle.loads(pickle.dumps(longer.spec)) == longer.spec

@@ -91,7 +91,8 @@ def test_gymnasium_finds_what_it_asks_for():
 
 
 def test_a_longer_time_limit_does_not_lengthen_episodes():
-    longer = gym.make_vec(IDS[0], num_envs=2, max_episode_steps=600, episode_seconds=0.1)
+    with pytest.warns(UserWarning, match="expected at most 5, .*episode_seconds=12"):
+        longer = gym.make_vec(IDS[0], num_envs=2, max_episode_steps=600, episode_seconds=0.1)
     longer.reset(seed=0)
     assert [longer.step(actions(k, 2))[3].all() for k in range(5)] == [False] * 4 + [True]
 
