@@ -14,14 +14,14 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 
-from hoof_env._output import bear_any_output, flush_or_drop
+from hoof_env._output import bear_any_output, check_arguments, flush_or_drop
 from hoof_env._version import __version__
 from hoof_env.commands.lab import average, compare
 from hoof_env.commands.played import USUAL, Played
 from hoof_env.commands.policies import demo, evaluate, list_ids
 from hoof_env.commands.said import say as _say
 from hoof_env.commands.said import size as _size
-from hoof_env.errors import HoofEnvError
+from hoof_env.errors import HoofEnvError, bounded, printable
 
 
 def reproduce(out: Path, figures: bool = True, preset: str | None = None) -> None:
@@ -239,7 +239,7 @@ def _with_axes(arguments: list[str]) -> list[str]:
 def _warnings_of_one_line() -> Iterator[None]:
     """Make warnings print their words alone, without the place in the code."""
     usual = warnings.formatwarning
-    warnings.formatwarning = lambda message, *_, **__: f"hoof-env: warning: {message}\n"
+    warnings.formatwarning = lambda message, *_, **__: f"hoof-env: warning: {bounded(str(message))}\n"
     try:
         yield
     finally:
@@ -257,6 +257,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     if not {"", os.getcwd()} & set(sys.path):
         sys.path.append(os.getcwd())
     try:
+        check_arguments(options)
         import tyro
 
         with _warnings_of_one_line():
@@ -278,10 +279,16 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except OSError as error:
         # The disk that takes our output is full.
         flush_or_drop()
-        print(f"hoof-env: error: cannot write the output: {error.strerror or error}", file=sys.stderr)
+        print(
+            f"hoof-env: error: cannot write the output: {printable(error.strerror or str(error))}",
+            file=sys.stderr,
+        )
         return 2
     except RecursionError:
         print("hoof-env: error: a file or an argument is nested too deep", file=sys.stderr)
+        return 2
+    except MemoryError as error:
+        print(f"hoof-env: error: there is not enough memory; {error}".rstrip("; "), file=sys.stderr)
         return 2
     except KeyboardInterrupt:
         print("interrupted", file=sys.stderr)

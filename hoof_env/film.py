@@ -244,7 +244,8 @@ def render_episode(
         renderer = Renderer(records.surroundings(env), size=size)
         played = records.episode(env, player, seed, seconds)
         pictures = frames(renderer, played, fps, slow)
-        count = write_film(_with_progress(pictures, round(seconds * slow * fps) + 1), path, fps)
+        most = round(records.longest_of(env, seconds) * slow * fps) + 1
+        count = write_film(_with_progress(pictures, most), path, fps)
     return count
 
 

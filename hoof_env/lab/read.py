@@ -21,6 +21,7 @@ from hoof_env.errors import (
     ParameterError,
     check_choice,
     check_number,
+    printable,
 )
 from hoof_env.lab.axis_checks import suspect_axes, suspect_direction
 from hoof_env.lab.columns import Source, Term, few, sources_of
@@ -167,7 +168,7 @@ def read_record(
     notes += suspect_direction(forces, times, ahead, has_axes)
     # A given mass takes precedence over the weight in the file.
     weight = table.weight if mass is None else mass * GRAVITY
-    return ForceRecord(path.name, times, forces, unit, weight, signs, turned, tuple(notes))
+    return ForceRecord(printable(path.name), times, forces, unit, weight, signs, turned, tuple(notes))
 
 
 def _check_arguments(

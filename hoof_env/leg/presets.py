@@ -13,6 +13,7 @@ from importlib import resources
 from pathlib import Path
 from typing import Any
 
+from hoof_env._input import read_text
 from hoof_env.errors import DataFileError, ParameterError, check_choice
 
 DEFAULT_PRESET = "identified"
@@ -72,7 +73,7 @@ def _read_file(source: str | Path) -> dict[str, Any]:
     is_path = isinstance(source, Path) or str(source).endswith(".json")
     label = Path(source) if is_path else check_choice("preset", source, _shipped())
     try:
-        data = json.loads(Path(source).read_text(encoding="utf-8") if is_path else _shipped_text(str(label)))
+        data = json.loads(read_text(Path(source)) if is_path else _shipped_text(str(label)))
     except OSError as error:
         raise DataFileError(f"cannot read {label}: {error.strerror or error}") from None
     except (ValueError, RecursionError) as error:

@@ -16,7 +16,7 @@ import numpy as np
 from hoof_env.envs.open_loop import load_open_loop, open_loop_record
 from hoof_env.envs.policies import constant_gait, make_policy, policy_names
 from hoof_env.envs.shipped import SHIPPED
-from hoof_env.errors import DataFileError, MissingExtraError, ParameterError, count
+from hoof_env.errors import DataFileError, MissingExtraError, ParameterError, brief, count
 from hoof_env.gait import PARAMETERS, GaitParameters
 from hoof_env.policies.onnx_file import FILE, OnnxPolicy
 from hoof_env.policies.plain import ABOUT, NumpyPolicy
@@ -136,12 +136,12 @@ def find_function(name: str, actions: int) -> Function:
     try:
         act = getattr(import_module(module), function)
     except (ImportError, AttributeError, SyntaxError) as error:
-        raise ParameterError(f"policy: expected MODULE:NAME, got {name!r}: {error}") from error
+        raise ParameterError(f"policy: expected MODULE:NAME, got {brief(name)}: {error}") from error
     # The module is the user's, and may fail in any way.
     except Exception as error:
-        raise ParameterError(f"policy: expected MODULE:NAME, got {name!r}; {_place(error)}") from error
+        raise ParameterError(f"policy: expected MODULE:NAME, got {brief(name)}; {_place(error)}") from error
     if not callable(act):
-        raise ParameterError(f"policy {name}: expected a function of observations, got {act!r}")
+        raise ParameterError(f"policy {name}: expected a function of observations, got {brief(act)}")
     return Function(name, act, actions)
 
 
@@ -189,7 +189,8 @@ def find_policy(name: str | None, env: gym.Env[Any, Any], env_id: str, seed: int
         return _load_saved(find_saved(Path(text)), env, env_id)
     if not is_ours:
         raise ParameterError(
-            f"policy: expected the path of a trained model, for none is scripted for {env_id}, got {name!r}"
+            f"policy: expected the path of a trained model, for none is scripted for {env_id}, got"
+            f" {brief(name)}"
         )
     if text.endswith(".json"):
         return load_open_loop(text, env)
@@ -203,7 +204,8 @@ def find_policy(name: str | None, env: gym.Env[Any, Any], env_id: str, seed: int
         return constant_gait(GaitParameters(*numbers), env, starts_in_it=True)
     raise ParameterError(
         f"policy: expected a name ({', '.join(names_of(env))}), four gait parameters as "
-        f"6.28,0.7,-0.2,-0.3, module:function, or the path of a trained model or a gait's .json, got {name!r}"
+        f"6.28,0.7,-0.2,-0.3, module:function, or the path of a trained model or a gait's .json, got"
+        f" {brief(name)}"
     )
 
 
@@ -259,7 +261,7 @@ def load_policy(policy: Any, env: gym.Env[Any, Any] | None = None, seed: int = 0
     if not isinstance(env, gym.Env):
         raise ParameterError(
             "env: expected a single environment, as gymnasium.make returns it, for its policy plays many"
-            f" observations, too: load_policy(policy, env); got {env!r}"
+            f" observations, too: load_policy(policy, env); got {brief(env)}"
         )
     count("seed", seed, low=0)
     spec = env.spec
@@ -271,10 +273,10 @@ def load_policy(policy: Any, env: gym.Env[Any, Any] | None = None, seed: int = 0
     if isinstance(policy, (tuple, list, np.ndarray)):
         values = policy.tolist() if isinstance(policy, np.ndarray) else list(policy)
         if not isinstance(values, list) or len(values) != len(PARAMETERS):
-            raise ParameterError(f"policy: expected four gait parameters, got {policy!r}")
+            raise ParameterError(f"policy: expected four gait parameters, got {brief(policy)}")
         return constant_gait(GaitParameters(*values), env, starts_in_it=True)
     if not isinstance(policy, (str, Path)):
-        raise ParameterError(f"policy: expected a name, a path, a gait or a function, got {policy!r}")
+        raise ParameterError(f"policy: expected a name, a path, a gait or a function, got {brief(policy)}")
     name = str(policy)
     # An environment that gymnasium.make has not made has no id: it is taken for that of the file.
     env_id = spec.id if spec else read_policy_record(name).get("env_id", type(env.unwrapped).__name__)
@@ -291,6 +293,6 @@ def _load_alone(policy: Any) -> Any:
         if Path(text).suffix.lower() == ".onnx" or (Path(text) / FILE).is_file():
             return OnnxPolicy(Path(text))
     raise ParameterError(
-        f"policy {policy!r}: expected the environment, too, load_policy(policy, env); without it, an .onnx"
-        f" file or one of {', '.join(shipped_ids())}"
+        f"policy {brief(policy)}: expected the environment, too, load_policy(policy, env); without it, an"
+        f" .onnx file or one of {', '.join(shipped_ids())}"
     )

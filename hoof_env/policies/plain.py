@@ -17,6 +17,7 @@ import numpy as np
 from gymnasium import spaces
 from numpy.typing import NDArray
 
+from hoof_env._input import check_regular, read_text
 from hoof_env.errors import DataFileError, parse_json
 from hoof_env.policies.file_policy import FilePolicy
 from hoof_env.policies.record import read_record
@@ -57,7 +58,7 @@ class NumpyPolicy(FilePolicy):
         super().__init__(path)
         self.record = read_record(path)
         try:
-            about = parse_json((path / ABOUT).read_text(encoding="utf-8"))
+            about = parse_json(read_text(path / ABOUT))
             if not is_known(about):
                 raise ValueError(f"a policy that NumPy does not play: {about.get('algo')} {about['policy']}")
             self.observation_space = built_box(**about["observation_space"])
@@ -111,6 +112,7 @@ def read_tensors(path: Path) -> dict[str, Floats]:
         OSError, ValueError, TypeError, KeyError: there is no such file, it is damaged, or its numbers are of
             another type or not finite.
     """
+    check_regular(path)
     content = path.read_bytes()
     start = 8 + int.from_bytes(content[:8], "little")
     tensors = {}

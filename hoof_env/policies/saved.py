@@ -24,10 +24,12 @@ from typing import Any
 import gymnasium as gym
 
 from hoof_env._collector import paused
+from hoof_env._input import read_text
 from hoof_env.errors import (
     DataFileError,
     MissingExtraError,
     ParameterError,
+    brief,
     check_choice,
     parse_json,
 )
@@ -250,7 +252,7 @@ def read_plain(folder: Path) -> TrainedPolicy:
 
     from hoof_env.policies.delayed_adam import DelayedAdam
 
-    about = parse_json((folder / ABOUT).read_text(encoding="utf-8"))
+    about = parse_json(read_text(folder / ABOUT))
     if about["format"] != FORMAT:
         raise ValueError(f"format {about['format']!r}, expected {FORMAT}")
     # Without set-up, which needs an environment and makes a replay buffer; only the policy is built.
@@ -317,7 +319,7 @@ def _built(value: Any) -> Any:
         if value.keys() == {"torch.nn"}:
             kind = getattr(nn, str(value["torch.nn"]))
             if not (isinstance(kind, type) and issubclass(kind, nn.Module)):
-                raise ValueError(f"expected the name of a torch.nn module, got {value['torch.nn']!r}")
+                raise ValueError(f"expected the name of a torch.nn module, got {brief(value['torch.nn'])}")
             return kind
         return {key: _built(inner) for key, inner in value.items()}
     return [_built(inner) for inner in value] if isinstance(value, list) else value

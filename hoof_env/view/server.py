@@ -17,7 +17,7 @@ from pathlib import Path
 from typing import Any
 
 from hoof_env._output import check_folder
-from hoof_env.errors import MissingExtraError, ParameterError, count, parse_pairs
+from hoof_env.errors import HoofEnvError, MissingExtraError, ParameterError, brief, count, parse_pairs
 from hoof_env.view.messages import error_text
 
 MAX_TABS = 8
@@ -37,9 +37,16 @@ PRIVATE = (".local", ".lan", ".internal", ".home.arpa")
 
 
 def check_bokeh() -> None:
-    """Raise `MissingExtraError` if Bokeh is not installed."""
+    """Raise `MissingExtraError` if Bokeh is not installed, and `HoofEnvError` if it cannot start."""
     if find_spec("bokeh") is None:
         raise MissingExtraError('the page needs Bokeh: pip install "hoof-env[view]"')
+    try:
+        Path.home()
+    except RuntimeError:
+        raise HoofEnvError(
+            "the page needs a home folder, where Bokeh looks for its settings, and this user has none: set"
+            " HOME to a folder, as in HOME=. hoof-env view"
+        ) from None
 
 
 class Pages:
@@ -186,10 +193,10 @@ def start(
 
     count("port", port, low=0, most=65535)
     if ":" in address:
-        raise ParameterError(f"address: expected an IPv4 address or a name, got {address!r}")
+        raise ParameterError(f"address: expected an IPv4 address or a name, got {brief(address)}")
     for name in hosts:
-        if not name or any(mark in name for mark in ":/ "):
-            raise ParameterError(f"host: expected a name without scheme and port, got {name!r}")
+        if not (name and name.isprintable()) or any(mark in name for mark in ":/ "):
+            raise ParameterError(f"host: expected a name without scheme and port, got {brief(name)}")
     check_folder(out)
     try_out(setup)
     pages = Pages(setup, out)
@@ -198,7 +205,9 @@ def start(
     except OSError as error:
         if error.errno == errno.EADDRINUSE:
             raise ParameterError(f"port: expected a free one, {port} is taken; 0 takes any") from None
-        raise ParameterError(f"address: expected one of this machine, got {address!r} ({error})") from None
+        raise ParameterError(
+            f"address: expected one of this machine, got {brief(address)} ({error})"
+        ) from None
     url = f"http://{address}:{sockets[0].getsockname()[1]}/"
     application = guarded(address, hosts)(
         {"/": Application(FunctionHandler(pages.open))},
