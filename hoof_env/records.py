@@ -28,6 +28,7 @@ from hoof_env.errors import (
     MissingExtraError,
     OutputError,
     ParameterError,
+    brief,
     check_choice,
     check_number,
     parse_pairs,
@@ -220,7 +221,7 @@ def check_place(path: Path, suffixes: Iterable[str]) -> None:
     folder or its folder cannot be written."""
     known = sorted(suffixes)
     if path.suffix.lower() not in known:
-        raise ParameterError(f"out: expected a file that ends in {', '.join(known)}, got {str(path)!r}")
+        raise ParameterError(f"out: expected a file that ends in {', '.join(known)}, got {brief(str(path))}")
     if path.is_dir():
         raise OutputError(f"cannot write to {str(path)!r}: expected a file, got a folder")
     check_folder(path.parent)

@@ -6,7 +6,7 @@ from importlib.util import find_spec
 from pathlib import Path
 
 from hoof_env.commands.said import say, size
-from hoof_env.errors import ParameterError, parse_pairs
+from hoof_env.errors import ParameterError, brief, parse_pairs
 
 EXTRAS = {
     "render": "pygame",
@@ -77,7 +77,7 @@ def list_ids(id: str | None = None) -> None:
 
     known = summaries()
     if id is not None and id not in known:
-        raise ParameterError(f"id: expected one of {', '.join(known)}, got {id!r}")
+        raise ParameterError(f"id: expected one of {', '.join(known)}, got {brief(id)}")
     for name in known if id is None else [id]:
         ships = shipped_policy(name)
         sizes = f"{ships.action_space.shape[0]} actions, {ships.observation_space.shape[0]} observations"

@@ -17,7 +17,7 @@ import numpy as np
 from hoof_env.envs.made import make_env
 from hoof_env.envs.policies import start_of
 from hoof_env.envs.vector import HorseLegVectorEnv
-from hoof_env.errors import ParameterError
+from hoof_env.errors import ParameterError, brief
 from hoof_env.policies.find import find_policy
 
 ROWS = 1024  # episodes side by side at most; more are played one batch after the other
@@ -73,7 +73,7 @@ def score_vector(policy: Any, env_id: str, seeds: Sequence[int], **env_kwargs: A
         if isinstance(policy, str):
             policy = find_policy(policy, env, env_id)
         if not hasattr(policy, "predict"):
-            raise ParameterError(f"policy: expected one with predict, or its name, got {policy!r}")
+            raise ParameterError(f"policy: expected one with predict, or its name, got {brief(policy)}")
         episodes: list[dict[str, float]] = []
         envs = None
         for first in range(0, len(seeds), ROWS):

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hoof_env._output import staged
-from hoof_env.errors import ParameterError, check_choice, check_number, flag
+from hoof_env.errors import ParameterError, brief, check_choice, check_number, flag
 from hoof_env.leg.checks import (
     check_feet,
     check_keys,
@@ -307,7 +307,7 @@ def _preset_content(
         }
     if gaits is not None:
         if not isinstance(gaits, Mapping):
-            raise ParameterError(f"gaits: expected a mapping of gaits by name, got {gaits!r}")
+            raise ParameterError(f"gaits: expected a mapping of gaits by name, got {brief(gaits)}")
         check_names("gaits", gaits)
         content["gaits"] = {name: numbers_of(f"gaits[{name!r}]", gait) for name, gait in gaits.items()}
     return content

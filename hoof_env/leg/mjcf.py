@@ -24,7 +24,7 @@ from numpy.typing import NDArray
 
 from hoof_env._output import staged
 from hoof_env.constants import GRAVITY
-from hoof_env.errors import GeometryError, ParameterError, check_number
+from hoof_env.errors import GeometryError, ParameterError, brief, check_number
 from hoof_env.leg.checks import checked_path
 from hoof_env.leg.kinematics import FrameMotion, Pose, pose
 from hoof_env.leg.link_tree import CRANK_LINK, LinkTree, link_tree
@@ -175,7 +175,7 @@ def leg_to_mjcf(
     ):
         # a class has the names of its fields' defaults, but is no part
         if given is not None and (isinstance(given, type) or not isinstance(given, kind)):
-            raise ParameterError(f"{name}: expected {needed} of this package or None, got {given!r}")
+            raise ParameterError(f"{name}: expected {needed} of this package or None, got {brief(given)}")
     if not np.isfinite(geometry.pose(theta, swing).points).all():
         raise GeometryError(f"theta: the leg cannot be assembled at a crank angle of {theta:g} rad")
     trunk = trunk or Held(geometry.hip_height)

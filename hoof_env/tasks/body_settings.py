@@ -7,6 +7,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Annotated, Any, NamedTuple
 
+from hoof_env.ground.terrain import Terrain
 from hoof_env.leg.presets import DEFAULT_PRESET, Preset
 
 Range = float | Sequence[float]
@@ -199,13 +200,13 @@ class BodySettings:
         ),
     ] = None
     terrain: Annotated[
-        Mapping[str, Any] | None,
+        Terrain | Mapping[str, Any] | None,
         About(
             "",
             (
                 'None for level ground, {"kind": "slope", "angle": rad}, {"kind": "hills", ...} as in '
-                "[HorseLegTerrain](HorseLegTerrain.md#terrain), or what `Terrain.to_dict` returns; a "
-                "suspended trunk and a rail keep their height, so ground that drifts from y = 0 is refused"
+                "[HorseLegTerrain](HorseLegTerrain.md#terrain), a `Terrain`, or what its `to_dict` returns; "
+                "a suspended trunk and a rail keep their height, so ground that drifts from y = 0 is refused"
             ),
         ),
     ] = None

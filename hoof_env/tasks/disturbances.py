@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from hoof_env.dynamics.parts import MOST_IMPULSE
-from hoof_env.errors import ParameterError, check_number
+from hoof_env.errors import ParameterError, brief, check_number
 
 MOST_NOISE = 10.0
 """Largest error of a number that is observed, of which the scale has mapped the usual range to [-1, 1]."""
@@ -39,7 +39,7 @@ def check_noise(name: str, given: Any, groups: Sequence[str]) -> dict[str, float
     if not isinstance(given, Mapping) or not set(given) <= set(groups):
         raise ParameterError(
             f"{name}: expected a mapping with some of the groups that are observed, {', '.join(groups)}; got"
-            f" {given!r}"
+            f" {brief(given)}"
         )
     return {
         group: check_number(f"{name}[{group!r}]", value, low=0, high=MOST_NOISE)
@@ -71,7 +71,7 @@ def check_pushes(name: str, given: Any, dt: float, steps: int) -> tuple[Push, ..
     impulses: dict[int, tuple[float, float]] = {}
     for k, row in enumerate(map(_listed, rows)):
         if not isinstance(row, (list, tuple)) or len(row) != 3:
-            raise ParameterError(f"{name}[{k}]: expected [s, N s forward, N s upward], got {row!r}")
+            raise ParameterError(f"{name}[{k}]: expected [s, N s forward, N s upward], got {brief(row)}")
         last = (steps - 1) * dt
         seconds = check_number(f"{name}[{k}], time", row[0], low=0.0, high=last)
         forward, upward = (

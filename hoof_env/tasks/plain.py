@@ -10,7 +10,8 @@ from typing import Any
 
 import numpy as np
 
-from hoof_env.errors import ParameterError
+from hoof_env.errors import ParameterError, brief
+from hoof_env.ground.terrain import Terrain
 from hoof_env.tasks.settings import Settings
 
 
@@ -21,7 +22,7 @@ def to_json(settings: Settings) -> dict[str, Any]:
 
 def as_plain(name: str, value: Any) -> Any:
     """Convert a value to plain Python: numbers of NumPy and pandas to numbers, arrays to lists, paths to
-    text, enumerations to their value. Other objects are returned as they are.
+    text, enumerations to their value, a terrain to its mapping. Other objects are returned as they are.
 
     Args:
         name: name of the value in messages.
@@ -39,6 +40,8 @@ def as_plain(name: str, value: Any) -> Any:
         return as_plain(name, value.value)
     if isinstance(value, PurePath):
         return str(value)
+    if isinstance(value, Terrain):
+        return value.to_dict()
     if isinstance(value, Mapping):
         return {str(key): as_plain(f"{name}[{key!r}]", inner) for key, inner in value.items()}
     if isinstance(value, (list, tuple)):
@@ -49,7 +52,7 @@ def as_plain(name: str, value: Any) -> Any:
         return next(kind(value) for kind in (int, float, str) if isinstance(value, kind))
     if hasattr(type(value), "__float__"):
         raise ParameterError(
-            f"{name}: expected a number of Python or NumPy, which JSON can hold, got {value!r}"
+            f"{name}: expected a number of Python or NumPy, which JSON can hold, got {brief(value)}"
         )
     return value  # the check of the setting says what is wrong
 

@@ -11,7 +11,7 @@ from hoof_env import records
 from hoof_env.envs.batch_build import substeps_under
 from hoof_env.envs.batch_starts import vary
 from hoof_env.envs.policies import constant_gait, start_of
-from hoof_env.errors import HoofEnvError, ParameterError, check_choice, check_number, count
+from hoof_env.errors import HoofEnvError, ParameterError, brief, check_choice, check_number, count
 from hoof_env.gait import PARAMETERS, GaitParameters, limits_of
 from hoof_env.lab.forces import THRESHOLD, above_threshold, onto_surface
 from hoof_env.record.columns import Columns
@@ -244,7 +244,9 @@ class Simulation:
         """
         limits = self.gait_limits
         if name not in limits:
-            raise ParameterError(f"gait: expected one of {', '.join(limits) or 'no parameter'}, got {name!r}")
+            raise ParameterError(
+                f"gait: expected one of {', '.join(limits) or 'no parameter'}, got {brief(name)}"
+            )
         low, high = limits[name]
         wanted = (self.hand or self.gait_now()) | {name: check_number(name, value, low=low, high=high)}
         constant_gait(GaitParameters(*wanted.values()), self.env)  # raises for a gait beyond the limits
