@@ -204,7 +204,7 @@ def _find_same(name: str, env: gym.Env[Any, Any], env_id: str) -> Any:
     for another id, leg, setting or version."""
     # What is a warning for a player is an error for a score.
     with warnings.catch_warnings():
-        warnings.filterwarnings("error", ".*(trained with|found for)", UserWarning)
+        warnings.filterwarnings("error", ".*(trained with|trained under|found for)", UserWarning)
         try:
             return find_policy(name, env, env_id)
         except UserWarning as unlike:

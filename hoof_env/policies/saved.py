@@ -33,6 +33,8 @@ from hoof_env.errors import (
     check_choice,
     parse_json,
 )
+from hoof_env.policies.normalisation import STATISTICS as STATISTICS
+from hoof_env.policies.normalisation import normaliser_of
 from hoof_env.policies.plain import ABOUT as ABOUT
 from hoof_env.policies.plain import FORMAT, Normalizer, built_box
 from hoof_env.policies.plain import WEIGHTS as WEIGHTS
@@ -47,7 +49,6 @@ from hoof_env.policies.record import read_record as read_record
 from hoof_env.policies.record import settings_of as settings_of
 
 FILE = "policy.onnx"
-STATISTICS = "vecnormalize.pkl"
 CHECKPOINTS = "checkpoints"
 
 ALGORITHMS = {
@@ -178,6 +179,9 @@ class SavedModel:
             origin = "a model saved by Stable-Baselines3"
         try:
             policy = read_plain(self.path.parent) if self.is_plain else self._unpickle(env)
+        # A warning where a caller makes errors of warnings
+        except (DataFileError, UserWarning):
+            raise
         # Damaged files raise exceptions of any type.
         except Exception as error:
             reason = f"{type(error).__name__}: {error}".splitlines()[0]
@@ -186,17 +190,10 @@ class SavedModel:
         return policy
 
     def _unpickle(self, env: gym.Env[Any, Any]) -> TrainedPolicy:
-        """Load the .zip and the statistics of observations next to it, if there are any."""
-        from stable_baselines3.common.vec_env import DummyVecEnv, VecNormalize
-
+        """Load the .zip and the statistics of observations beside it, if there are any."""
         algo = self.record.get("algo") or algorithm_of(self.path)
         model = algorithm_class(algo).load(self.path, device="cpu")
-        statistics = self.path.with_name(STATISTICS)
-        if not statistics.is_file():
-            return TrainedPolicy(model, None)
-        return TrainedPolicy(
-            model, VecNormalize.load(str(statistics), DummyVecEnv([lambda: env])).normalize_obs
-        )
+        return TrainedPolicy(model, normaliser_of(model, self.path, env))
 
 
 # -- the same as plain data --------------------------------------------------------------------
