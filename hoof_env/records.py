@@ -22,7 +22,6 @@ import hoof_env
 from hoof_env._output import check_folder, free_memory, staged
 from hoof_env.envs import made
 from hoof_env.envs.batch import EpisodeBatch
-from hoof_env.envs.policies import start_of
 from hoof_env.envs.recording import surroundings_of
 from hoof_env.errors import (
     MissingExtraError,
@@ -38,6 +37,7 @@ from hoof_env.lab.forces import THRESHOLD, above_threshold, in_units, limbs_of, 
 from hoof_env.lab.forces import UNITS as FORCE_UNITS
 from hoof_env.lab.opensim import check_bodies, loads_path, write_mot
 from hoof_env.lab.reactions import JointReactions, reaction_units
+from hoof_env.policies.actor import Actor
 from hoof_env.policies.find import default_policy as default_policy
 from hoof_env.policies.find import find_policy as find_policy
 from hoof_env.record.columns import RECORD, Columns, body_units, joined
@@ -99,24 +99,23 @@ def episode(
 
     Args:
         env: the environment.
-        policy: object with Stable-Baselines3's `predict`.
+        policy: what `load_policy` takes.
         seed, options: arguments of `reset`.
         seconds: time after which the episode is stopped [s]; None plays it to its end.
         joints: adds columns of joint reactions.
     """
     if seconds is not None:
         check_number("seconds", seconds, low=0, exclusive_low=True)
-    observation, _ = env.reset(seed=seed, options=start_of(policy) | dict(options or {}))
+    actor = Actor(policy, env, seed)
+    observation, _ = env.reset(seed=seed, options=actor.start | dict(options or {}))
     columns = substeps(env)
     yield columns | (_named(env, joints.now()) if joints else {})
-    start = np.ones(1, bool)
     ended = False
     # Times are sums of steps, and rounding must not add a step.
     while not ended and (seconds is None or columns["time"][-1] < seconds - 1e-9):
-        action, _ = policy.predict(observation, episode_start=start, deterministic=True)
+        action = actor.act(observation)
         began = joints.before() if joints else None
         observation, _, failed, truncated, _ = env.step(action)
-        start = np.zeros(1, bool)
         ended = failed or truncated
         before = columns["time"][-1]
         columns = substeps(env)

@@ -20,8 +20,8 @@ from hoof_env.errors import DataFileError, MissingExtraError, ParameterError, br
 from hoof_env.gait import PARAMETERS, GaitParameters
 from hoof_env.policies.onnx_file import FILE, OnnxPolicy
 from hoof_env.policies.plain import ABOUT, NumpyPolicy
-from hoof_env.policies.record import own_id, same_id
-from hoof_env.policies.saved import CHECKPOINTS, SavedModel
+from hoof_env.policies.record import describe_spaces, own_id, refuse_misfit, same_id
+from hoof_env.policies.saved import CHECKPOINTS, SavedModel, TrainedPolicy
 
 MODEL = "model.zip"
 
@@ -127,8 +127,9 @@ def is_function(name: str) -> bool:
     return function.isidentifier() and all(part.isidentifier() for part in module.split("."))
 
 
-def find_function(name: str, actions: int) -> Function:
-    """Return the function MODULE:NAME, of this folder or installed; `ParameterError` if there is none."""
+def find_function(name: str, env: gym.Env[Any, Any]) -> Any:
+    """Return the policy MODULE:NAME, a function or an object with `predict`, of this folder or installed;
+    `ParameterError` if there is none."""
     module, _, function = name.partition(":")
     # MODULE may lie in the working folder, which not every interpreter searches.
     if "" not in sys.path:
@@ -140,9 +141,29 @@ def find_function(name: str, actions: int) -> Function:
     # The module is the user's, and may fail in any way.
     except Exception as error:
         raise ParameterError(f"policy: expected MODULE:NAME, got {brief(name)}; {_place(error)}") from error
-    if not callable(act):
-        raise ParameterError(f"policy {name}: expected a function of observations, got {brief(act)}")
-    return Function(name, act, actions)
+    if not isinstance(act, type) and hasattr(act, "predict"):
+        return policy_of(act, env)
+    if not callable(act) or isinstance(act, type):
+        raise ParameterError(
+            f"policy {name}: expected a function of observations, or an object with predict, got {brief(act)}"
+        )
+    return Function(name, act, gym.spaces.flatdim(env.action_space))
+
+
+def policy_of(policy: Any, env: gym.Env[Any, Any] | None) -> Any:
+    """Return a policy that is an object with `predict`: a model of Stable-Baselines3 with the normalisation
+    of its environment, and any other one as it is.
+
+    Raises:
+        DataFileError: a model of other spaces.
+    """
+    if not hasattr(policy, "get_vec_normalize_env"):
+        return policy
+    if env is not None:
+        refuse_misfit(Path(type(policy).__name__), describe_spaces(policy), describe_spaces(env))
+    statistics = policy.get_vec_normalize_env()
+    is_normalised = statistics is not None and statistics.norm_obs
+    return TrainedPolicy(policy, statistics.normalize_obs if is_normalised else None)
 
 
 # -- all policies ------------------------------------------------------------------------------
@@ -182,7 +203,7 @@ def find_policy(name: str | None, env: gym.Env[Any, Any], env_id: str, seed: int
         return make_policy(str(name), env, seed)
     text = str(name)
     if is_function(text):
-        return find_function(text, gym.spaces.flatdim(env.action_space))
+        return find_function(text, env)
     if text == "shipped" or text in shipped_ids():
         return shipped_policy(env_id if text == "shipped" else text).load(env, env_id)
     if is_model(text) or (text and Path(text).is_dir()):
@@ -245,9 +266,11 @@ def load_policy(policy: Any, env: gym.Env[Any, Any] | None = None, seed: int = 0
             - the path of an open-loop gait, a .json;
             - a gait of one leg, in which episodes start: `GaitParameters`, or crank speed [rad/s], swing
               offset, sine and cosine coefficient [rad] as four numbers or as a text "6.28,0.7,-0.2,-0.3";
-            - "module:function", or a function of observations, shape (n, k), that returns actions.
-        env: the environment that it is to play. It may be left out for an id that ships and for an .onnx
-            file, which are then not compared with any environment.
+            - "module:name", or what it names: a function of observations, shape (n, k), that returns actions,
+              or an object with `predict`, such as a model of Stable-Baselines3, which plays with the
+              normalisation of its environment.
+        env: the environment that it is to play. It may be left out for an id that ships, an .onnx file and an
+            object, which are then not compared with any environment.
         seed: seed of the policy "random".
 
     Raises:
@@ -256,8 +279,9 @@ def load_policy(policy: Any, env: gym.Env[Any, Any] | None = None, seed: int = 0
         ParameterError: no such name, or an environment is needed.
         MissingExtraError: an extra is missing that the file needs.
     """
+    is_object = hasattr(policy, "predict") and not isinstance(policy, type)
     if env is None:
-        return _load_alone(policy)
+        return policy_of(policy, env) if is_object else _load_alone(policy)
     if not isinstance(env, gym.Env):
         raise ParameterError(
             "env: expected a single environment, as gymnasium.make returns it, for its policy plays many"
@@ -265,6 +289,9 @@ def load_policy(policy: Any, env: gym.Env[Any, Any] | None = None, seed: int = 0
         )
     count("seed", seed, low=0)
     spec = env.spec
+    # Before functions: a network is callable, and would return more than actions.
+    if is_object:
+        return policy_of(policy, env)
     if callable(policy) and not isinstance(policy, type):
         actions = gym.spaces.flatdim(env.action_space)
         return Function(getattr(policy, "__name__", repr(policy)), policy, actions)

@@ -86,7 +86,7 @@ def _read(file: Path, model: Any, env: Any) -> Callable[[Any], Any] | None:
     from stable_baselines3.common.vec_env import DummyVecEnv, VecNormalize
 
     try:
-        statistics = VecNormalize.load(str(file), DummyVecEnv([lambda: env]))
+        statistics: Any = VecNormalize.load(str(file), DummyVecEnv([lambda: env]))
         if not statistics.norm_obs:
             return None
         shape = statistics.obs_rms.mean.shape

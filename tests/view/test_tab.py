@@ -242,7 +242,7 @@ def raising(*given, **more):
 def test_a_policy_that_fails_pauses_the_page_until_another_drives(tmp_path, predict, words):
     page = Page(tmp_path, policy="walk")
     page.tick(0.1)
-    page.player.simulation._player = SimpleNamespace(predict=predict)
+    page.player.simulation._actor.policy = SimpleNamespace(predict=predict)
     told = []
     page.tab.wire.on_change("told", lambda attr, old, new: told.append(new))
     page.tick(0.1)
