@@ -205,11 +205,12 @@ class Geometry:
 
         Args:
             path: of the file, which ends in .xml.
-            theta, swing: crank angle and swing of the pose in which the model begins [rad].
+            theta, swing: crank angle and swing of the pose in which the model begins [rad]; the commands of
+                the keyframe "pose" hold it.
             trunk: a `Trunk` that carries the leg, at its height; without one, O is held at `hip_height`.
             motor: a `Motor` that drives the crank; without one, the crank turns freely.
             ground: a `Ground`, of which the friction alone is taken; none if None.
-            timestep: of the simulation [s].
+            timestep: of the simulation [s]; a small leg of much less mass per length needs a shorter one.
 
         Raises:
             ParameterError: a number, type or suffix that cannot be, or no leg at this `theta`.

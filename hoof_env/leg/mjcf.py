@@ -40,11 +40,20 @@ does."""
 IMPEDANCE = "0.9999 0.9999 0.001 0.5 2"
 """Impedance of the loops, as near to rigid as MuJoCo goes."""
 
+HIP_HEIGHT = 1.7
+"""Hip height of the leg for which the servo's gains are given, about that of the default one [m]."""
+
 SWING_STIFFNESS = 2e4
-"""Stiffness of the servo that holds the swing [N m/rad]: 500 N at a hoof 1.4 m below turn it by 2 degrees."""
+"""Stiffness of the servo that holds the swing [N m/rad]: 500 N at a hoof 1.4 m below turn it by 2 degrees.
+
+The gains of other legs go with the cube of the hip height, as inertias do, so that frequency and damping
+ratio stay, and with them the time step that MuJoCo needs."""
 
 SWING_DAMPING = 400.0
 """Damping of the servo that holds the swing [N m s/rad]."""
+
+POSE = "pose"
+"""Name of the keyframe whose commands hold the pose that is written."""
 
 LIGHT = 1e-6
 """Mass [kg] and inertia [kg m^2] of the frame that swings, which has none of its own but must have some."""
@@ -220,9 +229,13 @@ def write_mjcf(
     body = ET.SubElement(world, "body", name="trunk", pos=_place(complex(*position)))
     _add_inertia(body, 0j, trunk.mass, trunk.pitch_inertia)
     _hang(body, trunk, position, sum(leg.geometry.mass for leg in legs))
-    parts = {name: ET.SubElement(root, name) for name in ("equality", "tendon", "actuator")}
+    parts = {name: ET.SubElement(root, name) for name in ("equality", "tendon", "actuator", "keyframe")}
     for leg in legs:
         _add_leg(body, parts, leg, trunk, options)
+    commands = {f"swing{leg.label}": leg.swing for leg in legs}
+    held = [commands.get(actuator.attrib["name"], 0.0) for actuator in parts["actuator"]]
+    if held:
+        ET.SubElement(parts["keyframe"], "key", name=POSE, ctrl=" ".join(map(_text, held)))
     for name, part in parts.items():
         if not len(part):
             root.remove(root.find(name))  # type: ignore[arg-type]
@@ -280,13 +293,14 @@ def _add_leg(
         hinge = ET.SubElement(frame, "joint", name=f"swing{leg.label}", type="hinge")
         hinge.set("axis", _axis(leg.geometry.travel))
         hinge.set("ref", _text(leg.swing))
+        size = (leg.geometry.hip_height / HIP_HEIGHT) ** 3
         ET.SubElement(
             parts["actuator"],
             "position",
             name=f"swing{leg.label}",
             joint=f"swing{leg.label}",
-            kp=_text(SWING_STIFFNESS),
-            kv=_text(SWING_DAMPING),
+            kp=_text(size * SWING_STIFFNESS),
+            kv=_text(size * SWING_DAMPING),
         )
         hip = 0j
     turns = trunk.kind == "free" or options.swings
