@@ -17,6 +17,7 @@ from pathlib import Path
 from hoof_env._output import bear_any_output, check_arguments, flush_or_drop
 from hoof_env._version import __version__
 from hoof_env.commands.lab import average, compare
+from hoof_env.commands.leg import lengths
 from hoof_env.commands.played import USUAL, Played
 from hoof_env.commands.policies import demo, evaluate, list_ids
 from hoof_env.commands.said import say as _say
@@ -215,7 +216,8 @@ def mjcf(
 
 
 COMMANDS: dict[str, Callable[..., None]] = {
-    command.__name__: command for command in (reproduce, render, view, export, compare, average, manual, mjcf)
+    command.__name__: command
+    for command in (reproduce, render, view, export, compare, average, manual, lengths, mjcf)
 } | {"evaluate": evaluate, "list": list_ids, "demo": demo}
 """Functions by sub-command, in the order of the help."""
 

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hoof_env.errors import TEXTS, ParameterError, brief, check_number, is_number
-from hoof_env.leg.mechanism import Mechanism
+from hoof_env.leg.mechanism import BodyPoint, Mechanism
 from hoof_env.leg.mechanism_list import read_mechanism, split_solids
 
 Solids = Mapping[str, Mapping[str, Any]]
@@ -38,6 +38,29 @@ def check_names(what: str, given: Mapping[Any, Any]) -> None:
     for name in given:
         if not isinstance(name, str):
             raise ParameterError(f"{what}: expected names that are texts, got {brief(name)}")
+
+
+SHORTEST = 1e-3
+LONGEST = 1e3
+"""Least and largest length of a link [m]."""
+
+
+def check_length(mechanism: Mechanism, name: str, given: Any) -> float:
+    """Return a length [m]; an error of a negative one along or across a body says where its sign belongs."""
+    try:
+        return check_number(f"lengths[{name!r}]", given, low=SHORTEST, high=LONGEST)
+    except ParameterError as error:
+        for step in mechanism.steps:
+            if not isinstance(step, BodyPoint):
+                continue
+            for axis, text in (("along", step.along), ("across", step.across)):
+                if text.lstrip("-") == name and is_number(given) and given < 0:
+                    other = name if text.startswith("-") else f"-{name}"
+                    raise ParameterError(
+                        f"{error}; a point on the other side has the sign in the list of points: {axis!r}:"
+                        f" {other!r} of {step.point!r}"
+                    ) from None
+        raise
 
 
 def checked_path(given: Any, suffix: str) -> Path:

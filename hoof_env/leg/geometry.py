@@ -20,6 +20,7 @@ from hoof_env.errors import ParameterError, brief, check_choice, check_number, f
 from hoof_env.leg.checks import (
     check_feet,
     check_keys,
+    check_length,
     check_names,
     check_signs,
     check_texts,
@@ -94,7 +95,7 @@ class Geometry:
         object.__setattr__(self, "mechanism", mechanism)
         check_keys("lengths", self.lengths, mechanism.lengths)
         given = ((name, self.lengths[name]) for name in mechanism.lengths)
-        lengths = {name: check_number(f"lengths[{name!r}]", x, low=1e-3, high=1e3) for name, x in given}
+        lengths = {name: check_length(mechanism, name, x) for name, x in given}
         points = [dyad.point for dyad in mechanism.dyads]
         check_keys("assembly", self.assembly, points)
         check_signs({f"assembly[{p!r}]": self.assembly[p] for p in points} | {"travel": self.travel})
@@ -179,6 +180,9 @@ class Geometry:
         swing_acc: float = 0.0,
     ) -> Pose:
         """Return places, angles, velocities and accelerations of all points and bodies, with O at rest at 0.
+
+        `points` of the result has shape (points, 2), with rows in the order of `mechanism.points`, and
+        `point(name)` is one of them.
 
         Args:
             theta, theta_rate, theta_acc: crank angle from the leg's frame, clockwise in that frame before the

@@ -118,6 +118,10 @@ class Pose:
     angular_velocities: NDArray[np.float64]
     angular_accelerations: NDArray[np.float64]
 
+    def __repr__(self) -> str:
+        points, bodies = ", ".join(self.mechanism.points), len(self.angles)
+        return f"<Pose: points, shape {self.points.shape}, of {points}; {bodies} bodies; point(name) is one>"
+
     def point(self, name: str) -> NDArray[np.float64]:
         """Position (x, y) of a named point [m].
 
