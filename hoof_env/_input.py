@@ -3,8 +3,11 @@
 from __future__ import annotations
 
 import errno
+import os
 import stat
 from pathlib import Path
+
+from hoof_env.errors import ParameterError, brief
 
 MOST_BYTES = 1 << 28
 """Largest size of a file of text that is read whole [bytes]."""
@@ -27,3 +30,10 @@ def read_text(path: Path) -> str:
     if path.stat().st_size > MOST_BYTES:
         raise OSError(errno.EFBIG, f"expected at most {MOST_BYTES >> 20} MiB", str(path))
     return path.read_text(encoding="utf-8")
+
+
+def as_path(name: str, given: str | os.PathLike[str]) -> Path:
+    """Return a path that a caller gave as a path or as text; `ParameterError` for anything else."""
+    if not isinstance(given, (str, os.PathLike)) or given == "":
+        raise ParameterError(f"{name}: expected a path, got {brief(given)}")
+    return Path(given)

@@ -19,6 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 import hoof_env
+from hoof_env._input import as_path
 from hoof_env._output import check_folder, free_memory, staged
 from hoof_env.envs import made
 from hoof_env.envs.batch import EpisodeBatch
@@ -215,9 +216,10 @@ def describe(env: gym.Env[Any, Any], **about: Any) -> dict[str, Any]:
     }
 
 
-def check_place(path: Path, suffixes: Iterable[str]) -> None:
+def check_place(path: Path | str, suffixes: Iterable[str]) -> None:
     """Raise `ParameterError` unless the suffix of a path is one of `suffixes`, and `OutputError` if it is a
     folder or its folder cannot be written."""
+    path = as_path("path", path)
     known = sorted(suffixes)
     if path.suffix.lower() not in known:
         raise ParameterError(f"out: expected a file that ends in {', '.join(known)}, got {brief(str(path))}")
@@ -226,11 +228,12 @@ def check_place(path: Path, suffixes: Iterable[str]) -> None:
     check_folder(path.parent)
 
 
-def write_csv(record: Columns, about: Mapping[str, Any], path: Path) -> None:
+def write_csv(record: Columns, about: Mapping[str, Any], path: Path | str) -> None:
     """Write a CSV file with one row for each substep under one line of names and units.
 
     Numbers keep their bits. With forces in body weights there is a column `weight` [N], the same in all rows.
     """
+    path = as_path("path", path)
     units = dict(about["units"])
     # A CSV file has no other place for the weight, which converts body weights to newtons.
     if "BW" in units.values():
@@ -242,9 +245,10 @@ def write_csv(record: Columns, about: Mapping[str, Any], path: Path) -> None:
     np.savetxt(path, table, "%.17g", delimiter=",", header=header, comments="", encoding="utf-8")
 
 
-def write_parquet(record: Columns, about: Mapping[str, Any], path: Path) -> None:
+def write_parquet(record: Columns, about: Mapping[str, Any], path: Path | str) -> None:
     """Write a Parquet file of float64. The metadata of a field have its "unit", the schema's have `about` as
     JSON under "hoof_env"."""
+    path = as_path("path", path)
     import pyarrow as pa
     from pyarrow import parquet
 
@@ -271,9 +275,10 @@ NEWTONS = (*OPENSIM, ".c3d")
 """Formats with forces in newtons, which their readers expect."""
 
 
-def check_export(path: Path) -> None:
+def check_export(path: Path | str) -> None:
     """Check that `write` can write to a path, before an episode is played. Raise the errors of `check_place`,
     and `MissingExtraError` if the format needs a package that is not installed."""
+    path = as_path("path", path)
     check_place(path, WRITERS)
     if path.suffix.lower() == ".c3d":
         ezc3d()
@@ -284,18 +289,20 @@ def check_export(path: Path) -> None:
             raise MissingExtraError('Parquet needs pyarrow: pip install "hoof-env[export]"') from None
 
 
-def files_of(path: Path) -> list[Path]:
+def files_of(path: Path | str) -> list[Path]:
     """Return the paths of the files that `write` writes: the record and, in OpenSim's formats, the
     ExternalLoads XML."""
+    path = as_path("path", path)
     return [path, loads_path(path)] if path.suffix.lower() in OPENSIM else [path]
 
 
-def write(record: Columns, about: Mapping[str, Any], path: Path) -> Path:
+def write(record: Columns, about: Mapping[str, Any], path: Path | str) -> Path:
     """Write the results of `record_episode` and `describe` in the format of the path's suffix.
 
     Older files are replaced when all new ones are complete. Errors are those of `check_export`, and
     `ParameterError` if the record does not fit into the format.
     """
+    path = as_path("path", path)
     check_export(path)
     with staged(path.parent) as stage:
         WRITERS[path.suffix.lower()](record, about, stage / path.name)
@@ -303,7 +310,7 @@ def write(record: Columns, about: Mapping[str, Any], path: Path) -> Path:
 
 
 def export_episode(
-    path: Path,
+    path: Path | str,
     policy: str | None,
     env_id: str,
     arguments: Sequence[str] = (),
@@ -329,6 +336,7 @@ def export_episode(
     Raises:
         HoofEnvError: a subclass, as in `make_env`, `find_policy` and, before the episode is played, `write`.
     """
+    path = as_path("path", path)
     # All arguments are checked first: an episode may take long.
     check_export(path)
     suffix = path.suffix.lower()

@@ -24,7 +24,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from hoof_env._input import read_text
+from hoof_env._input import as_path, read_text
 from hoof_env._version import __version__
 from hoof_env.envs.policies import STANDS_FOR, Scripted, towards
 from hoof_env.errors import DataFileError, ParameterError, brief, parse_json
@@ -163,13 +163,14 @@ def _phase_gait(parameters: Mapping[str, Any], env: Any, blind: bool) -> Any:
     return numbers_at
 
 
-def open_loop_record(path: Path) -> dict[str, Any]:
+def open_loop_record(path: Path | str) -> dict[str, Any]:
     """Read the file of a gait, which `agents.open_loop` writes: a mapping with "parameters" of one
     environment as `open_loop` takes them, and their "form".
 
     Raises:
         DataFileError: not such a file, or its numbers are actions of an older form.
     """
+    path = as_path("path", path)
     try:
         record: dict[str, Any] = parse_json(read_text(path))
         parameters = record["parameters"]

@@ -20,6 +20,7 @@ from typing import Any
 
 import gymnasium as gym
 
+from hoof_env._input import as_path
 from hoof_env._output import markdown_table, staged
 from hoof_env._version import __version__
 from hoof_env.envs.made import make_env
@@ -285,8 +286,9 @@ def to_json(scores: Sequence[Score], **about: Any) -> dict[str, Any]:
     return {**about, "policies": policies}
 
 
-def write_json(found: Evaluation, path: Path) -> None:
+def write_json(found: Evaluation, path: Path | str) -> None:
     """Write all figures of all episodes, with means and intervals, as JSON."""
+    path = as_path("path", path)
     about = {"env_id": found.env_id, "env_kwargs": found.env_kwargs, "seed": found.seeds.start}
     data = to_json(found.scores, **about, hoof_env=__version__)
     with staged(path.parent) as stage:
@@ -294,8 +296,9 @@ def write_json(found: Evaluation, path: Path) -> None:
         (stage / path.name).write_text(text, encoding="utf-8")
 
 
-def write_csv(found: Evaluation, path: Path) -> None:
+def write_csv(found: Evaluation, path: Path | str) -> None:
     """Write a line for each episode of each policy: its seed, its return and the figures of its summary."""
+    path = as_path("path", path)
     names = list(found.scores[0].episodes[0])
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")

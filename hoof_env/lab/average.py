@@ -14,8 +14,9 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from hoof_env._input import as_path
 from hoof_env._output import markdown_table, staged
-from hoof_env.errors import DataFileError, ParameterError, check_choice, check_number, count
+from hoof_env.errors import DataFileError, ParameterError, brief, check_choice, check_number, count
 from hoof_env.lab.axis_checks import for_one
 from hoof_env.lab.compare import RELATIVE_THRESHOLD, why_none
 from hoof_env.lab.forces import THRESHOLD
@@ -82,6 +83,9 @@ def average(
     count("points", points, 2)
     if not records:
         raise ParameterError("records: expected one file or more, got none")
+    for record in records:
+        if not isinstance(record, ForceRecord):
+            raise ParameterError(f"records: expected what read_record returns, got {brief(record)}")
     unit = _common_unit(records, units)
     # By limb, a list of curves for each record that has the limb.
     curves_by_trial: dict[str, list[list[Floats]]] = {}
@@ -155,13 +159,14 @@ def _normalised(force: Floats, points: int) -> Floats:
     return np.column_stack([np.interp(at, samples, column) for column in force.T])
 
 
-def write_table(found: Average, path: Path) -> Path:
+def write_table(found: Average, path: Path | str) -> Path:
     """Write a CSV table with one row for each point.
 
     Its columns are `stance [%]` and, for each limb, mean and standard deviation of the forces, as
     `left_force_y_mean [N]` and `left_force_y_sd [N]`, and the number of stances. Errors are those of
     `check_table`.
     """
+    path = as_path("path", path)
     check_table(path)
     rows = len(next(iter(found.limbs.values())).mean)
     columns: dict[str, Floats] = {"stance [%]": np.linspace(0.0, 100.0, rows)}

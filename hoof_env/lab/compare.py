@@ -24,7 +24,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from hoof_env.errors import DataFileError, ParameterError, check_choice, check_number
+from hoof_env.errors import DataFileError, ParameterError, brief, check_choice, check_number
 from hoof_env.lab.forces import THRESHOLD
 from hoof_env.lab.read import ForceRecord
 from hoof_env.lab.stances import MIN_STANCE_SECONDS, Pair, Side, Spans, best_shift, pairs_of, whole_stances
@@ -138,6 +138,9 @@ def compare(
             overlap, or would be too long at the common rate.
         DataFileError: a record has no whole stance of the limbs that are compared.
     """
+    for name, record in (("a", a), ("b", b)):
+        if not isinstance(record, ForceRecord):
+            raise ParameterError(f"{name}: expected a record, as read_record returns it, got {brief(record)}")
     check_choice("align", align, ALIGNMENTS)
     check_choice("units", units, ("auto", "N", "BW"))
     unit, (by_a, by_b) = _common_unit(a, b, units)

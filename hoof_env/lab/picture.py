@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from hoof_env._input import as_path
 from hoof_env._output import check_folder, markdown_table, staged
 from hoof_env._plotting import BLUE, GREY, ORANGE, STYLE
 from hoof_env.errors import MissingExtraError, ParameterError
@@ -132,12 +133,13 @@ def _pair(error: float, of_a: float, places: int) -> str:
     return f"{round(error, places) + 0.0:+.{places}f} ({round(of_a, places) + 0.0:.{places}f})"
 
 
-def draw(found: Comparison, path: Path) -> Path:
+def draw(found: Comparison, path: Path | str) -> Path:
     """Write a picture of a comparison and return its path. Errors are those of `check_picture`.
 
     Each limb has a row of panels: the vertical and the fore-aft force of A and B from touchdown on, single
     stances thin and their mean thick. A force that a record lacks has no panel.
     """
+    path = as_path("path", path)
     check_picture(path)
     from matplotlib import style
     from matplotlib.figure import Figure

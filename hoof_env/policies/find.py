@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import sys
 import traceback
 from collections.abc import Callable
@@ -13,6 +14,7 @@ from typing import Any
 import gymnasium as gym
 import numpy as np
 
+from hoof_env._input import as_path
 from hoof_env.envs.open_loop import load_open_loop, open_loop_record
 from hoof_env.envs.policies import constant_gait, make_policy, policy_names
 from hoof_env.envs.shipped import SHIPPED
@@ -41,14 +43,15 @@ def shipped_policy(env_id: str) -> NumpyPolicy:
     return NumpyPolicy(SHIPPED / own_id(env_id).rpartition("/")[2])
 
 
-def find_saved(path: Path) -> OnnxPolicy | SavedModel:
+def find_saved(path: Path | str) -> OnnxPolicy | SavedModel:
     """Return the policy in a file or a folder: the .onnx if there is one, else the model of agents.train.
 
     Raises:
         DataFileError: there is no policy, or its file or record cannot be read.
         HoofEnvError: the .onnx needs onnxruntime, which is not installed.
     """
-    is_onnx = path.suffix.lower() == ".onnx" or (path / FILE).is_file()
+    path = as_path("path", path)
+    is_onnx = path.suffix.lower() == ".onnx" or os.path.isfile(path / FILE)
     return OnnxPolicy(path) if is_onnx else SavedModel.find(path)
 
 
@@ -59,7 +62,7 @@ def is_model(name: str) -> bool:
     is_path = (
         name.lower().endswith((".zip", ".onnx"))
         or Path(name).name != name
-        or any((Path(name) / part).exists() for part in (MODEL, ABOUT, FILE, CHECKPOINTS))
+        or any(os.path.exists(Path(name) / part) for part in (MODEL, ABOUT, FILE, CHECKPOINTS))
     )
     return (is_path and not name.endswith(".json")) or name == "shipped"
 
@@ -206,7 +209,7 @@ def find_policy(name: str | None, env: gym.Env[Any, Any], env_id: str, seed: int
         return find_function(text, env)
     if text == "shipped" or text in shipped_ids():
         return shipped_policy(env_id if text == "shipped" else text).load(env, env_id)
-    if is_model(text) or (text and Path(text).is_dir()):
+    if is_model(text) or (text and os.path.isdir(text)):
         return _load_saved(find_saved(Path(text)), env, env_id)
     if not is_ours:
         raise ParameterError(
@@ -317,7 +320,7 @@ def _load_alone(policy: Any) -> Any:
         for env_id in shipped_ids():
             if same_id(text, env_id):
                 return shipped_policy(env_id)
-        if Path(text).suffix.lower() == ".onnx" or (Path(text) / FILE).is_file():
+        if Path(text).suffix.lower() == ".onnx" or os.path.isfile(Path(text) / FILE):
             return OnnxPolicy(Path(text))
     raise ParameterError(
         f"policy {brief(policy)}: expected the environment, too, load_policy(policy, env); without it, an"

@@ -8,6 +8,7 @@ nor what its actions mean.
 from __future__ import annotations
 
 import json
+import os
 from copy import deepcopy
 from pathlib import Path
 from typing import Any
@@ -16,7 +17,7 @@ import gymnasium as gym
 import numpy as np
 from numpy.typing import NDArray
 
-from hoof_env._input import check_regular
+from hoof_env._input import as_path, check_regular
 from hoof_env._output import staged
 from hoof_env.errors import DataFileError, HoofEnvError, MissingExtraError, ParameterError, brief, parse_json
 from hoof_env.policies.file_policy import FilePolicy
@@ -56,14 +57,15 @@ class OnnxPolicy(FilePolicy):
         HoofEnvError: onnxruntime is not installed.
     """
 
-    def __init__(self, path: Path, content: bytes | None = None) -> None:
+    def __init__(self, path: Path | str, content: bytes | None = None) -> None:
+        path = as_path("path", path)
         try:
             import onnxruntime
         except ImportError:
             raise HoofEnvError(
                 f'policy {path}: reading it needs onnxruntime: pip install "hoof-env[onnx]"'
             ) from None
-        super().__init__(path / FILE if path.is_dir() else path)
+        super().__init__(path / FILE if os.path.isdir(path) else path)
         options = onnxruntime.SessionOptions()
         # One thread: in a small network, waiting for other threads takes longer than the arithmetic.
         options.intra_op_num_threads = 1

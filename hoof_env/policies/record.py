@@ -14,7 +14,7 @@ from typing import Any
 
 import gymnasium as gym
 
-from hoof_env._input import read_text
+from hoof_env._input import as_path, read_text
 from hoof_env._version import __version__
 from hoof_env.errors import DataFileError, brief, parse_json
 
@@ -215,9 +215,10 @@ def check_record(path: Path, record: dict[str, Any], env: Any, env_id: str) -> N
         warnings.warn(f"policy {path}: trained with {'; '.join(unlike)}", stacklevel=3)
 
 
-def read_record(folder: Path) -> dict[str, Any]:
+def read_record(folder: Path | str) -> dict[str, Any]:
     """Return the content of run.json in `folder`, empty if the file is missing; raise `DataFileError` if it
     cannot be read."""
+    folder = as_path("folder", folder)
     path = folder / "run.json"
     if not path.is_file():
         return {}

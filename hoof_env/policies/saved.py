@@ -14,6 +14,7 @@ from __future__ import annotations
 
 import json
 import math
+import os
 import warnings
 import zipfile
 from dataclasses import dataclass
@@ -24,7 +25,7 @@ from typing import Any
 import gymnasium as gym
 
 from hoof_env._collector import paused
-from hoof_env._input import read_text
+from hoof_env._input import as_path, read_text
 from hoof_env.errors import (
     DataFileError,
     MissingExtraError,
@@ -64,13 +65,14 @@ MARKS = {"tqc": "top_quantiles_to_drop_per_net", "sac": "target_entropy", "td3":
 """Entry by which the data in a .zip are known to be of an algorithm; TQC has that of SAC, too."""
 
 
-def algorithm_of(path: Path) -> str:
+def algorithm_of(path: Path | str) -> str:
     """Return the algorithm of `ALGORITHMS` that plays a .zip of Stable-Baselines3, "ppo" for those without a
     mark, among them A2C, whose policy is that of PPO. Nothing is unpickled.
 
     Raises:
         OSError, KeyError, ValueError, zipfile.BadZipFile: not such a file.
     """
+    path = as_path("path", path)
     with zipfile.ZipFile(path) as file:
         entries = parse_json(file.read("data"))
     return next((algo for algo, mark in MARKS.items() if mark in entries), "ppo")
@@ -126,17 +128,19 @@ class SavedModel:
     record: dict[str, Any]
 
     @classmethod
-    def find(cls, path: Path) -> SavedModel:
+    def find(cls, path: Path | str) -> SavedModel:
         """Return the model at `path`, a .zip or a run folder; raise `DataFileError` if there is none.
 
         A run folder without a model, as its training has not ended, gives its last checkpoint.
         """
-        saved = cls(path / "model.zip" if path.is_dir() else path, {})
-        if path.is_dir() and not (saved.path.is_file() or saved.is_plain):
+        path = as_path("path", path)
+        is_folder = os.path.isdir(path)
+        saved = cls(path / "model.zip" if is_folder else path, {})
+        if is_folder and not (os.path.isfile(saved.path) or saved.is_plain):
             folders = [folder for folder in (path / CHECKPOINTS).glob("*") if folder.name.isdigit()]
             last = max(folders, key=lambda folder: int(folder.name), default=path)
             saved = cls(last / "model.zip", {})
-        if not (saved.path.is_file() or saved.is_plain):
+        if not (os.path.isfile(saved.path) or saved.is_plain):
             raise DataFileError(
                 f"model {path}: expected a .zip of agents.train or its run folder, found no {saved.path}"
             )
@@ -199,13 +203,14 @@ class SavedModel:
 # -- the same as plain data --------------------------------------------------------------------
 
 
-def save_policy(model: Any, folder: Path) -> bool:
+def save_policy(model: Any, folder: Path | str) -> bool:
     """Write the policy of a Stable-Baselines3 model into `folder` as plain data.
 
     Returns:
         True, or False if nothing is written, because the policy's arguments are not plain data or its spaces
         are not boxes.
     """
+    folder = as_path("folder", folder)
     from safetensors.torch import save
 
     envs: Any = model.get_vec_normalize_env()
@@ -240,9 +245,10 @@ def save_policy(model: Any, folder: Path) -> bool:
     return True
 
 
-def read_plain(folder: Path) -> TrainedPolicy:
+def read_plain(folder: Path | str) -> TrainedPolicy:
     """Read the policy that `save_policy` wrote into `folder`, without a model's other parts. Damaged files
     raise exceptions of any type."""
+    folder = as_path("folder", folder)
     import torch
     from safetensors.torch import load_file
     from stable_baselines3.common.policies import ActorCriticPolicy

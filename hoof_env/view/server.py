@@ -16,6 +16,7 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
+from hoof_env._input import as_path
 from hoof_env._output import check_folder
 from hoof_env.errors import HoofEnvError, MissingExtraError, ParameterError, brief, count, parse_pairs
 from hoof_env.view.messages import error_text
@@ -162,7 +163,7 @@ def start(
     setup: dict[str, Any],
     address: str = HERE[0],
     port: int = 5006,
-    out: Path = Path(),
+    out: Path | str = Path(),
     hosts: Collection[str] = (),
 ) -> tuple[Any, str]:
     """Start the server of a set-up.
@@ -181,6 +182,7 @@ def start(
         MissingExtraError: Bokeh is not installed.
         HoofEnvError: the set-up is refused, the port is taken, or the address is not one of this machine.
     """
+    out = as_path("out", out)
     check_bokeh()
     from bokeh.application import Application
     from bokeh.application.handlers.function import FunctionHandler
@@ -232,7 +234,7 @@ def view(
     address: str,
     port: int,
     open_browser: bool,
-    out: Path,
+    out: Path | str,
     hosts: Sequence[str] = (),
 ) -> None:
     """Serve the page until Ctrl-C, as `hoof-env view` does with the same options.
@@ -240,6 +242,7 @@ def view(
     Raises:
         HoofEnvError: as in `start`.
     """
+    out = as_path("out", out)
     setup = {
         "env_id": env_id,
         "arguments": parse_pairs("--args", arguments),
