@@ -85,6 +85,7 @@ def _read(file: Path, model: Any, env: Any) -> Callable[[Any], Any] | None:
     """Return the function of `normaliser_of` from a file of statistics."""
     from stable_baselines3.common.vec_env import DummyVecEnv, VecNormalize
 
+    warnings.warn(f"{file} is a pickle, which can run any code: trusted?", stacklevel=5)
     try:
         statistics: Any = VecNormalize.load(str(file), DummyVecEnv([lambda: env]))
         if not statistics.norm_obs:

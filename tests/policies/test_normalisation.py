@@ -77,6 +77,14 @@ def test_statistics_are_found(file, statistics, normalised, env, tmp_path):
     assert not said
 
 
+def test_statistics_are_read_with_a_warning(normalised, env, tmp_path):
+    model, many, _ = normalised
+    model.save(tmp_path / "leg.zip")
+    many.save(str(tmp_path / "vec_normalize.pkl"))
+    with pytest.warns(UserWarning, match=r"vec_normalize\.pkl is a pickle, which can run any code"):
+        hoof_env.load_policy(tmp_path / "leg.zip", env)
+
+
 def test_each_checkpoint_has_its_own(normalised, env):
     _, many, folder = normalised
     early, late = (
