@@ -179,8 +179,10 @@ def open_loop_record(path: Path | str) -> dict[str, Any]:
         for name, value in parameters.items():
             if not _fits(name, value):
                 raise ValueError(f"{name} {brief(value)}")
-        for name, kind in (("env_id", str), ("env_kwargs", dict), ("versions", dict)):
-            if not isinstance(record.get(name, kind()), kind):
+        if not isinstance(record.get("env_id"), str | None):
+            raise TypeError(f"env_id {brief(record['env_id'])}")
+        for name in ("env_kwargs", "versions"):
+            if not isinstance(record.get(name, {}), dict):
                 raise TypeError(f"{name} {brief(record[name])}")
     except (OSError, ValueError, TypeError, KeyError, AttributeError) as error:
         raise DataFileError(

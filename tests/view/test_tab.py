@@ -234,7 +234,7 @@ def raising(*given, **more):
     [
         (lambda *_, **__: (np.full(4, np.nan), None), "expected finite actions"),
         (lambda *_, **__: (["fast"], None), "could not convert"),
-        (lambda *_, **__: 3.0, "TypeError"),
+        (lambda *_, **__: 3.0, "expected predict to return actions and a state"),
         (lambda *_, **__: sys.exit(3), "it raised SystemExit: 3"),
         (raising, "policy walk: expected actions, it raised RuntimeError: out of order"),
     ],
