@@ -189,7 +189,8 @@ def mjcf(
             the hip of the preset.
         motor: drive the crank by the package's default motor; otherwise it turns freely.
         ground: add a floor with the friction of the preset's ground, on which MuJoCo's own contact acts.
-        theta, swing: crank angle and swing of the pose in which the model begins [rad].
+        theta, swing: crank angle and swing of the pose in which the model begins [rad], which the commands of
+            the keyframe "pose" hold.
         overwrite: replace an existing file.
     """
     from hoof_env._output import check_new, new_file

@@ -27,7 +27,7 @@ from numpy.typing import NDArray
 from hoof_env._input import as_path, read_text
 from hoof_env._version import __version__
 from hoof_env.envs.policies import STANDS_FOR, Scripted, towards
-from hoof_env.errors import DataFileError, ParameterError, brief, parse_json
+from hoof_env.errors import DataFileError, ParameterError, bounded, brief, parse_json
 
 Floats = NDArray[np.float64]
 
@@ -263,9 +263,9 @@ def load_open_loop(path_or_env_id: str | Path, env: Any, family: str | None = No
     for key, there in record.get("env_kwargs", {}).items():
         # Through JSON, as the record's value went: tuples are lists there.
         if (present := json.loads(json.dumps(getattr(bare.settings, key, None), default=str))) != there:
-            unlike.append(f"{key}={there!r}, here {present!r}")
+            unlike.append(f"{key}={brief(there)}, here {brief(present)}")
     if unlike:
-        warnings.warn(f"open-loop gait {path}: found for {'; '.join(unlike)}", stacklevel=2)
+        warnings.warn(bounded(f"open-loop gait {path}: found for {'; '.join(unlike)}"), stacklevel=2)
     try:
         return open_loop(record["parameters"], env)
     except ParameterError as error:

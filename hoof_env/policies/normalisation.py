@@ -9,7 +9,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from hoof_env.errors import DataFileError
+from hoof_env.errors import DataFileError, bounded
 
 STATISTICS = "vecnormalize.pkl"
 NAMES = (STATISTICS, "vec_normalize.pkl")
@@ -78,7 +78,7 @@ def normaliser_of(model: Any, path: Path, env: Any) -> Callable[[Any], Any] | No
 
 def _warn(path: Path, words: str) -> None:
     """Warn of a policy, with the place where it is loaded."""
-    warnings.warn(f"policy {path}: {words}", stacklevel=5)
+    warnings.warn(bounded(f"policy {path}: {words}"), stacklevel=5)
 
 
 def _read(file: Path, model: Any, env: Any) -> Callable[[Any], Any] | None:

@@ -16,7 +16,7 @@ import gymnasium as gym
 
 from hoof_env._input import as_path, read_text
 from hoof_env._version import __version__
-from hoof_env.errors import DataFileError, brief, parse_json
+from hoof_env.errors import DataFileError, bounded, brief, parse_json
 
 RECORD = {
     "env_kwargs": dict,
@@ -212,7 +212,7 @@ def check_record(path: Path, record: dict[str, Any], env: Any, env_id: str) -> N
     if made_with != __version__:
         unlike.append(f"hoof-env {made_with}, here {__version__}")
     if unlike:
-        warnings.warn(f"policy {path}: trained with {'; '.join(unlike)}", stacklevel=3)
+        warnings.warn(bounded(f"policy {path}: trained with {'; '.join(unlike)}"), stacklevel=3)
 
 
 def read_record(folder: Path | str) -> dict[str, Any]:
