@@ -82,6 +82,8 @@ REQUESTS = {
         ([*MP4, "--args", "render_mode=human"], "render_mode: expected none, as"),
     ],
     "mjcf": [
+        ([*XML, "--theta", "1e308"], r"theta: expected a finite number in \[-1000, 1000\], got 1e\+308"),
+        ([*XML, "--swing", "-1e308"], r"swing: expected .* got -1e\+308"),
         (["--out", "{}/x.urdf"], "expected a file that ends in .xml, got"),
         ([*XML, "--trunk", "cloud"], "trunk: expected one of .*, got 'cloud'"),
         ([*XML, "--preset", "nothing"], "preset: expected .* got 'nothing'"),

@@ -28,6 +28,9 @@ Floats = NDArray[np.float64]
 POINTS = 101
 """Number of points of a stance, from 0 to 100 % of its duration."""
 
+MOST_POINTS = 100_000
+"""Largest number of points of a mean stance."""
+
 
 @dataclass(frozen=True)
 class MeanStance:
@@ -80,7 +83,7 @@ def average(
         DataFileError: no record has a whole stance.
     """
     check_choice("units", units, ("auto", "N", "BW"))
-    count("points", points, 2)
+    count("points", points, 2, MOST_POINTS)
     if not records:
         raise ParameterError("records: expected one file or more, got none")
     for record in records:

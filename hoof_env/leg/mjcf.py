@@ -55,6 +55,9 @@ SWING_DAMPING = 400.0
 POSE = "pose"
 """Name of the keyframe whose commands hold the pose that is written."""
 
+MOST_ANGLE = 1e3
+"""Largest angle of a pose [rad]; of larger ones rounding takes digits."""
+
 LIGHT = 1e-6
 """Mass [kg] and inertia [kg m^2] of the frame that swings, which has none of its own but must have some."""
 
@@ -174,8 +177,10 @@ def leg_to_mjcf(
     timestep: float,
 ) -> str:
     """Check the arguments of `Geometry.to_mjcf`, return the model, write it; angles are theta and swing."""
-    theta = check_number("theta", angles[0])
-    swing = check_number("swing", angles[1])
+    theta, swing = (
+        check_number(name, angle, low=-MOST_ANGLE, high=MOST_ANGLE)
+        for name, angle in zip(("theta", "swing"), angles, strict=True)
+    )
     timestep = check_number("timestep", timestep, low=0, high=0.1, exclusive_low=True)
     for name, given, kind, needed in (
         ("trunk", trunk, TrunkLike, "a Trunk"),

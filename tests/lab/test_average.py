@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from hoof_env import cli
+from hoof_env.errors import ParameterError
 from hoof_env.lab.average import average
 from hoof_env.lab.read import ForceRecord
 
@@ -65,3 +66,9 @@ def test_what_is_missing_is_said():
     assert [found.limbs[limb].trials for limb in ("left", "right")] == [1, 1]
     assert any("left: expected a whole stance above 20 N, found none" in one for one in found.warnings)
     assert "x: has no right" in found.warnings
+
+
+@pytest.mark.parametrize("points", [10**9, 10**21])
+def test_a_number_of_points_beyond_memory_is_refused(points):
+    with pytest.raises(ParameterError, match=rf"points: expected at most 100000, got {points}"):
+        average([trial(None, 700, 0.5)], points=points)
