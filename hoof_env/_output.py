@@ -155,7 +155,7 @@ def check_arguments(arguments: Iterable[str]) -> None:
     path it would be the working folder."""
     for before, item in pairwise(["", *arguments]):
         if not item or re.fullmatch("--[a-z-]+=", item):
-            name = item.removesuffix("=") or before or "argument"
+            name = item.removesuffix("=") or (before if before.startswith("--") else "argument")
             raise ParameterError(
                 f"{name}: expected a value, got an empty text, as of a variable without value"
             )
