@@ -26,8 +26,9 @@ POINTS = 201
 
 
 def report(found: Comparison) -> str:
-    """Return the report of a comparison as text: the records, a table of errors, and warnings of limbs that
-    are left out, of doubtful stances, and of fore-aft forces in opposite directions, with the remedy."""
+    """Return the report of a comparison as text: the records, a table of errors, the number of stances
+    without a partner, and warnings of limbs that are left out, of doubtful stances, and of fore-aft forces in
+    opposite directions, with the remedy."""
     lines = [
         _about("A", found.a),
         _about("B", found.b),
@@ -35,6 +36,7 @@ def report(found: Comparison) -> str:
         f"times of B {found.shift:+.3f} s. A's own value is in brackets. {_levels(found)}",
         "",
         _table(found),
+        *_alone(found),
     ]
     # A record that is compared with itself shows its warnings once, with the options of both.
     same = (found.a.name, found.a.notes) == (found.b.name, found.b.notes)
@@ -45,6 +47,20 @@ def report(found: Comparison) -> str:
         if "fore-aft" in errors.forces and errors.forces["fore-aft"].r < -0.5:
             warnings.append(f"{limb}: fore-aft forces point opposite ways; {_remedy(found, limb)}")
     return "\n".join([*lines, *(f"warning: {text}" for text in warnings)])
+
+
+def _alone(found: Comparison) -> list[str]:
+    """Return a line on stances without a partner, or none."""
+    limbs = []
+    for limb, errors in found.limbs.items():
+        alone = [
+            f"{count - errors.pairs} of {count} in {which}"
+            for which, count in zip("AB", errors.stances, strict=True)
+            if count > errors.pairs
+        ]
+        if alone:
+            limbs.append(f"{limb} {' and '.join(alone)}")
+    return ["", f"Whole stances that are not compared: {', '.join(limbs)}."] if limbs else []
 
 
 def _remedy(found: Comparison, limb: str) -> str:

@@ -146,16 +146,21 @@ class _Fit:
         first, last = self._overlap(lag)
         return math.sqrt(self._squares(lag).mean()) if last > first else math.inf
 
-    def _typical(self, lag: int) -> float:
-        """Return the median over strides of the root mean square difference; infinite for less than
-        `MIN_STRIDES`, or an overlap of less than half of the shorter record."""
+    def _within(self, lag: int) -> NDArray[np.int64]:
+        """Return the touchdowns in the overlap, counted from its start."""
         first, last = self._overlap(lag)
-        inside = self._touch[(self._touch >= first) & (self._touch < last)] - first
-        if len(inside) < MIN_STRIDES or last - first < self._shorter // 2:
-            return math.inf
+        return self._touch[(self._touch >= first) & (self._touch < last)] - first
+
+    def _is_long(self, lag: int) -> bool:
+        """Return True if the overlap has `MIN_STRIDES` and half of the shorter record."""
+        first, last = self._overlap(lag)
+        return len(self._within(lag)) >= MIN_STRIDES and last - first >= self._shorter // 2
+
+    def _typical(self, lag: int) -> float:
+        """Return the median over strides of the root mean square difference."""
         # Before the first touchdown in the overlap there is the end of a stride.
-        means = [part.mean() for part in np.split(self._squares(lag), inside)[1:]]
-        return math.sqrt(float(np.median(means)))
+        parts = np.split(self._squares(lag), self._within(lag))[1:]
+        return math.sqrt(float(np.median([part.mean() for part in parts]))) if parts else 0.0
 
     def of_all(self, lags: list[int]) -> int:
         """Return the best of the lags under which the shorter record lies within the other, but for half a
@@ -176,9 +181,12 @@ class _Fit:
     def of_part(self, lags: list[int], whole: int) -> int:
         """Return the lag under which a part of the records agrees far better than one stride with the next,
         as of two records that began at different times; else `whole`, the best of all strides."""
-        typical = {lag: self._typical(lag) for lag in dict.fromkeys([whole, *lags])}
-        best = min(typical, key=lambda lag: typical[lag])
-        return best if typical[best] < CLEAR_SHARE * self._variation else whole
+        least = CLEAR_SHARE * self._variation
+        # The median of strides, so that a stride in which one record is at fault does not count.
+        if not least > 0 or self._typical(whole) < least:
+            return whole
+        size, best = min((self.difference(lag), lag) for lag in [whole, *filter(self._is_long, lags)])
+        return best if size < least else whole
 
 
 class Side(NamedTuple):
@@ -251,16 +259,37 @@ def pairs_of(a: Side, b: Side, rate: float, by_touchdown: bool) -> list[Pair]:
 def _matches(a: Side, b: Side, by_touchdown: bool) -> list[tuple[int, int]]:
     """Return numbers of stances of A and of B that make pairs.
 
-    Two stances make a pair if each has the nearest touchdown to the other, so that a step that one record
-    lacks does not shift the others. Records of different pace are paired by touchdown in order, from the two
-    nearest touchdowns on.
+    Two stances make a pair if each has the nearest touchdown to the other, less than half a stride away, so
+    that a step that one record lacks does not shift the others. Records of different pace are paired by
+    touchdown in order, all stances of the record that has fewer.
     """
     apart = np.abs(a.touchdowns[:, None] - b.touchdowns)
     periods = sorted((a.period, b.period))
     # `not <=` instead of `>`, as an unknown period is NaN and counts as a different pace.
     if by_touchdown and not periods[1] <= MAX_PERIOD_RATIO * periods[0]:
-        i, j = np.unravel_index(int(apart.argmin()), apart.shape)
-        later = int(i - j)
-        return [(m, m - later) for m in range(apart.shape[0]) if 0 <= m - later < apart.shape[1]]
+        m, n = apart.shape
+        fewer = min(m, n)
+        # Sums of distances by the number of stances of the longer record before the first pair.
+        sums = [np.trace(apart[max(k, 0) :, max(-k, 0) :][:fewer, :fewer]) for k in _offsets(m, n)]
+        k = _offsets(m, n)[int(np.argmin(sums))]
+        return [(max(k, 0) + i, max(-k, 0) + i) for i in range(fewer)]
+    # The next stance of a limb is no partner of one that the other record lacks.
+    known = [period for period in periods if period > 0]
     nearest = apart.argmin(axis=1).tolist()
-    return [(m, n) for m, n in enumerate(nearest) if apart[:, n].argmin() == m]
+    return [
+        (m, n)
+        for m, n in enumerate(nearest)
+        if apart[:, n].argmin() == m and (apart[m, n] < known[0] / 2 if known else _overlap(a, b, m, n))
+    ]
+
+
+def _offsets(m: int, n: int) -> list[int]:
+    """Return by how many stances A may be ahead of B, of `m` and `n` stances, if all of the fewer are paired;
+    negative where B is ahead."""
+    return list(range(m - n + 1)) if m >= n else [-k for k in range(n - m + 1)]
+
+
+def _overlap(a: Side, b: Side, m: int, n: int) -> bool:
+    """Return True if stance `m` of A and stance `n` of B are partly at the same time."""
+    (first_a, last_a), (first_b, last_b) = a.stances[m], b.stances[n]
+    return bool(a.time[first_a] < b.time[last_b] and b.time[first_b] < a.time[last_a])
