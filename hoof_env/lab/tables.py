@@ -225,8 +225,9 @@ def _read_c3d(path: Path) -> Table:
         for k, axis in enumerate("xyz"):
             columns[f"{limb}_{axis}"] = force[:, k]
             units[f"{limb}_{axis}"] = plates.units[limb]
-    columns["time"] = plates.time
-    units["time"] = "s"
+    if plates.time is not None:
+        columns["time"] = plates.time
+        units["time"] = "s"
     return Table(
         columns,
         units,
