@@ -13,6 +13,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from hoof_env.errors import DataFileError
+from hoof_env.lab.clock import moment
 
 # A name, with its unit in brackets behind it if it has one.
 TITLE_PATTERN = re.compile(r"\s*(?P<name>.*?)\s*(?:[\[(]\s*(?P<unit>[^\[\]()]*?)\s*[\])])?\s*")
@@ -33,6 +34,9 @@ UNIT_WORDS = frozenset(
     for word in line.split()
 )
 """Words of a row of units below the names."""
+
+MISSING = frozenset(("", "nan", "na", "n/a", "#n/a", "nat", "null", "none", "-", "--", ".", "missing"))
+"""Words of cells without a number, in small letters."""
 
 SEPARATORS = ("\t", ";", ",", None)
 """Separators of cells; None stands for blanks."""
@@ -89,6 +93,11 @@ def number(cell: str, decimal_comma: bool = True) -> float:
     return float(cell.replace(",", ".") if decimal_comma else cell)
 
 
+def is_missing(cell: str) -> bool:
+    """Return True if a cell says that there is no number."""
+    return cell.strip().casefold() in MISSING
+
+
 def is_number(cell: str, decimal_comma: bool = True) -> bool:
     """Return True if a cell is a number."""
     try:
@@ -118,13 +127,20 @@ def _separator(line: str, least: int) -> tuple[bool, str | None]:
     for between in SEPARATORS:
         if between is not None and between not in line:
             continue
-        cells = [cell for cell in cells_of(line, between) if cell.strip()]
-        known = [is_number(cell, between != ",") for cell in cells]
-        share = sum(known) / len(known) if known and known[0] and len(known) >= least else 0.0
+        cells = cells_of(line, between)
+        # The first cell of a row is a number or a time, and most others are, as far as there are any.
+        known = [_is_value(cell, between) for cell in cells if not is_missing(cell)]
+        enough = len(cells) >= least and bool(known) and not is_missing(cells[0]) and known[0]
+        share = sum(known) / len(known) if enough else 0.0
         if share > best:
             best = share
             separator = between
     return best > 0.5, separator
+
+
+def _is_value(cell: str, between: str | None) -> bool:
+    """Return True if a cell between separators is a number or a time."""
+    return is_number(cell, between != ",") or moment(cell) is not None
 
 
 def _first_row(lines: list[str]) -> tuple[int, str | None]:
@@ -177,8 +193,16 @@ def parse(lines: list[str]) -> Text:
         if len(rows) > 1 and _are_groups(rows[-2], titles):
             groups = _filled(rows[-2])
     table, after = _rows(lines, begin, between)
+    # Other lines above the numbers have fewer words, or are numbers, too.
+    if table and (len(titles) < width_of(table[0][1]) or all(_is_value(cell, between) for cell in titles)):
+        titles, units, groups, line = [], [], [], 0
     notes = [f"line {after}: another table begins there, which is not read"] if after else []
     return Text(titles, table, units, groups, line, between != ",", notes)
+
+
+def width_of(cells: list[str]) -> int:
+    """Return the number of cells of a row without those at its end that are blank."""
+    return max((k for k, cell in enumerate(cells, 1) if cell.strip()), default=0)
 
 
 def _between_names(line: str, between: str | None, row: str) -> str | None:
