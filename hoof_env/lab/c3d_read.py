@@ -89,6 +89,7 @@ class Plates:
         up: axis of the laboratory that points upward: "x", "y" or "z", with "-" for its other end.
         weight: weight of the animal [N], from files of this package, else None.
         notes: messages about counts that are not those of the data, and a baseline that was not subtracted.
+        own: True if this package wrote the file.
     """
 
     forces: dict[str, Floats]
@@ -97,6 +98,7 @@ class Plates:
     up: str
     weight: float | None
     notes: list[str]
+    own: bool
 
 
 def read_plates(path: Path) -> Plates:
@@ -146,7 +148,9 @@ def read_plates(path: Path) -> Plates:
     units = {limb: _force_unit(parameters, k) for k, limb in enumerate(limbs)}
     weight = float(np.ravel(ours["WEIGHT"])[0]) if "WEIGHT" in ours else None
     up = _upward(content["corners"], content["middle"])
-    return Plates(dict(zip(limbs, forces, strict=True)), units, time, up, weight, [*stale, *notes])
+    return Plates(
+        dict(zip(limbs, forces, strict=True)), units, time, up, weight, [*stale, *notes], bool(ours)
+    )
 
 
 def _joined(parts: list[dict[str, Any]]) -> dict[str, Any]:

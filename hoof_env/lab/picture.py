@@ -11,7 +11,7 @@ import numpy as np
 from hoof_env._output import check_folder, markdown_table, staged
 from hoof_env._plotting import BLUE, GREY, ORANGE, STYLE
 from hoof_env.errors import MissingExtraError, ParameterError
-from hoof_env.lab.axis_checks import for_one
+from hoof_env.lab.axis_checks import for_one, of_model, propelling_first
 from hoof_env.lab.compare import Comparison, Force
 from hoof_env.lab.read import REVERSED, ForceRecord
 
@@ -38,6 +38,8 @@ def report(found: Comparison) -> str:
         _table(found),
         *_alone(found),
     ]
+    for which, record in (("A", found.a), ("B", found.b)):
+        lines += [f"{which}: {text}" for text in (of_model(record.limbs, record.time) if record.own else [])]
     # A record that is compared with itself shows its warnings once, with the options of both.
     same = (found.a.name, found.a.notes) == (found.b.name, found.b.notes)
     warnings = [f"{found.a.name}: {note if same else for_one(note, '-a')}" for note in found.a.notes]
@@ -45,7 +47,7 @@ def report(found: Comparison) -> str:
     warnings += [f"{limb} is not compared: {why}" for limb, why in found.missing.items()] + found.warnings
     for limb, errors in found.limbs.items():
         if "fore-aft" in errors.forces and errors.forces["fore-aft"].r < -0.5:
-            warnings.append(f"{limb}: fore-aft forces point opposite ways; {_remedy(found, limb)}")
+            warnings.append(f"{limb}: fore-aft forces point opposite ways; {_why_opposite(found, limb)}")
     return "\n".join([*lines, *(f"warning: {text}" for text in warnings)])
 
 
@@ -63,15 +65,30 @@ def _alone(found: Comparison) -> list[str]:
     return ["", f"Whole stances that are not compared: {', '.join(limbs)}."] if limbs else []
 
 
-def _remedy(found: Comparison, limb: str) -> str:
-    """Return the option that turns the fore-aft forces of a limb.
-
-    The option counts from the file: if "auto" has turned both components, the vertical one alone is to be
-    turned. A is taken to be wrong if only A was turned, else B.
-    """
+def _why_opposite(found: Comparison, limb: str) -> str:
+    """Return why the fore-aft forces of a limb point opposite ways, or the option that turns them."""
     # The only limbs of two records are compared even with different names.
     of_b = limb if limb in found.b.limbs else next(iter(found.b.limbs))
-    at_a = limb in found.a.turned and of_b not in found.b.turned
+    if found.a.own and found.b.own:
+        return "both records are exports of this package, whose signs are right"
+    own, other, name = (found.a, found.b, of_b) if found.a.own else (found.b, found.a, limb)
+    # A measured limb that does not clearly propel first has the signs of an animal that travels forward.
+    if own.own and name not in propelling_first(other.limbs, other.time):
+        return (
+            f"braking and propulsion of {own.name} are the model's (Limits in docs/help.md), and the signs "
+            f"of {other.name} are those of an animal that travels forward: nothing is to be turned"
+        )
+    return _remedy(found, limb, of_b)
+
+
+def _remedy(found: Comparison, limb: str, of_b: str) -> str:
+    """Return the option that turns the fore-aft forces of a limb, whose name in B is `of_b`.
+
+    The option counts from the file: if "auto" has turned both components, the vertical one alone is to be
+    turned. A is taken to be wrong if B is an export of this package, or if only A was turned; else B.
+    """
+    only_a = limb in found.a.turned and of_b not in found.b.turned
+    at_a = found.b.own or (only_a and not found.a.own)
     which, record, limb = ("a", found.a, limb) if at_a else ("b", found.b, of_b)
     forward, upward = record.signs.get(limb, (1, 1))
     # An option turns all limbs, so that it is no remedy if their signs differ.
@@ -91,11 +108,12 @@ def _about(which: str, record: ForceRecord) -> str:
     """Return a line on a record, `which` is "A" or "B"."""
     limbs = "" if len(record.turned) == len(record.limbs) else f" of {', '.join(record.turned)}"
     turned = f"; forces{limbs} pointed into the ground and are turned round" if record.turned else ""
+    own = "; an export of this package" if record.own else ""
     level = [limb for limb, force in record.limbs.items() if not np.isfinite(force[:, 0]).any()]
     only = f"; no fore-aft force of {', '.join(level)}" if level else ""
     return (
         f"{which}  {record.name}: {record.rate:g} Hz, {record.unit}, {', '.join(record.limbs)}, "
-        f"{record.time[0]:.4g} to {record.time[-1]:.4g} s{turned}{only}"
+        f"{record.time[0]:.4g} to {record.time[-1]:.4g} s{own}{turned}{only}"
     )
 
 

@@ -86,6 +86,7 @@ class ForceRecord:
         signs: factors of the forward and the upward component in the file by limb; (1, 1) for others.
         turned: limbs of which "auto" has turned both components.
         notes: warnings about the record, and their remedies.
+        own: True if this package wrote the file: its signs are right.
     """
 
     name: str
@@ -96,6 +97,7 @@ class ForceRecord:
     signs: dict[str, tuple[int, int]] = field(default_factory=dict)
     turned: tuple[str, ...] = ()
     notes: tuple[str, ...] = ()
+    own: bool = False
 
     @property
     def rate(self) -> float:
@@ -169,10 +171,11 @@ def read_record(
     turned = tuple(limb for limb, which in down.items() if any(which))
     notes += table.notes + time_notes
     notes += suspect_axes(forces, _others(table, sources), ahead, upward, (up, forward))
-    notes += suspect_direction(forces, times, ahead, has_axes)
+    if not table.own:
+        notes += suspect_direction(forces, times, ahead, has_axes)
     # A given mass takes precedence over the weight in the file.
     weight = table.weight if mass is None else mass * GRAVITY
-    return ForceRecord(path.name, times, forces, unit, weight, signs, turned, tuple(notes))
+    return ForceRecord(path.name, times, forces, unit, weight, signs, turned, tuple(notes), table.own)
 
 
 def _check_arguments(

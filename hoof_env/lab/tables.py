@@ -22,6 +22,7 @@ from numpy.typing import NDArray
 from hoof_env.errors import DataFileError, MissingExtraError, parse_json
 from hoof_env.lab.c3d_read import read_plates
 from hoof_env.lab.clock import moment, seconds_of
+from hoof_env.lab.opensim import STATED
 from hoof_env.lab.text import (
     TITLE_PATTERN,
     Row,
@@ -34,6 +35,9 @@ from hoof_env.lab.text import (
     parse,
     width_of,
 )
+
+OWN_COLUMNS = ("toe_normal", "cop_x", "crank_angle", "command_crank_speed")
+"""Ends of names of columns that together only the tables of this package have."""
 
 Columns = dict[str, NDArray[np.float64]]
 
@@ -60,6 +64,7 @@ class Table:
         line: number of the line of names, 0 if there is none.
         lines: numbers of the lines of the rows, empty in files without lines.
         notes: messages about parts of the file that are not read or not used.
+        own: True if this package wrote the file.
     """
 
     columns: Columns
@@ -73,6 +78,7 @@ class Table:
     line: int = 0
     lines: list[int] = field(default_factory=list)
     notes: list[str] = field(default_factory=list)
+    own: bool = False
 
     @property
     def names(self) -> list[str]:
@@ -92,6 +98,7 @@ class Table:
 def _read_text(path: Path) -> Table:
     """Read a .csv, .txt or .tsv."""
     table = _table(path, parse(lines_of(path)))
+    table.own = all(any(name.endswith(end) for name in table.order) for end in OWN_COLUMNS)
     # Our files in body weights have the weight in a column, as they have no other place for it.
     weights = table.columns.get("weight", np.empty(0))
     if weights.size and table.units.get("weight") == "N":
@@ -130,6 +137,7 @@ def _read_opensim(path: Path) -> Table:
             table.units[name] = "N"
     table.units["time"] = "s"
     table.weight = float(stated["weight_n"]) if "weight_n" in stated else None
+    table.own = all(name in stated for name in STATED)
     return table
 
 
@@ -275,7 +283,7 @@ def _read_parquet(path: Path) -> Table:
     content = parquet.read_table(path)
     units = {entry.name: (entry.metadata or {}).get(b"unit", b"").decode() for entry in content.schema}
     about = parse_json((content.schema.metadata or {}).get(b"hoof_env", b"{}"))
-    table = Table({}, units, about.get("weight_n"))
+    table = Table({}, units, about.get("weight_n"), own="hoof_env" in about)
     for name in content.column_names:
         try:
             values = content[name].to_numpy()
@@ -320,6 +328,7 @@ def _read_c3d(path: Path) -> Table:
         up=plates.up,
         plates=[*plates.forces],
         notes=plates.notes,
+        own=plates.own,
     )
 
 
