@@ -27,6 +27,7 @@ from hoof_env.errors import DataFileError, ParameterError, count
 from hoof_env.evaluation.episodes import FINAL_SEEDS, play, score_vector
 from hoof_env.evaluation.statistics import (
     TABLE,
+    TRANSPORT,
     Interval,
     Scored,
     cells,
@@ -34,6 +35,7 @@ from hoof_env.evaluation.statistics import (
     mean_figures,
     over_episodes,
     over_seeds,
+    transport,
 )
 from hoof_env.policies.find import find_policy, is_function, is_model, read_policy_record
 from hoof_env.policies.record import environment_of
@@ -81,10 +83,15 @@ class Score:
 
     @cached_property
     def estimates(self) -> dict[str, Interval]:
-        """Means and intervals by key of `METRICS`, those that the episodes have."""
-        return {
-            key: estimate([one[key] for one in self.episodes]) for key in METRICS if key in self.episodes[0]
-        }
+        """Means and intervals by key of `METRICS`, those that the episodes have; the cost of transport is
+        that of all episodes together, as in every table."""
+        found = {}
+        for key in METRICS:
+            if key == "cost_of_transport" and all(name in self.episodes[0] for name in TRANSPORT):
+                found[key] = transport(self.episodes)
+            elif key in self.episodes[0]:
+                found[key] = estimate([one[key] for one in self.episodes])
+        return found
 
 
 @dataclass(frozen=True)
