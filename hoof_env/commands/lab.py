@@ -127,6 +127,9 @@ class AverageArgs:
     """unit of the table: N or BW; auto is N if all files can be in N."""
     points: int = 101
     """rows of the table, from touchdown to lift-off."""
+    drop: tuple[str, ...] = ()
+    """stances to be left out: first, the first of each file, as that of an episode depends on its start; odd,
+    those that differ from the median duration by more than 25 %."""
     overwrite: bool = False
     """replace an existing table."""
 
@@ -158,7 +161,7 @@ def average(args: Annotated[AverageArgs, arg(name="")]) -> None:
     except HoofEnvError as error:
         # Its message names the options of `compare`, which end in -a and -b.
         raise type(error)(for_one(str(error), "").replace("--units", "--units-in")) from None
-    stances = mean.average(trials, args.threshold, args.units, args.points)
+    stances = mean.average(trials, args.threshold, args.units, args.points, args.drop)
     say(f"{mean.report(stances)}\n")
     with new_file(args.out, args.overwrite) as file:
         mean.write_table(stances, file)

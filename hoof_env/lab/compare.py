@@ -29,6 +29,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hoof_env.errors import DataFileError, ParameterError, check_choice, check_number
+from hoof_env.lab.doubts import baseline
 from hoof_env.lab.forces import THRESHOLD
 from hoof_env.lab.read import ForceRecord
 from hoof_env.lab.stances import MIN_STANCE_SECONDS, Pair, Side, Spans, best_shift, pairs_of, whole_stances
@@ -177,6 +178,9 @@ def compare(
             limbs[name] = _errors(pairs, sides, rate)
             curves[name] = [(pair.time, pair.a, pair.b) for pair in pairs]
             warnings += [f"{name}: {text}" for text in _warnings(sides, limbs[name], align)]
+            for which, side, level, moved in zip("AB", sides, levels, (0.0, shift), strict=True):
+                texts = baseline(side.force[:, 1], side.stances, level, side.time - moved, unit)
+                warnings += [f"{name}: {which}: {text}" for text in texts]
         else:
             missing[name] = _why_missing(sides, levels, unit)
     if not limbs:

@@ -44,7 +44,13 @@ MAX_PERIOD_RATIO = 1.1
 
 
 def whole_stances(vertical: Floats, level: float, rate: float) -> Spans:
-    """Find the whole stances in a vertical force.
+    """Find the whole stances in a vertical force: `loaded_spans` that no end of the record cuts off."""
+    # Stances at an end of the record are dropped last, as a neighbour across a short gap is a part of them.
+    return [(i, j) for i, j in loaded_spans(vertical, level, rate) if i > 0 and j < len(vertical)]
+
+
+def loaded_spans(vertical: Floats, level: float, rate: float) -> Spans:
+    """Find the times above a threshold in a vertical force.
 
     Args:
         vertical: the force, shape (n,).
@@ -60,8 +66,7 @@ def whole_stances(vertical: Floats, level: float, rate: float) -> Spans:
             spans[-1] = spans[-1][0], last
         else:
             spans.append((first, last))
-    # Stances at an end of the record are dropped last, as a neighbour across a short gap is a part of them.
-    return [(i, j) for i, j in spans if i > 0 and j < len(vertical)]
+    return spans
 
 
 def best_shift(
