@@ -319,7 +319,8 @@ def _warnings(sides: tuple[Side, Side], errors: LimbErrors, align: str) -> list[
     if counts[0] != counts[1] and errors.pairs < max(counts):
         warnings.append(
             f"A has {counts[0]} whole stances and B {counts[1]} in the same time, {errors.pairs} are "
-            "compared; if noise makes or splits stances, raise --threshold"
+            "compared; if noise makes or splits stances, raise --threshold; other causes are steps that one "
+            "record lacks, and limbs that share a plate"
         )
     fewer = min(errors.stances)
     if errors.pairs < fewer:

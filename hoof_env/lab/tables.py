@@ -102,8 +102,22 @@ def _read_text(path: Path) -> Table:
     # Our files in body weights have the weight in a column, as they have no other place for it.
     weights = table.columns.get("weight", np.empty(0))
     if weights.size and table.units.get("weight") == "N":
-        table.weight = float(weights[0])
+        _set_weight(table, "column weight", weights[0])
     return table
+
+
+def _set_weight(table: Table, name: str, value: Any) -> None:
+    """Set the weight of a table, or note that what the file states under a name is none."""
+    try:
+        weight = float(value)
+    except (TypeError, ValueError):
+        weight = np.nan
+    if np.isfinite(weight) and weight > 0:
+        table.weight = weight
+    else:
+        table.notes.append(
+            f"{name}: expected a weight in N, got {value!s:.40}; --mass-a or --mass-b gives the mass"
+        )
 
 
 def _read_opensim(path: Path) -> Table:
@@ -136,7 +150,8 @@ def _read_opensim(path: Path) -> Table:
         if "force" in name.lower() and re.search(r"(_v[xyz]|_[xyz])(#\d+)?$", name):
             table.units[name] = "N"
     table.units["time"] = "s"
-    table.weight = float(stated["weight_n"]) if "weight_n" in stated else None
+    if "weight_n" in stated:
+        _set_weight(table, "weight_n", stated["weight_n"])
     table.own = all(name in stated for name in STATED)
     return table
 
@@ -283,7 +298,9 @@ def _read_parquet(path: Path) -> Table:
     content = parquet.read_table(path)
     units = {entry.name: (entry.metadata or {}).get(b"unit", b"").decode() for entry in content.schema}
     about = parse_json((content.schema.metadata or {}).get(b"hoof_env", b"{}"))
-    table = Table({}, units, about.get("weight_n"), own="hoof_env" in about)
+    table = Table({}, units, own="hoof_env" in about)
+    if "weight_n" in about:
+        _set_weight(table, "weight_n", about["weight_n"])
     for name in content.column_names:
         try:
             values = content[name].to_numpy()
@@ -321,15 +338,11 @@ def _read_c3d(path: Path) -> Table:
     if plates.time is not None:
         columns["time"] = plates.time
         units["time"] = "s"
-    return Table(
-        columns,
-        units,
-        plates.weight,
-        up=plates.up,
-        plates=[*plates.forces],
-        notes=plates.notes,
-        own=plates.own,
-    )
+    names = [*plates.forces]
+    table = Table(columns, units, up=plates.up, plates=names, notes=plates.notes, own=plates.own)
+    if plates.weight is not None:
+        _set_weight(table, "HOOF_ENV:WEIGHT", plates.weight)
+    return table
 
 
 READERS: dict[str, Callable[[Path], Table]] = {

@@ -77,6 +77,16 @@ STALE = {
 """Notes on counts in headers."""
 
 
+@pytest.mark.parametrize("weight", ["0", "-5", "nan", "heavy", "inf"])
+def test_a_weight_that_is_none_is_said_and_not_used(weight, tmp_path):
+    head = f"x\nweight_n={weight}\nendheader\ntime ground_force_vx ground_force_vy\n"
+    found = read_record(written(tmp_path / "x.mot", head, between=" "))
+    assert found.weight is None
+    assert found.notes == (
+        f"weight_n: expected a weight in N, got {weight}; --mass-a or --mass-b gives the mass",
+    )
+
+
 @pytest.mark.parametrize("name", LAYOUTS)
 def test_names_and_numbers_are_found_in_every_layout(name, tmp_path):
     arguments, options, mapping = LAYOUTS[name]
