@@ -308,6 +308,6 @@ def report(found: Average) -> str:
         counts = {limb: getattr(stance, what) for limb, stance in found.limbs.items()}
         if any(counts.values()):
             ends = " off by the ends of records" if what == "cut" else ""
-            lines.append(f"Stances {what}{ends}: {', '.join(f'{limb} {n}' for limb, n in counts.items())}.")
-    lines += found.remarks
+            lines.append(f"\nStances {what}{ends}: {', '.join(f'{limb} {n}' for limb, n in counts.items())}.")
+    lines += ["", *found.remarks] if found.remarks else []
     return "\n".join([*lines, *(f"warning: {text}" for text in found.warnings)])

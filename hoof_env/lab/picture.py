@@ -38,8 +38,13 @@ def report(found: Comparison) -> str:
         _table(found),
         *_alone(found),
     ]
-    for which, record in (("A", found.a), ("B", found.b)):
-        lines += [f"{which}: {text}" for text in (of_model(record.limbs, record.time) if record.own else [])]
+    remarks = [
+        f"{which}: {text}"
+        for which, record in (("A", found.a), ("B", found.b))
+        if record.own
+        for text in of_model(record.limbs, record.time)
+    ]
+    lines += ["", *remarks] if remarks else []
     # A record that is compared with itself shows its warnings once, with the options of both.
     same = (found.a.name, found.a.notes) == (found.b.name, found.b.notes)
     warnings = [f"{found.a.name}: {note if same else for_one(note, '-a')}" for note in found.a.notes]
@@ -72,11 +77,10 @@ def _why_opposite(found: Comparison, limb: str) -> str:
     if found.a.own and found.b.own:
         return "both records are exports of this package, whose signs are right"
     own, other, name = (found.a, found.b, of_b) if found.a.own else (found.b, found.a, limb)
-    # A measured limb that does not clearly propel first has the signs of an animal that travels forward.
     if own.own and name not in propelling_first(other.limbs, other.time):
         return (
-            f"braking and propulsion of {own.name} are the model's (Limits in docs/help.md), and the signs "
-            f"of {other.name} are those of an animal that travels forward: nothing is to be turned"
+            f"braking and propulsion of {own.name} are the model's (Limits in docs/help.md); {other.name} does "
+            "not propel before it brakes, so nothing shows that its forces are to be turned"
         )
     return _remedy(found, limb, of_b)
 
