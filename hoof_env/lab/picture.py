@@ -79,8 +79,8 @@ def _why_opposite(found: Comparison, limb: str) -> str:
     own, other, name = (found.a, found.b, of_b) if found.a.own else (found.b, found.a, limb)
     if own.own and name not in propelling_first(other.limbs, other.time):
         return (
-            f"braking and propulsion of {own.name} are the model's (Limits in docs/help.md); {other.name} does "
-            "not propel before it brakes, so nothing shows that its forces are to be turned"
+            f"braking and propulsion of {own.name} are the model's (Limits in docs/help.md); {other.name} "
+            "does not propel before it brakes, so nothing shows that its forces are to be turned"
         )
     return _remedy(found, limb, of_b)
 
