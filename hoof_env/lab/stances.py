@@ -32,7 +32,7 @@ MAX_OUTSIDE_STRIDE = 0.55
 """Largest part of the shorter record that may lie outside the other, in strides: with half a stride any phase
 of B can be laid on A's."""
 
-MIN_STRIDES = 3
+MIN_STRIDES = 2
 """Least number of strides in the overlap of records that began at different times."""
 
 CLEAR_SHARE = 1 / 3
