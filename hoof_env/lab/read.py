@@ -160,6 +160,8 @@ def read_record(
             f"up, forward: expected neither with columns of {path.name} that --map names; name the columns "
             "of the axes there, with a minus for the opposite direction"
         )
+    if any(name.casefold() == time.casefold() for name in table.columns):
+        table.drop_empty()  # the steps of the times say whether one is missing
     notes += fill(path, table, sources, gaps)
     columns = _components(path, table, sources)
     unit = _unit(path, table, unit, sources)

@@ -89,6 +89,15 @@ class Table:
         """Return the place of a row, from 0, as text: its line, or its number in files without lines."""
         return f"line {self.lines[row]}" if self.lines else f"row {row + 1}"
 
+    def drop_empty(self) -> None:
+        """Leave out rows without any value."""
+        empty = np.ones(self.rows, bool)
+        for values in self.columns.values():
+            empty &= np.isnan(values)
+        if empty.any() and self.lines and not self.unread:
+            self.columns = {name: values[~empty] for name, values in self.columns.items()}
+            self.lines = [line for line, gone in zip(self.lines, empty, strict=True) if not gone]
+
     @property
     def rows(self) -> int:
         """Number of rows of the columns that are numbers."""
@@ -281,9 +290,11 @@ def _numbers(rows: list[Row], at: int, decimal_comma: bool, points: bool) -> NDA
     values = np.empty(len(rows))
     for n, (k, cells) in enumerate(rows):
         try:
-            missing = is_missing(cells[at])
-            values[n] = np.nan if missing else number(cells[at], decimal_comma and not points)
+            values[n] = number(cells[at], decimal_comma and not points)
         except ValueError:
+            if is_missing(cells[at]):
+                values[n] = np.nan
+                continue
             mixed = " beside numbers with decimal points" if points and "," in cells[at] else ""
             raise ValueError(f"line {k}: expected numbers, got {cells[at]!r}{mixed}") from None
     return values

@@ -138,6 +138,16 @@ def _separator(line: str, least: int) -> tuple[bool, str | None]:
     return best > 0.5, separator
 
 
+def is_empty(cells: list[str]) -> bool:
+    """Return True if a row has cells, and no value in any."""
+    return len(cells) > 1 and all(map(is_missing, cells))
+
+
+def _split(line: str) -> list[list[str]]:
+    """Return the cells of a line at each separator that it contains, but blanks."""
+    return [cells_of(line, between) for between in SEPARATORS if between is not None and between in line]
+
+
 def _is_value(cell: str, between: str | None) -> bool:
     """Return True if a cell between separators is a number or a time."""
     return is_number(cell, between != ",") or moment(cell) is not None
@@ -154,7 +164,8 @@ def _first_row(lines: list[str]) -> tuple[int, str | None]:
         # Runs of rows of numbers: length, first row and separator.
         runs: list[tuple[int, int, str | None]] = []
         for k, line in enumerate(lines):
-            if not line.strip():
+            # Rows without any value break no run: programs write them in swing.
+            if not line.strip() or any(map(is_empty, _split(line))):
                 continue
             numeric, between = _separator(line, least)
             if not numeric:
@@ -175,6 +186,10 @@ def _first_row(lines: list[str]) -> tuple[int, str | None]:
 def parse(lines: list[str]) -> Text:
     """Parse the first table in the lines of a file."""
     begin, between = _first_row(lines)
+    if begin < len(lines) and any(is_empty(cells_of(line, between)) for line in lines[begin:]):
+        # The first rows may have no value, either.
+        while begin and is_empty(cells_of(lines[begin - 1], between)):
+            begin -= 1
     above = [k for k in range(begin) if lines[k].strip()]
     if begin == len(lines) and not above:
         return Text([], [])
@@ -263,14 +278,19 @@ def _filled(cells: list[str]) -> list[str]:
 def _rows(lines: list[str], begin: int, between: str | None) -> tuple[list[Row], int]:
     """Return the rows from line `begin` on, and the number of the line where another table begins, else 0."""
     rows: list[Row] = []
+    empty: list[Row] = []
     blank = False
     for k in range(begin, len(lines)):
         cells = cells_of(lines[k], between)
         if not any(cell.strip() for cell in cells):
             blank = True
+            # Separators alone are a row without values if others follow.
+            empty += [(k + 1, cells)] if len(cells) > 1 else []
             continue
-        if blank and not _separator(lines[k], 1)[0]:
+        if blank and not (_separator(lines[k], 1)[0] or is_empty(cells)):
             return rows, k + 1
-        rows.append((k + 1, cells))
+        rows += [*empty, (k + 1, cells)]
+        empty = []
         blank = False
-    return rows, 0
+    # At the end such rows may be the padding of a spreadsheet, unless there were others.
+    return rows + (empty if any(is_empty(cells) for _, cells in rows) else []), 0

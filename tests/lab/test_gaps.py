@@ -96,3 +96,23 @@ def test_a_column_of_two_limbs_is_said(tmp_path):
     path = lacking(tmp_path / "x.csv", np.zeros(300, bool))
     found = read_record(path, {"l_force_y": "left_force_y", "r_force_y": "left_force_y"})
     assert found.notes[0].startswith("left_force_y is the vertical force of l and of r")
+
+
+@pytest.mark.parametrize("word", ["", "NA"])
+@pytest.mark.parametrize("between", [",", ";", "\t"])
+def test_rows_without_any_value_are_samples(between, word, tmp_path):
+    """Without times a row that was skipped would bring stances together."""
+    lines = [between.join((word, word) if y == 0 else (f"{x}", f"{y}")) for x, y in BOTH]
+    (tmp_path / "x.csv").write_text("\n".join([f"force_x [N]{between}force_y [N]", *lines]))
+    found = read_record(tmp_path / "x.csv", rate=100.0)
+    np.testing.assert_allclose(found.limbs["leg"], BOTH, atol=1e-9)
+    assert "missing in swing, the first in line 2" in found.notes[0]
+
+
+def test_rows_of_separators_beside_times_are_no_samples(tmp_path):
+    lines = [f"{t},{x},{y}" for t, x, y in ROWS]
+    lines[100:100] = [",,", ",,"]
+    (tmp_path / "x.csv").write_text("\n".join(["time [s],force_x [N],force_y [N]", ",,", *lines, ",,"]))
+    found = read_record(tmp_path / "x.csv")
+    np.testing.assert_allclose(found.limbs["leg"], BOTH, atol=1e-9)
+    assert found.notes == ()
