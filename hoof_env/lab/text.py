@@ -186,10 +186,11 @@ def _first_row(lines: list[str]) -> tuple[int, str | None]:
 def parse(lines: list[str]) -> Text:
     """Parse the first table in the lines of a file."""
     begin, between = _first_row(lines)
-    if begin < len(lines) and any(is_empty(cells_of(line, between)) for line in lines[begin:]):
-        # The first rows may have no value, either.
-        while begin and is_empty(cells_of(lines[begin - 1], between)):
-            begin -= 1
+    first = begin
+    while begin < len(lines) and first and is_empty(cells_of(lines[first - 1], between)):
+        first -= 1
+    if first < begin and any(is_empty(cells_of(line, between)) for line in lines[begin:]):
+        begin = first  # the first rows have no value, either
     above = [k for k in range(begin) if lines[k].strip()]
     if begin == len(lines) and not above:
         return Text([], [])
@@ -293,4 +294,4 @@ def _rows(lines: list[str], begin: int, between: str | None) -> tuple[list[Row],
         empty = []
         blank = False
     # At the end such rows may be the padding of a spreadsheet, unless there were others.
-    return rows + (empty if any(is_empty(cells) for _, cells in rows) else []), 0
+    return rows + (empty if empty and any(is_empty(cells) for _, cells in rows) else []), 0
