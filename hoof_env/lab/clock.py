@@ -14,8 +14,8 @@ DATE = (
 )
 """Patterns of dates: 2024-05-31, 31.5.2024 and 5/31/2024."""
 
-TIME = r"(?:(?P<hours>\d+):)?(?P<minutes>\d+):(?P<seconds>\d+(?:[.,]\d*)?)"
-"""Pattern of 12:34:56.789, and of 34:56.789 without hours."""
+TIME = r"(?:(?P<hours>\d+):)?(?P<minutes>\d+):(?P<seconds>\d+(?:[.,]\d*)?)(?:\s*(?P<half>[AaPp])[Mm])?"
+"""Pattern of 12:34:56.789, also with AM or PM, and of 34:56.789 without hours."""
 
 ZONE = r"(?:\s*(?:Z|UTC|[+-]\d\d:?\d\d))?"
 """Pattern of a time zone, which changes no difference of times."""
@@ -47,7 +47,10 @@ def moment(text: str) -> tuple[int, float] | None:
             except ValueError:
                 return None
         seconds = float(part["seconds"].replace(",", "."))
-        return days, 3600.0 * int(part["hours"] or 0) + 60.0 * int(part["minutes"]) + seconds
+        hours = int(part["hours"] or 0)
+        if part["half"]:
+            hours = hours % 12 + (12 if part["half"] in "Pp" else 0)
+        return days, 3600.0 * hours + 60.0 * int(part["minutes"]) + seconds
     return None
 
 

@@ -103,6 +103,7 @@ CLOCKS = {
     "28.02.2024": lambda t: (DAY + timedelta(seconds=t)).strftime("%d.%m.%Y %H:%M:%S.%f"),
     "02/28/2024": lambda t: (DAY + timedelta(seconds=t)).strftime("%m/%d/%Y %H:%M:%S.%f"),
     "23:59:58.500": lambda t: (DAY + timedelta(seconds=t)).strftime("%H:%M:%S.%f")[:-3],
+    "11:59:58.500 PM": lambda t: (DAY + timedelta(seconds=t)).strftime("%I:%M:%S.%f %p"),
     "0:00:00.500": lambda t: f"0:00:{t:06.3f}",
     "1:00.500": lambda t: f"1:{t:06.3f}",
     "0 days 00:00:00.500000": lambda t: f"0 days 00:00:{t:09.6f}",
@@ -114,7 +115,8 @@ def test_durations_and_times_of_day_are_read(said, tmp_path):
     rows = [f"{said(t)},{x:.6f},{y:.6f}" for t, (x, y) in zip(LATE, force(LATE), strict=True)]
     (tmp_path / "x.csv").write_text("\n".join(["time,left_force_x [N],left_force_y [N]", *rows]))
     found = read_record(tmp_path / "x.csv")
-    start = {"0": 0.5, "1": 60.5}.get(said(0.5)[0] if said(0.5)[1] in ": " else "", 86398.5)
+    first = said(0.5)
+    start = 0.5 if first[0] == "0" and first[1] in ": " else 60.5 if first[:2] == "1:" else 86398.5
     np.testing.assert_allclose(found.time, start + np.arange(300) / 100, atol=1e-9)
     dated = "2024" in said(0.5)
     assert found.notes == (("time: times are counted from midnight of 2024-02-28",) if dated else ())
