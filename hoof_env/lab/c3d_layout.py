@@ -24,8 +24,8 @@ from hoof_env.lab.c3d_header import BLOCK, Head
 MAX_FRAMES = 32_767
 """Largest number of frames of a copy, which any reader takes for positive."""
 
-MAX_RATIO_ERROR = 1e-3
-"""Largest relative error of a rate, as of a ratio of rates that is a whole number."""
+MAX_RATIO_ERROR = 0.02
+"""Largest relative error of a rate, and of a ratio of rates from a whole number: 600 Hz beside 59.94 Hz."""
 
 WORD = 1 << 16
 """Values of a word: TRIAL has counts of frames as two of them, the lower one first."""
@@ -83,7 +83,7 @@ def readable(path: Path, head: Head, folder: Path) -> tuple[list[Path], int, lis
     """
     stated = _stated(head)
     if head.is_dec:
-        return [path], max(stated.values()), []
+        return [path], stated["header"], []
     size = path.stat().st_size
     believed = _believed(head)
     layout = _layout(head, size, [*stated.values()], believed)

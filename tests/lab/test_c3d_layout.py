@@ -98,6 +98,29 @@ STALE = {
 """Damage, and words of a note, "" for none."""
 
 
+def as_integers(path, stale=False):
+    """The fast file with integers of two bytes; `stale` leaves the scale of floats in the header."""
+    content = bytearray(fast(path).read_bytes())
+    start = (struct.unpack_from("<H", content, 16)[0] - 1) * 512
+    numbers = np.frombuffer(bytes(content[start:]), "<f4")[: 300 * (4 + 6 * SAMPLES)]
+    del content[start:]
+    content += numbers.astype("<i2").tobytes()
+    content += bytes(-len(content) % 512)
+    parameter("POINT:SCALE", 1.0, "f")(content)
+    if not stale:
+        word(7, 1.0, "f")(content)
+    path.write_bytes(content)
+    return path
+
+
+@pytest.mark.parametrize("stale", [False, True])
+def test_integers_are_read(stale, tmp_path):
+    found = read_record(as_integers(tmp_path / "x.c3d", stale))
+    (force,) = found.limbs.values()
+    np.testing.assert_allclose(force[:, 1], np.arange(1.0, 3001.0))
+    assert_said(found, "form of numbers" if stale else "")
+
+
 PADDED = ("first frame 50", "last frame 301", "POINT:FRAMES 1000")
 """Damages of a file whose frames are so small that padding could be taken for some."""
 
