@@ -82,11 +82,11 @@ def readable(path: Path, head: Head, folder: Path) -> tuple[list[Path], int, lis
         DataFileError: the file holds fewer frames than it states.
     """
     stated = _stated(head)
-    if head.is_dec:
-        return [path], stated["header"], []
     size = path.stat().st_size
     believed = _believed(head)
     layout = _layout(head, size, [*stated.values()], believed)
+    if head.is_dec or not layout.frame_bytes:
+        return [path], stated["header"], []
     frames = _frames(path, layout, size, stated)
     notes = _notes(head, stated, frames, believed, layout)
     if layout == believed and stated.get("POINT:FRAMES", stated["header"]) == frames:
@@ -145,7 +145,7 @@ def _samples(head: Head) -> int:
     (rate, *_), (camera, *_) = (head.numbers(f"{group}:RATE") or (0.0,) for group in ("ANALOG", "POINT"))
     if not rate > 0:
         return 0
-    ratio = min(rate / camera, WORD) if camera > 0 else 1.0
+    ratio = min(rate / camera, WORD) if camera > 0 else max(head.words(10)[0], 1)
     samples = round(ratio)
     return samples if abs(ratio - samples) < MAX_RATIO_ERROR * samples else 0
 
