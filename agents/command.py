@@ -9,9 +9,9 @@ import warnings
 from collections.abc import Callable
 from typing import NoReturn
 
-from hoof_env._output import bear_any_output, flush_or_drop
+from hoof_env._output import bear_any_output, check_arguments, flush_or_drop
 from hoof_env.commands.options import parse as parse
-from hoof_env.errors import HoofEnvError, check_number
+from hoof_env.errors import HoofEnvError, bounded, check_number
 from hoof_env.errors import parse_pairs as parse_pairs
 
 
@@ -31,8 +31,9 @@ def run(command: Callable[[], int | None]) -> NoReturn:
     hook = threading.excepthook  # TensorBoard's thread fails on a full disk; its caller reports that, too
     bear_any_output()
     threading.excepthook = lambda args: None if isinstance(args.exc_value, OSError) else hook(args)
-    warnings.formatwarning = lambda message, *_, **__: f"warning: {message}\n"
+    warnings.formatwarning = lambda message, *_, **__: f"warning: {bounded(str(message))}\n"
     try:
+        check_arguments(sys.argv[1:])
         code = command() or 0
         sys.stdout.flush()
     except (HoofEnvError, OSError) as error:
@@ -42,6 +43,9 @@ def run(command: Callable[[], int | None]) -> NoReturn:
     except RecursionError:
         # JSON and YAML parsers recurse once a level
         print("error: a file or an argument is nested too deep", file=sys.stderr)
+        code = 2
+    except MemoryError as error:
+        print(f"error: there is not enough memory; {error}".rstrip("; "), file=sys.stderr)
         code = 2
     except KeyboardInterrupt:
         print("\ninterrupted", file=sys.stderr)

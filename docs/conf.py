@@ -71,9 +71,10 @@ add_module_names = False
 nitpicky = True
 nitpick_ignore_regex = [
     ("py:obj", ".*"),  # not every name in a docstring is public
-    ("py:class", r"hoof_env\.envs\.batch\..*"),
+    ("py:class", r"hoof_env\.episodes\..*"),
+    ("py:class", r"hoof_env\.tasks\.(body\.Body|settings\.ResolvedSettings)"),
     ("py:class", r"hoof_env\.leg\.(mechanism|mjcf|profile)\..*"),
-    ("py:class", r"hoof_env\.(dynamics\.(engine_calls|layout)|envs\.(properties|row_states))\..*"),
+    ("py:class", r"hoof_env\.dynamics\.(engine_calls|layout)\..*"),
     ("py:.*", r"(?!hoof_env\.).*"),  # other people's names; their inventories need a network
 ]
 

@@ -5,15 +5,17 @@ from __future__ import annotations
 import io
 import itertools
 import os
+import re
 import shutil
 import sys
 import tempfile
 import textwrap
 from collections.abc import Collection, Iterable, Iterator
 from contextlib import contextmanager, suppress
+from itertools import pairwise
 from pathlib import Path
 
-from hoof_env.errors import OutputError
+from hoof_env.errors import OutputError, ParameterError
 
 STAGE = ".unfinished-"
 """First letters of the name of a folder whose files are not complete yet."""
@@ -122,6 +124,8 @@ def check_new(path: Path, overwrite: bool) -> str:
     """
     try:
         is_there = path.is_file()
+        if path.exists() and not (is_there or path.is_dir()):
+            raise OutputError(f"cannot write to {str(path)!r}: expected a file, got a pipe or a device")
         has_folder = path.parent.exists()
     except OSError as error:
         raise OutputError(f"cannot write to {str(path)!r}: {error.strerror}") from None
@@ -146,6 +150,17 @@ def free_memory() -> float:
         with suppress(OSError, ValueError, AttributeError):
             bounds.append(float(os.sysconf("SC_PHYS_PAGES")) * os.sysconf("SC_PAGE_SIZE"))
     return max(min(bounds), 0.0)
+
+
+def check_arguments(arguments: Iterable[str]) -> None:
+    """Raise `ParameterError` for an empty argument of a command, as a variable that is not set gives: as a
+    path it would be the working folder."""
+    for before, item in pairwise(["", *arguments]):
+        if not item or re.fullmatch("--[a-z-]+=", item):
+            name = item.removesuffix("=") or (before if before.startswith("--") else "argument")
+            raise ParameterError(
+                f"{name}: expected a value, got an empty text, as of a variable without value"
+            )
 
 
 MIN_COLUMNS = 40

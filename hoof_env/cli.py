@@ -14,16 +14,17 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 
-from hoof_env._output import bear_any_output, flush_or_drop
+from hoof_env._output import bear_any_output, check_arguments, flush_or_drop
 from hoof_env._version import __version__
 from hoof_env.commands.lab import average, compare
+from hoof_env.commands.leg import lengths
 from hoof_env.commands.manual import manual
 from hoof_env.commands.options import parse
 from hoof_env.commands.played import USUAL, Played
 from hoof_env.commands.policies import demo, evaluate, list_ids
 from hoof_env.commands.said import say as _say
 from hoof_env.commands.said import size as _size
-from hoof_env.errors import HoofEnvError
+from hoof_env.errors import HoofEnvError, bounded, printable
 
 
 def reproduce(out: Path, figures: bool = True, preset: str | None = None) -> None:
@@ -173,7 +174,8 @@ def mjcf(
             the hip of the preset.
         motor: drive the crank by the package's default motor; otherwise it turns freely.
         ground: add a floor with the friction of the preset's ground, on which MuJoCo's own contact acts.
-        theta, swing: crank angle and swing of the pose in which the model begins [rad].
+        theta, swing: crank angle and swing of the pose in which the model begins [rad], which the commands of
+            the keyframe "pose" hold.
         overwrite: replace an existing file.
     """
     from hoof_env._output import check_new, new_file
@@ -200,7 +202,8 @@ def mjcf(
 
 
 COMMANDS: dict[str, Callable[..., None]] = {
-    command.__name__: command for command in (reproduce, render, view, export, compare, average, manual, mjcf)
+    command.__name__: command
+    for command in (reproduce, render, view, export, compare, average, manual, lengths, mjcf)
 } | {"evaluate": evaluate, "list": list_ids, "demo": demo}
 """Functions by sub-command, in the order of the help."""
 
@@ -224,7 +227,7 @@ def _with_axes(arguments: list[str]) -> list[str]:
 def _warnings_of_one_line() -> Iterator[None]:
     """Make warnings print their words alone, without the place in the code."""
     usual = warnings.formatwarning
-    warnings.formatwarning = lambda message, *_, **__: f"hoof-env: warning: {message}\n"
+    warnings.formatwarning = lambda message, *_, **__: f"hoof-env: warning: {bounded(str(message))}\n"
     try:
         yield
     finally:
@@ -242,6 +245,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     if not {"", os.getcwd()} & set(sys.path):
         sys.path.append(os.getcwd())
     try:
+        check_arguments(options)
         about = "A horse's leg, or a horse, on the ground. --version prints the version."
         with _warnings_of_one_line():
             parse(COMMANDS, options, "hoof-env", about)
@@ -257,10 +261,16 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except OSError as error:
         # The disk that takes our output is full.
         flush_or_drop()
-        print(f"hoof-env: error: cannot write the output: {error.strerror or error}", file=sys.stderr)
+        print(
+            f"hoof-env: error: cannot write the output: {printable(error.strerror or str(error))}",
+            file=sys.stderr,
+        )
         return 2
     except RecursionError:
         print("hoof-env: error: a file or an argument is nested too deep", file=sys.stderr)
+        return 2
+    except MemoryError as error:
+        print(f"hoof-env: error: there is not enough memory; {error}".rstrip("; "), file=sys.stderr)
         return 2
     except KeyboardInterrupt:
         print("interrupted", file=sys.stderr)

@@ -7,15 +7,97 @@ from __future__ import annotations
 
 import json
 import math
+import reprlib
+import unicodedata
 from collections.abc import Iterable, Sequence
 from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+MAX_LINES = 20
+"""Largest number of lines of a message."""
+
+MAX_LETTERS = 2000
+"""Largest number of letters of a message, about as many as twenty lines of a terminal hold."""
+
+MAX_VALUE_LETTERS = 200
+"""Largest number of letters of a value in a message."""
+
+
+GYMNASIUM_ADDS = " was raised from the environment creator for"
+"""Begin of what `gymnasium.make` adds to a message: the id, and all arguments at any length."""
+
+
+def printable(text: str) -> str:
+    """Return a text whose control characters, such as the escape sequences of a file's name, are written as
+    escapes; line breaks and tabs stay."""
+    if text.isprintable():
+        return text
+    return "".join(
+        letter
+        if letter.isprintable() or letter in "\n\t" or unicodedata.category(letter) == "Zs"
+        else letter.encode("unicode_escape").decode()
+        for letter in text
+    )
+
+
+class _Brief(reprlib.Repr):
+    """Texts of values that are too long for a message: the begin of rows, and the types of objects."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.maxlist = self.maxtuple = self.maxdict = self.maxset = 4
+        self.maxstring = 60
+        self.maxlevel = 3
+
+    def repr_ndarray(self, x: NDArray[Any], level: int) -> str:
+        return f"array of shape {x.shape}"
+
+    def repr_instance(self, x: Any, level: int) -> str:
+        text = repr(x)
+        return text if len(text) <= self.maxstring and "\n" not in text else f"{type(x).__name__}(...)"
+
+
+def brief(value: Any) -> str:
+    """Return a value for a message: one that is long loses its middle, and a large object is only named.
+
+    >>> brief([0.5] * 1000)
+    '[0.5, 0.5, 0.5, 0.5, ...]'
+    """
+    try:
+        text = repr(value)
+    # The object is a user's, whose text may fail in any way.
+    except Exception:
+        return f"{type(value).__name__}(...)"
+    if not isinstance(value, str):
+        text = " ".join(text.split())
+    if len(text) > MAX_VALUE_LETTERS:
+        text = _Brief().repr(value)
+    return text if len(text) <= MAX_VALUE_LETTERS else f"{text[:MAX_VALUE_LETTERS]}..."
+
+
+def bounded(text: str) -> str:
+    """Return a message that prints, of at most `MAX_LINES` and `MAX_LETTERS`, without what Gymnasium adds:
+    a longer one loses its middle."""
+    text = printable(text.partition(GYMNASIUM_ADDS)[0])
+    lines = text.split("\n")
+    if len(lines) > MAX_LINES:
+        first, last = lines[: MAX_LINES - 6], lines[-5:]
+        left_out = len(lines) - len(first) - len(last)
+        text = "\n".join([*first, f"... ({left_out} lines are left out)", *last])
+    if len(text) > MAX_LETTERS:
+        first_letters, last_letters = text[: MAX_LETTERS - 600], text[-500:]
+        left_out = len(text) - len(first_letters) - len(last_letters)
+        text = f"{first_letters}... ({left_out} letters are left out) ...{last_letters}"
+    return text
+
 
 class HoofEnvError(Exception):
-    """Base class of every error that this package raises on purpose."""
+    """Base class of every error that this package raises on purpose; a message is `bounded`."""
+
+    def __init__(self, *args: Any) -> None:
+        super().__init__(*(bounded(part) if isinstance(part, str) else part for part in args))
 
 
 class ParameterError(HoofEnvError, ValueError):
@@ -81,9 +163,9 @@ def check_number(
         number = np.nan
     if not (math.isfinite(number) and low <= number <= high) or (exclusive_low and number == low):
         bounds = f"{'(' if exclusive_low else '['}{low:g}, {high:g}]"
-        raise ParameterError(f"{name}: expected a finite number in {bounds}, got {value!r}")
+        raise ParameterError(f"{name}: expected a finite number in {bounds}, got {brief(value)}")
     if exclusive_low and low == 0 and number < MIN_POSITIVE:
-        raise ParameterError(f"{name}: expected {MIN_POSITIVE:g} or more, got {value!r}")
+        raise ParameterError(f"{name}: expected {MIN_POSITIVE:g} or more, got {brief(value)}")
     return number
 
 
@@ -91,7 +173,7 @@ def check_choice(name: str, value: Any, choices: Iterable[str]) -> str:
     """Return `value`, or raise `ParameterError` unless it is one of `choices`."""
     known = sorted(choices)
     if not isinstance(value, str) or value not in known:
-        raise ParameterError(f"{name}: expected one of {', '.join(known)}, got {value!r}")
+        raise ParameterError(f"{name}: expected one of {', '.join(known)}, got {brief(value)}")
     return value
 
 
@@ -133,8 +215,7 @@ def parse_pairs(option: str, items: Sequence[str]) -> dict[str, Any]:
                 why = " (nested too deep)"
             else:
                 continue
-        given = repr(item) if len(item) <= 200 else f"{item[:200]!r}... ({len(item)} characters)"
-        raise ParameterError(f"{option}: expected a JSON object or key=value, got {given}{why}")
+        raise ParameterError(f"{option}: expected a JSON object or key=value, got {brief(item)}{why}")
     return pairs
 
 
@@ -147,9 +228,9 @@ MAX_FLOAT = float(np.finfo(np.float64).max)
 def count(name: str, value: Any, low: int = 1, most: float = np.inf) -> int:
     """Return `value` as an int; raise `ParameterError` unless it is a whole number from `low` to `most`."""
     if isinstance(value, (bool, np.bool_)) or not isinstance(value, (int, np.integer)) or value < low:
-        raise ParameterError(f"{name}: expected a whole number, {low} or more, got {value!r}")
+        raise ParameterError(f"{name}: expected a whole number, {low} or more, got {brief(value)}")
     if value > most:
-        raise ParameterError(f"{name}: expected at most {most:g}, got {value!r}")
+        raise ParameterError(f"{name}: expected at most {most:g}, got {brief(value)}")
     return int(value)
 
 
@@ -167,7 +248,7 @@ def spread(name: str, value: ArrayLike, shape: tuple[int, ...], most: float = np
     try:
         return np.broadcast_to(numbers, shape)
     except ValueError:
-        raise ParameterError(f"{name}: expected numbers that fit shape {shape}, got {value!r}") from None
+        raise ParameterError(f"{name}: expected numbers that fit shape {shape}, got {brief(value)}") from None
 
 
 def finite(name: str, value: Any, most: float = np.inf) -> Floats:
@@ -181,8 +262,8 @@ def finite(name: str, value: Any, most: float = np.inf) -> Floats:
     if (np.abs(numbers) <= min(most, MAX_FLOAT)).all():
         return numbers
     if not np.isfinite(numbers).all():
-        raise ParameterError(f"{name}: expected finite numbers, got {value!r}")
-    raise ParameterError(f"{name}: expected numbers within +-{most:g}, got {value!r}")
+        raise ParameterError(f"{name}: expected finite numbers, got {brief(value)}")
+    raise ParameterError(f"{name}: expected numbers within +-{most:g}, got {brief(value)}")
 
 
 def _doubles(values: NDArray[Any]) -> Floats:
@@ -197,7 +278,7 @@ def _doubles(values: NDArray[Any]) -> Floats:
 def one_of(name: str, value: Any, kind: type[Kind]) -> Kind:
     """Return `value`; raise `ParameterError` unless it is a `kind`."""
     if not isinstance(value, kind):
-        raise ParameterError(f"{name}: expected {kind.__name__}, got {value!r}")
+        raise ParameterError(f"{name}: expected {kind.__name__}, got {brief(value)}")
     return value
 
 
@@ -209,12 +290,12 @@ def all_of(name: str, values: Any, kind: type[Kind]) -> tuple[Kind, ...]:
     except TypeError:
         several = ()
     if not several or not all(isinstance(value, kind) for value in several):
-        raise ParameterError(f"{name}: expected {kind.__name__}, one or more, got {values!r}")
+        raise ParameterError(f"{name}: expected {kind.__name__}, one or more, got {brief(values)}")
     return several
 
 
 def flag(name: str, value: Any) -> bool:
     """Return `value` as a bool; raise `ParameterError` unless it is True or False."""
     if not isinstance(value, (bool, np.bool_)):
-        raise ParameterError(f"{name}: expected True or False, got {value!r}")
+        raise ParameterError(f"{name}: expected True or False, got {brief(value)}")
     return bool(value)

@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hoof_env import records
+from hoof_env._input import as_path
 from hoof_env._output import staged
 from hoof_env.errors import HoofEnvError, MissingExtraError, ParameterError, check_number, parse_pairs
 from hoof_env.record.columns import Columns
@@ -59,7 +60,7 @@ TELL_SECONDS = 5.0
 """Time between two lines about the progress of a film, on output without a bar [s]."""
 
 
-def check_film(path: Path, fps: float) -> None:
+def check_film(path: Path | str, fps: float) -> None:
     """Check that a film can be written.
 
     Args:
@@ -70,6 +71,7 @@ def check_film(path: Path, fps: float) -> None:
         ParameterError: the rate is out of range, or not one of a GIF, which counts hundredths of a second.
         HoofEnvError: pygame, imageio-ffmpeg or ffmpeg is missing.
     """
+    path = as_path("path", path)
     check_number("fps", fps, low=0, high=1000, exclusive_low=True)
     needed = {"pygame": ("pygame-ce", "render"), "imageio_ffmpeg": ("imageio-ffmpeg", "video")}
     missing = [names for module, names in needed.items() if find_spec(module) is None]
@@ -138,7 +140,7 @@ def frames(
                     yield frame
 
 
-def write_film(pictures: Iterable[NDArray[np.uint8]], path: Path, fps: float) -> int:
+def write_film(pictures: Iterable[NDArray[np.uint8]], path: Path | str, fps: float) -> int:
     """Write pictures to a film; an older file is replaced when the new one is complete.
 
     Args:
@@ -153,6 +155,7 @@ def write_film(pictures: Iterable[NDArray[np.uint8]], path: Path, fps: float) ->
         OutputError: the folder cannot be written, or the disk is full.
         ParameterError, HoofEnvError: as in `check_film`.
     """
+    path = as_path("path", path)
     check_film(path, fps)
     with staged(path.parent) as stage:
         writer: Any = None
@@ -203,7 +206,7 @@ def _writer(path: Path, shape: tuple[int, ...], fps: float) -> Any:
 
 
 def render_episode(
-    path: Path,
+    path: Path | str,
     policy: str | None,
     env_id: str,
     arguments: Sequence[str] = (),
@@ -232,6 +235,7 @@ def render_episode(
     Raises:
         HoofEnvError: a subclass as in `records.make_env`, `records.find_policy` and `write_film`.
     """
+    path = as_path("path", path)
     from hoof_env.render.renderer import Renderer
 
     records.check_place(path, FFMPEG)
@@ -244,7 +248,8 @@ def render_episode(
         renderer = Renderer(records.surroundings(env), size=size)
         played = records.episode(env, player, seed, seconds)
         pictures = frames(renderer, played, fps, slow)
-        count = write_film(_with_progress(pictures, round(seconds * slow * fps) + 1), path, fps)
+        most = round(records.longest_of(env, seconds) * slow * fps) + 1
+        count = write_film(_with_progress(pictures, most), path, fps)
     return count
 
 

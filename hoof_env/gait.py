@@ -13,7 +13,7 @@ from typing import Any, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from hoof_env.errors import ParameterError, check_choice, check_number
+from hoof_env.errors import ParameterError, brief, check_choice, check_number
 from hoof_env.leg.geometry import Geometry, load_geometry
 from hoof_env.leg.presets import DEFAULT_PRESET, Preset, preset_error_type, preset_label, read_preset
 
@@ -156,7 +156,7 @@ class HarmonicGait(GaitParameters):
         if len(higher) not in (2, 4):
             raise ParameterError(
                 "higher: expected the sine and cosine coefficients of the second harmonic, or of the second "
-                f"and the third, got {values!r}"
+                f"and the third, got {brief(values)}"
             )
         low, high = WIDEST["higher"]
         numbers = (check_number(f"higher[{k}]", x, low=low, high=high) for k, x in enumerate(higher))
@@ -190,7 +190,8 @@ def gait_array(gait: GaitParameters, harmonics: int) -> NDArray[np.float64]:
     values = gait.to_array()
     if len(values) > 2 + 2 * harmonics:
         raise ParameterError(
-            f"gait: expected a swing of at most {harmonics} harmonic{'s' * (harmonics > 1)}, got {gait!r}"
+            f"gait: expected a swing of at most {harmonics} harmonic{'s' * (harmonics > 1)}, got"
+            f" {brief(gait)}"
         )
     return np.append(values, np.zeros(2 + 2 * harmonics - len(values)))
 
@@ -233,7 +234,7 @@ def load_gait(name: str, preset: Preset = DEFAULT_PRESET) -> GaitParameters:
     except TypeError:
         raise preset_error_type(preset)(
             f"{preset_label(preset)}, gait {name!r}: expected {', '.join(PARAMETERS)}, perhaps higher, "
-            f"got {gaits[name]!r}"
+            f"got {brief(gaits[name])}"
         ) from None
     except ParameterError as error:
         raise ParameterError(f"{preset_label(preset)}, gait {name!r}: {error}") from None
@@ -253,11 +254,11 @@ def _read_gaits(preset: Preset) -> dict[str, Any]:
     gaits = read_preset(preset).get("gaits")
     if not isinstance(gaits, Mapping) or not gaits:
         raise preset_error_type(preset)(
-            f"{preset_label(preset)}: expected an object 'gaits' with at least one gait, got {gaits!r}"
+            f"{preset_label(preset)}: expected an object 'gaits' with at least one gait, got {brief(gaits)}"
         )
     if not all(isinstance(name, str) for name in gaits):
         raise preset_error_type(preset)(
-            f"{preset_label(preset)}: gaits: expected names that are texts, got {[*gaits]!r}"
+            f"{preset_label(preset)}: gaits: expected names that are texts, got {brief([*gaits])}"
         )
     return dict(gaits)
 

@@ -19,14 +19,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 import hoof_env
+from hoof_env._input import as_path
 from hoof_env._output import check_folder, free_memory, staged
 from hoof_env.envs import made
 from hoof_env.envs.base import LegBase
-from hoof_env.envs.policies import start_of
 from hoof_env.errors import (
     MissingExtraError,
     OutputError,
     ParameterError,
+    brief,
     check_choice,
     check_number,
     parse_pairs,
@@ -36,6 +37,7 @@ from hoof_env.lab.forces import THRESHOLD, above_threshold, in_units, limbs_of, 
 from hoof_env.lab.forces import UNITS as FORCE_UNITS
 from hoof_env.lab.opensim import check_bodies, loads_path, write_mot
 from hoof_env.lab.reactions import JointReactions, reaction_units
+from hoof_env.policies.actor import Actor
 from hoof_env.policies.find import default_policy as default_policy
 from hoof_env.policies.find import find_policy as find_policy
 from hoof_env.record.columns import RECORD, Columns, body_units, joined
@@ -96,24 +98,23 @@ def episode(
 
     Args:
         env: the environment.
-        policy: object with Stable-Baselines3's `predict`.
+        policy: what `load_policy` takes.
         seed, options: arguments of `reset`.
         seconds: time after which the episode is stopped [s]; None plays it to its end.
         joints: adds columns of joint reactions.
     """
     if seconds is not None:
         check_number("seconds", seconds, low=0, exclusive_low=True)
-    observation, _ = env.reset(seed=seed, options=start_of(policy) | dict(options or {}))
+    actor = Actor(policy, env, seed)
+    observation, _ = env.reset(seed=seed, options=actor.start | dict(options or {}))
     columns = substeps(env)
     yield columns | (_named(env, joints.now()) if joints else {})
-    start = np.ones(1, bool)
     ended = False
     # Times are sums of steps, and rounding must not add a step.
     while not ended and (seconds is None or columns["time"][-1] < seconds - 1e-9):
-        action, _ = policy.predict(observation, episode_start=start, deterministic=True)
+        action = actor.act(observation)
         began = joints.before() if joints else None
         observation, _, failed, truncated, _ = env.step(action)
-        start = np.zeros(1, bool)
         ended = failed or truncated
         before = columns["time"][-1]
         columns = substeps(env)
@@ -213,22 +214,24 @@ def describe(env: gym.Env[Any, Any], **about: Any) -> dict[str, Any]:
     }
 
 
-def check_place(path: Path, suffixes: Iterable[str]) -> None:
+def check_place(path: Path | str, suffixes: Iterable[str]) -> None:
     """Raise `ParameterError` unless the suffix of a path is one of `suffixes`, and `OutputError` if it is a
     folder or its folder cannot be written."""
+    path = as_path("path", path)
     known = sorted(suffixes)
     if path.suffix.lower() not in known:
-        raise ParameterError(f"out: expected a file that ends in {', '.join(known)}, got {str(path)!r}")
+        raise ParameterError(f"out: expected a file that ends in {', '.join(known)}, got {brief(str(path))}")
     if path.is_dir():
         raise OutputError(f"cannot write to {str(path)!r}: expected a file, got a folder")
     check_folder(path.parent)
 
 
-def write_csv(record: Columns, about: Mapping[str, Any], path: Path) -> None:
+def write_csv(record: Columns, about: Mapping[str, Any], path: Path | str) -> None:
     """Write a CSV file with one row for each substep under one line of names and units.
 
     Numbers keep their bits. With forces in body weights there is a column `weight` [N], the same in all rows.
     """
+    path = as_path("path", path)
     units = dict(about["units"])
     # A CSV file has no other place for the weight, which converts body weights to newtons.
     if "BW" in units.values():
@@ -240,9 +243,10 @@ def write_csv(record: Columns, about: Mapping[str, Any], path: Path) -> None:
     np.savetxt(path, table, "%.17g", delimiter=",", header=header, comments="", encoding="utf-8")
 
 
-def write_parquet(record: Columns, about: Mapping[str, Any], path: Path) -> None:
+def write_parquet(record: Columns, about: Mapping[str, Any], path: Path | str) -> None:
     """Write a Parquet file of float64. The metadata of a field have its "unit", the schema's have `about` as
     JSON under "hoof_env"."""
+    path = as_path("path", path)
     import pyarrow as pa
     from pyarrow import parquet
 
@@ -269,9 +273,10 @@ NEWTONS = (*OPENSIM, ".c3d")
 """Formats with forces in newtons, which their readers expect."""
 
 
-def check_export(path: Path) -> None:
+def check_export(path: Path | str) -> None:
     """Check that `write` can write to a path, before an episode is played. Raise the errors of `check_place`,
     and `MissingExtraError` if the format needs a package that is not installed."""
+    path = as_path("path", path)
     check_place(path, WRITERS)
     if path.suffix.lower() == ".c3d":
         ezc3d()
@@ -282,18 +287,20 @@ def check_export(path: Path) -> None:
             raise MissingExtraError('Parquet needs pyarrow: pip install "hoof-env[export]"') from None
 
 
-def files_of(path: Path) -> list[Path]:
+def files_of(path: Path | str) -> list[Path]:
     """Return the paths of the files that `write` writes: the record and, in OpenSim's formats, the
     ExternalLoads XML."""
+    path = as_path("path", path)
     return [path, loads_path(path)] if path.suffix.lower() in OPENSIM else [path]
 
 
-def write(record: Columns, about: Mapping[str, Any], path: Path) -> Path:
+def write(record: Columns, about: Mapping[str, Any], path: Path | str) -> Path:
     """Write the results of `record_episode` and `describe` in the format of the path's suffix.
 
     Older files are replaced when all new ones are complete. Errors are those of `check_export`, and
     `ParameterError` if the record does not fit into the format.
     """
+    path = as_path("path", path)
     check_export(path)
     with staged(path.parent) as stage:
         WRITERS[path.suffix.lower()](record, about, stage / path.name)
@@ -301,7 +308,7 @@ def write(record: Columns, about: Mapping[str, Any], path: Path) -> Path:
 
 
 def export_episode(
-    path: Path,
+    path: Path | str,
     policy: str | None,
     env_id: str,
     arguments: Sequence[str] = (),
@@ -327,6 +334,7 @@ def export_episode(
     Raises:
         HoofEnvError: a subclass, as in `make_env`, `find_policy` and, before the episode is played, `write`.
     """
+    path = as_path("path", path)
     # All arguments are checked first: an episode may take long.
     check_export(path)
     suffix = path.suffix.lower()

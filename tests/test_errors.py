@@ -3,18 +3,24 @@
 from decimal import Decimal
 from fractions import Fraction
 
+import gymnasium as gym
 import numpy as np
 import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
+from hoof_env import Terrain
 from hoof_env.errors import (
+    MAX_LETTERS,
+    MAX_LINES,
     MIN_POSITIVE,
     DataFileError,
     GeometryError,
     HoofEnvError,
+    MissingExtraError,
     OutputError,
     ParameterError,
+    brief,
     check_choice,
     check_number,
     finite,
@@ -116,3 +122,56 @@ def test_a_positive_number_is_not_so_small_that_quotients_are_none():
         check_number("mass", 5e-324, low=0, exclusive_low=True)
     assert check_number("mass", 1e-12, low=0, exclusive_low=True) == 1e-12
     assert check_number("speed", 5e-324, low=0) == 5e-324
+
+
+class Large:
+    """Object whose text is long."""
+
+    def __repr__(self):
+        return f"Large({'0.5, ' * 100_000})"
+
+
+class Broken:
+    """Object without a text."""
+
+    def __repr__(self):
+        raise RuntimeError
+
+
+@pytest.mark.parametrize(
+    ("value", "text"),
+    [
+        (3, "3"), ("run", "'run'"), ([1, 2.5], "[1, 2.5]"), (None, "None"),
+        (np.eye(2), "array([[1., 0.], [0., 1.]])"),
+        (Large(), "Large(...)"), (Broken(), "Broken(...)"), ([Large()], "[Large(...)]"),
+        ({"terrain": Large()}, "{'terrain': Large(...)}"), ([0.5] * 1000, "[0.5, 0.5, 0.5, 0.5, ...]"),
+        (np.zeros((50, 40)) + np.arange(40), "array of shape (50, 40)"),
+        ([[1.5] * 500] * 2, "[[1.5, 1.5, 1.5, 1.5, ...], [1.5, 1.5, 1.5, 1.5, ...]]"),
+    ],
+)  # fmt: skip
+def test_a_value_is_shown_briefly_and_a_large_object_named(value, text):
+    assert brief(value) == text
+
+
+@pytest.mark.parametrize(
+    "kind", [HoofEnvError, ParameterError, DataFileError, OutputError, MissingExtraError]
+)
+def test_a_message_has_an_end_and_no_control_characters(kind):
+    long = str(kind(f"begin {'x' * 600_000} remedy"))
+    assert len(long) <= MAX_LETTERS
+    assert long.startswith("begin x")
+    assert long.endswith("x remedy")
+    lines = str(kind("\n".join(f"line {k}" for k in range(1000)))).split("\n")
+    assert len(lines) == MAX_LINES
+    assert (lines[0], lines[-1]) == ("line 0", "line 999")
+    assert str(kind("record \x1b[31mred\x9b.csv, \udcff: a\nb")) == (
+        "record \\x1b[31mred\\x9b.csv, \\udcff: a\nb"
+    )
+    assert str(kind("speed: expected 1, got 2")) == "speed: expected 1, got 2"
+
+
+def test_what_gymnasium_adds_to_a_message_is_left_out():
+    terrain = Terrain(height=tuple(0.001 * (k % 7) for k in range(20_000)), spacing=0.01)
+    with pytest.raises(ParameterError) as refused:
+        gym.make("hoof_env/HorseLeg-v0", terain=terrain)
+    assert str(refused.value).endswith("unexpected keyword argument 'terain'; did you mean terrain?")

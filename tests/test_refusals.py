@@ -85,6 +85,8 @@ REQUESTS = {
         ([*MP4, "--env-kwargs", "render_mode=human"], "render_mode: expected none, as"),
     ],
     "mjcf": [
+        ([*XML, "--theta", "1e308"], r"theta: expected .*1000.*got 1e\+308"),
+        ([*XML, "--swing", "-1e308"], r"swing: expected .* got -1e\+308"),
         (["--out", "{}/x.urdf"], "expected .*.xml, got"),
         ([*XML, "--trunk", "cloud"], "trunk: expected .*, got 'cloud'"),
         ([*XML, "--preset", "nothing"], "preset: expected .*got 'nothing'"),

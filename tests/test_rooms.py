@@ -15,7 +15,13 @@ ROOT = Path(__file__).parents[1]
 
 FLOORS = (
     ("hoof_env/_version.py", "hoof_env/constants.py", "hoof_env/errors.py"),
-    ("hoof_env/_collector.py", "hoof_env/_display.py", "hoof_env/_output.py", "hoof_env/_plotting.py"),
+    (
+        "hoof_env/_collector.py",
+        "hoof_env/_display.py",
+        "hoof_env/_input.py",
+        "hoof_env/_output.py",
+        "hoof_env/_plotting.py",
+    ),
     ("hoof_env/simd",),
     ("hoof_env/leg",),
     ("hoof_env/ground", "hoof_env/gait.py"),

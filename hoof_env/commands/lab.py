@@ -55,6 +55,11 @@ class ComparisonArgs:
     """axis of A's file in which the animal travels, likewise; auto is x."""
     forward_b: str = "auto"
     """axis of B's file in which the animal travels."""
+    gaps_a: str = "auto"
+    """what missing values of A are: zero, or line for lines between their neighbours; auto takes those in
+    swing as 0 and refuses others."""
+    gaps_b: str = "auto"
+    """what missing values of B are."""
     align: str = "stances"
     """stances lays each pair touchdown on touchdown, shift shifts B as a whole, none takes the times of the
     files."""
@@ -79,12 +84,10 @@ def compare(args: Annotated[ComparisonArgs, arg(name="")]) -> None:
     check_picture(args.out)
     map_a = parse_mapping("--map-a", args.map_a)
     map_b = parse_mapping("--map-b", args.map_b)
-    a = read_record(
-        args.a, map_a, args.units_a, args.reverse_a, args.rate_a, args.mass_a, args.up_a, args.forward_a
-    )
-    b = read_record(
-        args.b, map_b, args.units_b, args.reverse_b, args.rate_b, args.mass_b, args.up_b, args.forward_b
-    )
+    of_a = (map_a, args.units_a, args.reverse_a, args.rate_a, args.mass_a)
+    of_b = (map_b, args.units_b, args.reverse_b, args.rate_b, args.mass_b)
+    a = read_record(args.a, *of_a, args.up_a, args.forward_a, args.gaps_a)
+    b = read_record(args.b, *of_b, args.up_b, args.forward_b, args.gaps_b)
     comparison = compare(a, b, args.align, args.threshold, args.units)
     say(f"{report(comparison)}\n")
     with new_file(args.out, args.overwrite) as file:
@@ -115,6 +118,8 @@ class AverageArgs:
     """axis of the files that points upward, as --up-a of `hoof-env compare`."""
     forward: str = "auto"
     """axis of the files in which the animal travels."""
+    gaps: str = "auto"
+    """what missing values are, as --gaps-a of `hoof-env compare`."""
     threshold: float | None = None
     """vertical force that makes a stance [N]; 20, or 1 % of the weight if forces are in body weights and the
     weight is unknown."""
@@ -122,6 +127,9 @@ class AverageArgs:
     """unit of the table: N or BW; auto is N if all files can be in N."""
     points: int = 101
     """rows of the table, from touchdown to lift-off."""
+    drop: tuple[str, ...] = ()
+    """stances to be left out: first, the first of each file, as that of an episode depends on its start; odd,
+    those that differ from the median duration by more than 25 %."""
     overwrite: bool = False
     """replace an existing table."""
 
@@ -139,16 +147,21 @@ def average(args: Annotated[AverageArgs, arg(name="")]) -> None:
     check_folder(args.out.parent)
     mapping = parse_mapping("--map", args.map)
     try:
-        trials = [
-            read_record(
-                file, mapping, args.units_in, args.reverse, args.rate, args.mass, args.up, args.forward
-            )
-            for file in args.records
-        ]
+        of_all = (
+            mapping,
+            args.units_in,
+            args.reverse,
+            args.rate,
+            args.mass,
+            args.up,
+            args.forward,
+            args.gaps,
+        )
+        trials = [read_record(file, *of_all) for file in args.records]
     except HoofEnvError as error:
         # Its message names the options of `compare`, which end in -a and -b.
         raise type(error)(for_one(str(error), "").replace("--units", "--units-in")) from None
-    stances = mean.average(trials, args.threshold, args.units, args.points)
+    stances = mean.average(trials, args.threshold, args.units, args.points, args.drop)
     say(f"{mean.report(stances)}\n")
     with new_file(args.out, args.overwrite) as file:
         mean.write_table(stances, file)

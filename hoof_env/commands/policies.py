@@ -6,7 +6,7 @@ from importlib.util import find_spec
 from pathlib import Path
 
 from hoof_env.commands.said import say, size
-from hoof_env.errors import ParameterError, parse_pairs
+from hoof_env.errors import ParameterError, brief, parse_pairs
 
 EXTRAS = {
     "render": "pygame",
@@ -80,7 +80,7 @@ def list_ids(env_id: str | None = None) -> None:
 
     known = summaries()
     if env_id is not None and env_id not in known:
-        raise ParameterError(f"env_id: expected one of {', '.join(known)}, got {env_id!r}")
+        raise ParameterError(f"env_id: expected one of {', '.join(known)}, got {brief(env_id)}")
     for name in known if env_id is None else [env_id]:
         ships = shipped_policy(name)
         sizes = f"{ships.action_space.shape[0]} actions, {ships.observation_space.shape[0]} observations"

@@ -4,10 +4,13 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from hoof_env.errors import printable
+
 
 def say(line: str) -> None:
-    """Print a line at once, also where the output is a pipe."""
-    print(line, flush=True)
+    """Print a line at once, also where the output is a pipe; control characters, as of a file's name, become
+    escapes."""
+    print(printable(line), flush=True)
 
 
 def size(path: Path) -> str:

@@ -13,6 +13,7 @@ from dataclasses import replace
 from importlib.util import find_spec
 from pathlib import Path
 
+from hoof_env._input import as_path
 from hoof_env._output import check_folder, staged
 from hoof_env.demo.report import OPEN_LOOP, Report, data_uri
 from hoof_env.errors import MissingExtraError
@@ -42,7 +43,7 @@ EXTRAS = {"plot": ("matplotlib", "jinja2"), "render": ("pygame",), "video": ("im
 """Modules of the extras that the demonstration needs."""
 
 
-def demo(out: Path, quick: bool = False, say: Say = print, overwrite: bool = True) -> Path:
+def demo(out: Path | str, quick: bool = False, say: Say = print, overwrite: bool = True) -> Path:
     """Make the report, and return its path.
 
     Args:
@@ -56,6 +57,7 @@ def demo(out: Path, quick: bool = False, say: Say = print, overwrite: bool = Tru
         OutputError: the folder cannot be written, or there is another report.
         HoofEnvError: an extra is missing.
     """
+    out = as_path("out", out)
     check_folder(out)
     check_extras()
     check_film(out / "film.mp4", 50.0)

@@ -46,6 +46,7 @@ from hoof_env.errors import (
     NotStartedError,
     ParameterError,
     all_of,
+    brief,
     check_choice,
     check_number,
     count,
@@ -157,7 +158,7 @@ class TrunkEngine:
         if contact_law is not None and features.has_springs:
             raise ParameterError(
                 "contact_law: expected none beside springs of the hoofs, whose speed follows from a law that "
-                f"is linear in it, got {contact_law!r}"
+                f"is linear in it, got {brief(contact_law)}"
             )
         ground = Ground() if ground is None else one_of("ground", ground, Ground)
         terrain = Terrain.flat() if terrain is None else one_of("terrain", terrain, Terrain)
@@ -803,7 +804,7 @@ class TrunkEngine:
         try:
             values = np.array(column, dtype=np.float64)
         except (TypeError, ValueError):
-            raise ParameterError(f"column: expected numbers, got {column!r}") from None
+            raise ParameterError(f"column: expected numbers, got {brief(column)}") from None
         if values.shape != m.data.shape[:1]:
             raise ParameterError(f"column: expected shape {m.data.shape[:1]}, got {values.shape}")
         parts = memory.memory_of(values[:, None], 1, m.constants, m.reactions[..., :1], m.features)

@@ -16,7 +16,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from hoof_env.errors import Floats, ParameterError, check_choice, check_number
+from hoof_env.errors import Floats, ParameterError, brief, check_choice, check_number
 from hoof_env.ground.contact import Ground
 from hoof_env.ground.terrain import Terrain
 from hoof_env.leg.geometry import Geometry
@@ -193,12 +193,14 @@ class Limits:
                 low = high = math.nan
             # false for NaN, too
             if not low < high:
-                raise ParameterError(f"limits.{name}: expected a lower and a higher bound, got {bounds!r}")
+                raise ParameterError(
+                    f"limits.{name}: expected a lower and a higher bound, got {brief(bounds)}"
+                )
             object.__setattr__(self, name, (low, high))
         # bool is a kind of int to Python, but True is no height
         least: Any = self.clearance
         if isinstance(least, bool) or not isinstance(least, (int, float, np.number)) or math.isnan(least):
-            raise ParameterError(f"limits.clearance: expected a number, got {least!r}")
+            raise ParameterError(f"limits.clearance: expected a number, got {brief(least)}")
 
 
 MAX_HIP_OFFSET = 1e3
@@ -226,16 +228,16 @@ class Limb:
 
     def __post_init__(self) -> None:
         if self.spring is not None and not isinstance(self.spring, HoofSpring):
-            raise ParameterError(f"limb.spring: expected a HoofSpring or None, got {self.spring!r}")
+            raise ParameterError(f"limb.spring: expected a HoofSpring or None, got {brief(self.spring)}")
         if not isinstance(self.geometry, Geometry):
-            raise ParameterError(f"limb.geometry: expected a Geometry, got {self.geometry!r}")
+            raise ParameterError(f"limb.geometry: expected a Geometry, got {brief(self.geometry)}")
         if not isinstance(self.drive, (Prescribed, Motor)):
-            raise ParameterError(f"limb.drive: expected a Motor or Prescribed, got {self.drive!r}")
+            raise ParameterError(f"limb.drive: expected a Motor or Prescribed, got {brief(self.drive)}")
         try:
             x, y = self.hip
         except (TypeError, ValueError):
             raise ParameterError(
-                f"limb.hip: expected two numbers (x, y) in metres, got {self.hip!r}"
+                f"limb.hip: expected two numbers (x, y) in metres, got {brief(self.hip)}"
             ) from None
         for k, value in enumerate((x, y)):
             check_number(f"limb.hip[{k}]", value, low=-MAX_HIP_OFFSET, high=MAX_HIP_OFFSET)

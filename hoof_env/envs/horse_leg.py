@@ -22,7 +22,7 @@ from hoof_env.episodes.infos import name_columns
 from hoof_env.episodes.states import check_single, set_state
 from hoof_env.episodes.step import SOME_SWITCHED
 from hoof_env.episodes.summaries import ending_of
-from hoof_env.errors import ParameterError, count, flag
+from hoof_env.errors import ParameterError, brief, count, flag
 from hoof_env.render.size import USUAL_SIZE
 from hoof_env.simd.compile import BLOCKS
 from hoof_env.tasks.episode import FAILED
@@ -220,7 +220,7 @@ class HorseLegEnv(LegBase, gym.Env[NDArray[np.float32], NDArray[np.float32]]):
         array = array_of("action", action)
         count = len(self.action_names)
         if array.shape != (count,) or array.dtype.kind not in "fiu":
-            raise ParameterError(f"action: expected {count} finite numbers in [-1, 1], got {action!r}")
+            raise ParameterError(f"action: expected {count} finite numbers in [-1, 1], got {brief(action)}")
         with np.errstate(over="ignore"):  # to infinity, which the kernel refuses
             self.batch.rows.actions[0] = array
 

@@ -7,7 +7,7 @@ from typing import Any
 
 import gymnasium as gym
 
-from hoof_env.errors import ParameterError
+from hoof_env.errors import ParameterError, brief
 
 
 def make_env(env_id: str, **kwargs: Any) -> gym.Env[Any, Any]:
@@ -15,13 +15,12 @@ def make_env(env_id: str, **kwargs: Any) -> gym.Env[Any, Any]:
     take."""
     try:
         return gym.make(env_id, **kwargs)
-    except ParameterError as error:
-        # Gymnasium puts the name of the id and all arguments behind an error of an argument
-        raise type(error)(str(error).partition(" was raised from the environment creator")[0]) from None
+    except ParameterError as error:  # first, because `UnknownArgumentError` is a TypeError, too
+        raise error from None
     except (gym.error.Error, ModuleNotFoundError, TypeError) as error:
         raise ParameterError(
-            f"environment {env_id!r} with {kwargs or 'no arguments'}: expected a registered id and arguments "
-            f"that it takes: {str(error).rstrip('. ')}{_alike(env_id)}"
+            f"environment {env_id!r} with {brief(kwargs) if kwargs else 'no arguments'}: expected a "
+            f"registered id and arguments that it takes: {str(error).rstrip('. ')}{_alike(env_id)}"
         ) from None
 
 

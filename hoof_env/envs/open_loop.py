@@ -24,9 +24,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from hoof_env._input import as_path, read_text
 from hoof_env._version import __version__
 from hoof_env.envs.policies import STANDS_FOR, Scripted, towards
-from hoof_env.errors import DataFileError, ParameterError, parse_json
+from hoof_env.errors import DataFileError, ParameterError, bounded, brief, parse_json
 
 Floats = NDArray[np.float64]
 
@@ -38,6 +39,9 @@ GAITS = Path(__file__).parents[1] / "data" / "gaits"
 """Folder of the gaits of the package, which `agents.open_loop` found."""
 
 FAMILIES = ("constant", "phase")
+
+MAX_NUMBER = 1e6
+"""Largest absolute value of a number in a file."""
 
 BLIND = ("crank", "gait", "target", "offset")
 """Groups of observations that no force changes while the drive is prescribed."""
@@ -159,38 +163,49 @@ def _phase_gait(parameters: Mapping[str, Any], env: Any, blind: bool) -> Any:
     return numbers_at
 
 
-def open_loop_record(path: Path) -> dict[str, Any]:
+def open_loop_record(path: Path | str) -> dict[str, Any]:
     """Read the file of a gait, which `agents.open_loop` writes: a mapping with "parameters" of one
     environment as `open_loop` takes them, and their "form".
 
     Raises:
         DataFileError: not such a file, or one of another form.
     """
+    path = as_path("path", path)
     try:
-        record: dict[str, Any] = parse_json(path.read_text(encoding="utf-8"))
+        record: dict[str, Any] = parse_json(read_text(path))
         parameters = record["parameters"]
         if set(parameters) not in ({"constant"}, {"coefficients"}, {"coefficients", "frequency_hz"}):
             raise ValueError(f"parameters {sorted(parameters)}")
         for name, value in parameters.items():
-            numbers = np.asarray(value)
-            if not (_has_shape(name, numbers.shape) and numbers.dtype.kind in "if"):
-                raise ValueError(f"{name} {value!r}")
-            if not np.isfinite(numbers).all() or (name == "frequency_hz" and not 0 < numbers <= 1e3):
-                raise ValueError(f"{name} {value!r}")
+            if not _fits(name, value):
+                raise ValueError(f"{name} {brief(value)}")
+        if not isinstance(record.get("env_id"), str | None):
+            raise TypeError(f"env_id {brief(record['env_id'])}")
         for name in ("env_kwargs", "versions"):
             if not isinstance(record.get(name, {}), dict):
-                raise TypeError(f"{name} {record[name]!r}")
+                raise TypeError(f"{name} {brief(record[name])}")
     except (OSError, ValueError, TypeError, KeyError, AttributeError) as error:
         raise DataFileError(
             f"open-loop gait {path}: expected the JSON object of agents.open_loop with form and parameters:"
-            f" {error!r}"
+            f" {getattr(error, 'strerror', None) or error}"
         ) from None
     if not isinstance(record.get("form"), str) or not record["form"].startswith((GAIT, "offsets")):
         raise DataFileError(
             f"open-loop gait {path}: expected form {GAIT!r}, parameters of gaits, or the form of a horse's"
-            f" actions, got {record.get('form')!r}; make one by agents.open_loop"
+            f" actions, got {brief(record.get('form'))}; make one by agents.open_loop"
         )
     return record
+
+
+def _fits(name: str, value: Any) -> bool:
+    """True if a value may be an entry of a file's parameters."""
+    numbers = np.asarray(value, object)
+    if not _has_shape(name, numbers.shape):
+        return False
+    # By type, for True is an int, too.
+    if not all(type(number) in (int, float) and abs(number) <= MAX_NUMBER for number in numbers.flat):
+        return False
+    return name != "frequency_hz" or 0 < value <= 1e3
 
 
 def _has_shape(name: str, shape: Sequence[int]) -> bool:
@@ -236,7 +251,7 @@ def load_open_loop(path_or_env_id: str | Path, env: Any, family: str | None = No
     if record["form"] != form:
         raise DataFileError(
             f"open-loop gait {path}: expected the form {form!r} of {type(bare).__name__}, whose actions are"
-            f" {bare.action_form}, got {record['form']!r}"
+            f" {bare.action_form}, got {brief(record['form'])}"
         )
     here = bare.spec and bare.spec.id
     unlike = []
@@ -247,9 +262,9 @@ def load_open_loop(path_or_env_id: str | Path, env: Any, family: str | None = No
     for key, there in record.get("env_kwargs", {}).items():
         # Through JSON, as the record's value went: tuples are lists there.
         if (present := json.loads(json.dumps(getattr(bare.settings, key, None), default=str))) != there:
-            unlike.append(f"{key}={there!r}, here {present!r}")
+            unlike.append(f"{key}={brief(there)}, here {brief(present)}")
     if unlike:
-        warnings.warn(f"open-loop gait {path}: found for {'; '.join(unlike)}", stacklevel=2)
+        warnings.warn(bounded(f"open-loop gait {path}: found for {'; '.join(unlike)}"), stacklevel=2)
     try:
         return open_loop(record["parameters"], env)
     except ParameterError as error:

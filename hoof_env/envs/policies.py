@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hoof_env._display import line_of
-from hoof_env.errors import ParameterError, check_choice
+from hoof_env.errors import ParameterError, brief, check_choice
 from hoof_env.gait import LIMITS, GaitParameters, paper_gaits
 from hoof_env.leg.profile import leg_profile
 from hoof_env.tasks.leg_starts import extreme_posture
@@ -96,7 +96,7 @@ def heading_seen(env: Any) -> Any:
     if "gait" not in leg.settings.observation:
         raise ParameterError(
             "policy: expected 'gait' among the observed groups, for a policy that goes to a gait must see the"
-            f" present one; got {leg.settings.observation!r}"
+            f" present one; got {brief(leg.settings.observation)}"
         )
     names = leg.observation_names
     first = names.index("crank speed")
@@ -112,7 +112,7 @@ def heading_seen(env: Any) -> Any:
         if not seen.ndim:
             raise ParameterError(
                 f"observation: expected what the environment returned, of shape (..., {len(names)}), for a"
-                f" policy that goes to a gait must see the present one; got {observation!r}"
+                f" policy that goes to a gait must see the present one; got {brief(observation)}"
             )
         gait = body.middle + body.half * seen[..., first:middle]
         return gait + lead * rate_bounds * seen[..., middle:last]
@@ -160,7 +160,7 @@ def make_policy(name: str, env: Any, seed: int = 0) -> Scripted:
     leg: Any = getattr(env, "unwrapped", None)
     if not hasattr(leg, "gaits"):
         raise ParameterError(
-            f"env: expected an environment of this package, make_policy(name, env), got {env!r}"
+            f"env: expected an environment of this package, make_policy(name, env), got {brief(env)}"
         )
     check_choice("policy", name, policy_names(env))
     if leg.task.action_map and name not in ("zero", "random", "bang-bang"):
@@ -227,7 +227,8 @@ def _at_a_posture(name: str, env: Any, middle: float) -> Scripted:
     seen = [f"{function}(crank angle)" for function in ("sin", "cos")]
     if not set(seen) <= set(leg.observation_names):
         raise ParameterError(
-            f"policy {name!r}: expected 'crank' among the observed groups, got {leg.settings.observation!r}"
+            f"policy {name!r}: expected 'crank' among the observed groups, got"
+            f" {brief(leg.settings.observation)}"
         )
     sine, cosine = map(leg.observation_names.index, seen)
     brakes = leg.body.rates[0]

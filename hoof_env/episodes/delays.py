@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hoof_env.episodes.rows import Rows
-from hoof_env.errors import ParameterError, check_number, count
+from hoof_env.errors import ParameterError, brief, check_number, count
 from hoof_env.tasks.parameters import check_range
 from hoof_env.tasks.settings import ResolvedSettings
 
@@ -50,14 +50,14 @@ def check_delay(name: str, given: Any, substeps: int, steps: int) -> Delay:
     if isinstance(given, (list, tuple)):
         low, high = check_range(name, given, 0.0, most)
         if low != round(low) or high != round(high):
-            raise ParameterError(f"{name}: expected whole numbers of a range, got {given!r}")
+            raise ParameterError(f"{name}: expected whole numbers of a range, got {brief(given)}")
         return Delay(round(low), round(high), 0)
     delay = check_number(name, given, low=0.0, high=most)
     whole = math.floor(delay + 1e-9)
     rest = (delay - whole) * substeps
     if abs(rest - round(rest)) > 1e-6:
         raise ParameterError(
-            f"{name}: expected whole substeps, of which a control step has {substeps}, got {given!r}"
+            f"{name}: expected whole substeps, of which a control step has {substeps}, got {brief(given)}"
         )
     return Delay(whole, whole, round(rest))
 
@@ -129,7 +129,7 @@ class Delays:
             delay = check_delay(name, getattr(s, name), substeps, steps_per_episode)
             if delay.substeps and s.solver == "paper":
                 raise ParameterError(
-                    f'{name}: expected whole steps with solver="paper", got {getattr(s, name)!r}'
+                    f'{name}: expected whole steps with solver="paper", got {brief(getattr(s, name))}'
                 )
             return delay
 

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hoof_env.episodes.rows import Rows
-from hoof_env.errors import ParameterError, check_number
+from hoof_env.errors import ParameterError, brief, check_number
 from hoof_env.tasks.settings import ResolvedSettings
 
 MAX_NOISE = 10.0
@@ -34,7 +34,7 @@ def check_noise(name: str, given: Any, groups: Sequence[str]) -> dict[str, float
     if not isinstance(given, Mapping) or not set(given) <= set(groups):
         raise ParameterError(
             f"{name}: expected a mapping with some of the groups that are observed, {', '.join(groups)}; got"
-            f" {given!r}"
+            f" {brief(given)}"
         )
     return {
         group: check_number(f"{name}[{group!r}]", value, low=0, high=MAX_NOISE)

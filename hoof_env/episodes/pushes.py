@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from hoof_env.dynamics.parts import MAX_IMPULSE
 from hoof_env.episodes.rows import Rows
-from hoof_env.errors import ParameterError, check_number
+from hoof_env.errors import ParameterError, brief, check_number
 from hoof_env.tasks.disturbances import MAX_STRENGTH
 from hoof_env.tasks.parameters import check_range
 from hoof_env.tasks.settings import ResolvedSettings
@@ -53,7 +53,7 @@ def check_pushes(name: str, given: Any, dt: float, steps: int) -> tuple[Push, ..
     impulses: dict[int, tuple[float, float]] = {}
     for k, row in enumerate(map(_listed, rows)):
         if not isinstance(row, (list, tuple)) or len(row) != 3:
-            raise ParameterError(f"{name}[{k}]: expected [s, N s forward, N s upward], got {row!r}")
+            raise ParameterError(f"{name}[{k}]: expected [s, N s forward, N s upward], got {brief(row)}")
         last = (steps - 1) * dt
         seconds = check_number(f"{name}[{k}], time", row[0], low=0.0, high=last)
         forward, upward = (
@@ -104,7 +104,7 @@ class Pushes:
         # Intervals shorter than a control step do no harm where nothing is pushed.
         seconds = check_range("push_seconds", s.push_seconds, dt if impulse else 0.0)
         if given and impulse:
-            raise ParameterError(f"pushes: expected none beside a push_impulse, got {s.pushes!r}")
+            raise ParameterError(f"pushes: expected none beside a push_impulse, got {brief(s.pushes)}")
         pushes = cls(given, impulse, seconds, s.trunk, dt, steps_per_episode)
         if impulse:
             pushes.check_trunk("push_impulse", upward=False)

@@ -15,10 +15,9 @@ import gymnasium as gym
 import numpy as np
 
 from hoof_env.envs.made import make_env
-from hoof_env.envs.policies import start_of
 from hoof_env.envs.vector import HorseLegVectorEnv
-from hoof_env.errors import ParameterError
-from hoof_env.policies.find import find_policy
+from hoof_env.policies.actor import Actor
+from hoof_env.policies.find import find_policy, load_policy
 
 ROWS = 1024  # episodes side by side at most; more are played one batch after the other
 
@@ -36,18 +35,17 @@ def play(
     tick: Any = lambda: None,
 ) -> list[dict[str, float]]:
     """Play one episode per seed, with the start of the policy; return the return and the summary of each.
-    `tick` is called after each."""
+    `policy` is what `load_policy` takes, and `tick` is called after each episode."""
+    actor = Actor(policy, env)
     episodes = []
     for seed in seeds:
-        observation, info = env.reset(seed=seed, options=start_of(policy))
+        observation, info = env.reset(seed=seed, options=actor.start)
+        actor.begin()
         total = 0.0
-        start = np.ones(1, bool)
         done = False
         while not done:
-            action, _ = policy.predict(observation, episode_start=start, deterministic=True)
-            observation, reward, terminated, truncated, info = env.step(action)
+            observation, reward, terminated, truncated, info = env.step(actor.act(observation))
             total += float(np.asarray(reward).sum())  # a vector reward: the sum of all objectives
-            start = np.zeros(1, bool)
             done = terminated or truncated
         episodes.append({"return": total, **_with_stance_peak(info.get("episode_summary", {}))})
         tick()
@@ -59,8 +57,8 @@ def score_vector(policy: Any, env_id: str, seeds: Sequence[int], **env_kwargs: A
     one.
 
     Args:
-        policy: one with Stable-Baselines3's `predict` for many observations, shape (n, k), and
-            `episode_start`, shape (n,), or its name or path as `find_policy` takes them.
+        policy: what `load_policy` takes; an object needs Stable-Baselines3's `predict` for many observations,
+            shape (n, k), and `episode_start`, shape (n,).
         env_id: id of the environment.
         seeds: seeds of the episodes.
         **env_kwargs: arguments of the environment.
@@ -70,10 +68,8 @@ def score_vector(policy: Any, env_id: str, seeds: Sequence[int], **env_kwargs: A
         DataFileError: a model that does not fit.
     """
     with make_env(env_id, **env_kwargs) as env:
-        if isinstance(policy, str):
-            policy = find_policy(policy, env, env_id)
-        if not hasattr(policy, "predict"):
-            raise ParameterError(f"policy: expected one with predict, or its name, got {policy!r}")
+        # Not by `load_policy`, which knows the id only as the environment has it
+        policy = find_policy(policy, env, env_id) if isinstance(policy, str) else load_policy(policy, env)
         episodes: list[dict[str, float]] = []
         envs = None
         for first in range(0, len(seeds), ROWS):
@@ -97,15 +93,14 @@ def make_rows(env_id: str, num_envs: int, **env_kwargs: Any) -> HorseLegVectorEn
 
 def play_rows(envs: HorseLegVectorEnv, policy: Any, seeds: Sequence[int]) -> list[dict[str, float]]:
     """Play as `score_vector` does in an environment with one row for each seed."""
-    observation, _ = envs.reset(seed=list(seeds), options=start_of(policy))
-    start = np.ones(envs.num_envs, bool)
+    actor = Actor(policy)
+    actor.begin(envs.num_envs)
+    observation, _ = envs.reset(seed=list(seeds), options=actor.start)
     going = np.ones(envs.num_envs, bool)
     total = np.zeros(envs.num_envs)
-    state = None
     episodes: list[dict[str, float]] = [{} for _ in seeds]
     while going.any():
-        actions, state = policy.predict(observation, state, episode_start=start, deterministic=True)
-        observation, rewards, terminated, truncated, infos = envs.step(actions)
+        observation, rewards, terminated, truncated, infos = envs.step(actor.act(observation))
         total += np.where(going, rewards, 0.0)  # a row that is over starts again; that is not counted
         ended = going & (terminated | truncated)
         for row in np.flatnonzero(ended):
@@ -114,7 +109,7 @@ def play_rows(envs: HorseLegVectorEnv, policy: Any, seeds: Sequence[int]) -> lis
             episodes[row] = {"return": float(total[row]), **_with_stance_peak(summary)}
         going &= ~ended
         # A row that has ended begins a new episode, which a policy with a memory must know
-        start = terminated | truncated
+        actor.restart(terminated | truncated)
     return episodes
 
 

@@ -20,6 +20,7 @@ from typing import Any
 
 import gymnasium as gym
 
+from hoof_env._input import as_path
 from hoof_env._output import markdown_table, staged
 from hoof_env._version import __version__
 from hoof_env.envs.made import make_env
@@ -27,6 +28,7 @@ from hoof_env.errors import DataFileError, ParameterError, count
 from hoof_env.evaluation.episodes import FINAL_SEEDS, play, score_vector
 from hoof_env.evaluation.statistics import (
     TABLE,
+    TRANSPORT,
     Interval,
     Scored,
     cells,
@@ -34,6 +36,7 @@ from hoof_env.evaluation.statistics import (
     mean_figures,
     over_episodes,
     over_seeds,
+    transport,
 )
 from hoof_env.policies.find import find_policy, is_function, is_model, read_policy_record
 from hoof_env.policies.record import environment_of
@@ -43,7 +46,7 @@ DEFAULT_ENV = "hoof_env/HorseLeg-v0"
 TELL_SECONDS = 5.0
 """Time between two lines about the progress [s]."""
 
-MOST_EPISODES = 1_000_000
+MAX_EPISODES = 1_000_000
 """Largest number of episodes of an evaluation."""
 
 
@@ -81,10 +84,15 @@ class Score:
 
     @cached_property
     def estimates(self) -> dict[str, Interval]:
-        """Means and intervals by key of `METRICS`, those that the episodes have."""
-        return {
-            key: estimate([one[key] for one in self.episodes]) for key in METRICS if key in self.episodes[0]
-        }
+        """Means and intervals by key of `METRICS`, those that the episodes have; the cost of transport is
+        that of all episodes together, as in every table."""
+        found = {}
+        for key in METRICS:
+            if key == "cost_of_transport" and all(name in self.episodes[0] for name in TRANSPORT):
+                found[key] = transport(self.episodes)
+            elif key in self.episodes[0]:
+                found[key] = estimate([one[key] for one in self.episodes])
+        return found
 
 
 @dataclass(frozen=True)
@@ -165,7 +173,7 @@ def _seeds(episodes: int | None, seed: int | None, published: bool) -> range:
                 f" {FINAL_SEEDS[-1]:,}"
             )
         return FINAL_SEEDS
-    number = 20 if episodes is None else count("episodes", episodes, most=MOST_EPISODES)
+    number = 20 if episodes is None else count("episodes", episodes, most=MAX_EPISODES)
     first = 1000 if seed is None else count("seed", seed, low=0)
     return range(first, first + number)
 
@@ -204,7 +212,7 @@ def _find_same(name: str, env: gym.Env[Any, Any], env_id: str) -> Any:
     for another id, leg, setting or version."""
     # What is a warning for a player is an error for a score.
     with warnings.catch_warnings():
-        warnings.filterwarnings("error", ".*(trained with|found for)", UserWarning)
+        warnings.filterwarnings("error", ".*(trained with|trained under|found for)", UserWarning)
         try:
             return find_policy(name, env, env_id)
         except UserWarning as unlike:
@@ -285,8 +293,9 @@ def to_json(scores: Sequence[Score], **about: Any) -> dict[str, Any]:
     return {**about, "policies": policies}
 
 
-def write_json(found: Evaluation, path: Path) -> None:
+def write_json(found: Evaluation, path: Path | str) -> None:
     """Write all figures of all episodes, with means and intervals, as JSON."""
+    path = as_path("path", path)
     about = {"env_id": found.env_id, "env_kwargs": found.env_kwargs, "seed": found.seeds.start}
     data = to_json(found.scores, **about, hoof_env=__version__)
     with staged(path.parent) as stage:
@@ -294,8 +303,9 @@ def write_json(found: Evaluation, path: Path) -> None:
         (stage / path.name).write_text(text, encoding="utf-8")
 
 
-def write_csv(found: Evaluation, path: Path) -> None:
+def write_csv(found: Evaluation, path: Path | str) -> None:
     """Write a line for each episode of each policy: its seed, its return and the figures of its summary."""
+    path = as_path("path", path)
     names = list(found.scores[0].episodes[0])
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")

@@ -154,18 +154,24 @@ def over_episodes(episodes: Sequence[Mapping[str, float]]) -> dict[str, Interval
         key: estimate([episode[key] for episode in episodes]) for key in means if key != "cost_of_transport"
     }
     if "cost_of_transport" in means:
-        mean = means["cost_of_transport"]
-        intervals["cost_of_transport"] = Interval(mean)
-        if math.isfinite(mean) and len(episodes) > 1:
-            parts = np.array([[episode[name] for episode in episodes] for name in TRANSPORT])
-
-            def cost(drawn: NDArray[np.int64]) -> Floats:
-                distance, work, force, share = parts[:, drawn].sum(-1)
-                with np.errstate(divide="ignore", invalid="ignore"):  # a draw that gets nowhere divides by 0
-                    return np.asarray(work * share / (force * distance))
-
-            intervals["cost_of_transport"] = Interval(mean, *bca_interval(len(episodes), cost))
+        intervals["cost_of_transport"] = transport(episodes)
     return intervals
+
+
+def transport(episodes: Sequence[Mapping[str, float]]) -> Interval:
+    """Return the cost of transport over episodes, that of their distance and work together, with the
+    bootstrap's interval, which draws whole episodes; NaN if they do not get forward."""
+    parts = np.array([[episode[name] for episode in episodes] for name in TRANSPORT])
+
+    def cost(drawn: NDArray[np.int64]) -> Floats:
+        distance, work, force, share = parts[:, drawn].sum(-1)
+        with np.errstate(divide="ignore", invalid="ignore"):  # a draw that gets nowhere divides by 0
+            return np.asarray(work * share / (force * distance))
+
+    mean = mean_figures(episodes)["cost_of_transport"]
+    if not math.isfinite(mean) or len(episodes) < 2:
+        return Interval(mean)
+    return Interval(mean, *bca_interval(len(episodes), cost))
 
 
 def interquartile_mean(values: Floats) -> Floats:

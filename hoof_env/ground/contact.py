@@ -8,7 +8,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
-from hoof_env.errors import ParameterError, check_choice, check_number
+from hoof_env.errors import ParameterError, brief, check_choice, check_number
 from hoof_env.ground.laws import FRICTION_LAWS, NORMAL_LAWS, damping, friction_part, normal_force
 from hoof_env.leg.presets import DEFAULT_PRESET, Preset, preset_error_type, preset_label, read_preset
 from hoof_env.simd.math import EXPONENT_UNIT
@@ -87,7 +87,7 @@ class Ground:
         if self.exponent * EXPONENT_UNIT % 1:
             raise ParameterError(
                 f"exponent: expected a multiple of 1/{EXPONENT_UNIT}, whose power is made of square roots and"
-                f" so has the same bits alone and in a batch, got {self.exponent!r}"
+                f" so has the same bits alone and in a batch, got {brief(self.exponent)}"
             )
         check_choice("normal_law", self.normal_law, NORMAL_LAWS)
         check_number("approach_floor", self.approach_floor, low=0, high=1e6, exclusive_low=True)
@@ -198,7 +198,7 @@ def load_ground(preset: Preset = DEFAULT_PRESET, **overrides: Any) -> Ground:
     if not isinstance(section, Mapping) or set(section) - set(SETTINGS):
         raise preset_error_type(preset)(
             f"{preset_label(preset)}: ground: expected an object with no other entries than "
-            f"{', '.join(SETTINGS)}, got {section!r}"
+            f"{', '.join(SETTINGS)}, got {brief(section)}"
         )
     try:
         ground = Ground(**section)

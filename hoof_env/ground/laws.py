@@ -25,7 +25,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 
-from hoof_env.errors import ParameterError, check_choice, check_number
+from hoof_env.errors import ParameterError, brief, check_choice, check_number
 from hoof_env.simd import maximum, minimum
 from hoof_env.simd.math import Real, exp_of_negative
 
@@ -73,7 +73,7 @@ def damping(law: str, restitution: float, stiffness: float, reference_mass: floa
     if law not in REGULAR_LAWS and cr < MIN_RESTITUTION:
         raise ParameterError(
             f"restitution: expected a number in [{MIN_RESTITUTION}, 1] for {law!r}, whose damping grows "
-            f"without bound towards 0, got {restitution!r}"
+            f"without bound towards 0, got {brief(restitution)}"
         )
     if law == "kelvin-voigt":
         return 0.0, 2 * kelvin_voigt_damping_ratio(cr) * math.sqrt(stiffness * reference_mass)

@@ -16,7 +16,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from hoof_env.errors import ParameterError, check_number
+from hoof_env.errors import ParameterError, brief, check_number
 from hoof_env.simd import Lanes, Matrix, Number, floor, gather_eight, minimum, where
 
 MAX_KNOTS = 1_000_000
@@ -110,7 +110,7 @@ class Terrain:
         """
         points = np.array(_row("x", x, -1e6, 1e6, None))
         if points.size < 2 or np.diff(points).min() <= 0:
-            raise ParameterError(f"x: expected two or more increasing numbers, got {_short(x)}")
+            raise ParameterError(f"x: expected two or more increasing numbers, got {brief(x)}")
         knots = _knots(points[0], points[-1], spacing)
         rows: dict[str, Any] = {}
         for name, values in (("height", height), ("stiffness", stiffness), ("friction", friction)):
@@ -133,13 +133,13 @@ class Terrain:
         """
         spacing = check_number("terrain.spacing", spacing, low=1e-4, high=1e6)
         if not isinstance(patches, Iterable):
-            raise ParameterError(f"patches: expected a row of patches, got {_short(patches)}")
+            raise ParameterError(f"patches: expected a row of patches, got {brief(patches)}")
         rows = []
         for number, patch in enumerate(patches):
             values = _row(f"patches[{number}]", patch, -1e6, 1e6, None)
             if len(values) != 4 or values[0] >= values[1]:
                 wanted = "(x0, x1, stiffness, friction) with x0 < x1"
-                raise ParameterError(f"patches[{number}]: expected {wanted}, got {_short(patch)}")
+                raise ParameterError(f"patches[{number}]: expected {wanted}, got {brief(patch)}")
             rows.append(values)
         rows.sort()
         if not rows:
@@ -167,7 +167,7 @@ class Terrain:
         names = [field.name for field in fields(cls)]
         if not isinstance(data, Mapping) or set(data) - set(names):
             wanted = f"an object with no other entries than {', '.join(names)}"
-            raise ParameterError(f"terrain: expected {wanted}, got {_short(data)}")
+            raise ParameterError(f"terrain: expected {wanted}, got {brief(data)}")
         return cls(**data)
 
     def to_dict(self) -> dict[str, Any]:
@@ -221,7 +221,7 @@ def _knots(start: float, end: float, spacing: float) -> NDArray[np.float64]:
     count = math.ceil((end - start) / spacing - 1e-6) + 1
     if count > MAX_KNOTS:
         wanted = f"at most {MAX_KNOTS} knots from {start:g} to {end:g} m"
-        raise ParameterError(f"terrain.spacing: expected {wanted}, got {spacing!r} m")
+        raise ParameterError(f"terrain.spacing: expected {wanted}, got {brief(spacing)} m")
     return start + spacing * np.arange(count, dtype=np.float64)
 
 
@@ -238,7 +238,7 @@ def _row(name: str, values: Any, low: float, high: float, count: int | None) -> 
     except TypeError:
         row = ()
     if isinstance(values, (str, bytes)) or not 0 < len(row) <= MAX_KNOTS or (count and len(row) != count):
-        raise ParameterError(f"{name}: expected {count or 'a row of'} numbers, got {_short(values)}")
+        raise ParameterError(f"{name}: expected {count or 'a row of'} numbers, got {brief(values)}")
     return row
 
 
@@ -254,11 +254,6 @@ def _plain_row(values: Any, low: float, high: float, count: int | None) -> tuple
     # Bounds may be infinite, values must be finite.
     is_good = np.isfinite(row) & (low <= row) & (row <= high)
     return tuple(values) if is_good.all() else None
-
-
-def _short(value: Any) -> str:
-    text = repr(value)
-    return text if len(text) <= 80 else f"{text[:80]}..."
 
 
 class TerrainGrid(NamedTuple):

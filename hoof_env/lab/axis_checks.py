@@ -120,6 +120,41 @@ def order(force: Floats, rate: float) -> float:
     return moments / sizes
 
 
+def propelling_first(forces: Mapping[str, Floats], time: Floats) -> list[str]:
+    """Return the limbs with propulsion before braking.
+
+    Args:
+        forces: forces forward and upward by limb, shape (n, 2).
+        time: times, shape (n,) [s].
+    """
+    rate = (len(time) - 1) / float(time[-1] - time[0])
+    highest = max(float(np.abs(force[:, 1]).max()) for force in forces.values())
+    orders = {}
+    for limb, force in forces.items():
+        if np.isfinite(force).all() and force[:, 1].max() > UNLOADED_SHARE * highest:
+            orders[limb] = order(force, rate)
+    known = [value for value in orders.values() if value != 0.0]
+    # The order of one limb scatters more than the mean of all and must therefore be clearer.
+    least = 0.0 if known and float(np.mean(known)) < MIN_MEAN_ORDER else MIN_ORDER
+    return [limb for limb, value in orders.items() if value < least]
+
+
+def of_model(forces: Mapping[str, Floats], time: Floats) -> list[str]:
+    """Return a line on limbs of an export of this package with propulsion before braking, or none.
+
+    Args:
+        forces: forces forward and upward by limb, shape (n, 2).
+        time: times, shape (n,) [s].
+    """
+    limbs = propelling_first(forces, time)
+    if not limbs:
+        return []
+    return [
+        f"{', '.join(limbs)}: propulsion before braking, as legs of the model may have it and living horses "
+        "do not (Limits in docs/help.md); the signs are right"
+    ]
+
+
 def suspect_direction(forces: Mapping[str, Floats], time: Floats, ahead: str, by_axis: bool) -> list[str]:
     """Warn of limbs with propulsion before braking.
 
@@ -132,16 +167,7 @@ def suspect_direction(forces: Mapping[str, Floats], time: Floats, ahead: str, by
     Returns:
         One warning with the remedy, or none.
     """
-    rate = (len(time) - 1) / float(time[-1] - time[0])
-    highest = max(float(np.abs(force[:, 1]).max()) for force in forces.values())
-    orders = {}
-    for limb, force in forces.items():
-        if np.isfinite(force).all() and force[:, 1].max() > UNLOADED_SHARE * highest:
-            orders[limb] = order(force, rate)
-    known = [value for value in orders.values() if value != 0.0]
-    # The order of one limb scatters more than the mean of all and must therefore be clearer.
-    least = 0.0 if known and float(np.mean(known)) < MIN_MEAN_ORDER else MIN_ORDER
-    limbs = [limb for limb, value in orders.items() if value < least]
+    limbs = propelling_first(forces, time)
     if not limbs:
         return []
     opposite = ahead[1:] if ahead.startswith("-") else f"-{ahead}"

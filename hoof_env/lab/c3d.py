@@ -73,7 +73,10 @@ def write_c3d(record: Columns, about: Mapping[str, Any], path: Path) -> None:
     time = record["time"]
     limbs = limbs_of(record)
     if len(time) > MAX_FRAMES:
-        raise ParameterError(f"seconds: expected at most {MAX_FRAMES} frames of a c3d, got {len(time)}")
+        raise ParameterError(
+            f"seconds: expected at most {MAX_FRAMES} frames of a c3d, got {len(time)}; --seconds shortens "
+            "the episode, and other formats hold more"
+        )
     file = ezc3d().c3d()
     parameters = file["parameters"]
     rate = [1 / float(np.median(np.diff(time)))]

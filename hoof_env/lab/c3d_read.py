@@ -18,6 +18,7 @@ import os
 import re
 import subprocess
 import sys
+import tempfile
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -27,7 +28,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hoof_env.errors import DataFileError, MissingExtraError
-from hoof_env.lab.c3d_header import frames_of
+from hoof_env.lab.c3d_header import head_of
+from hoof_env.lab.c3d_layout import readable
 
 Floats = NDArray[np.float64]
 
@@ -61,6 +63,14 @@ MAX_OFFSET_SHARE = 0.25
 ZERO_FORCE_SHARE = 0.1
 """Share of the baseline below which a plate's force counts as zero."""
 
+NEEDED = (
+    "ANALOG:SCALE",
+    "ANALOG:GEN_SCALE",
+    "ANALOG:OFFSET",
+    *(f"FORCE_PLATFORM:{name}" for name in ("USED", "TYPE", "CORNERS", "ORIGIN", "CHANNEL")),
+)
+"""Parameters that ezc3d needs for forces."""
+
 PLEA = re.compile(
     r"[\s,.]*\b(please|this is probably due|if you want to ignore)\b.*", re.IGNORECASE | re.DOTALL
 )
@@ -74,18 +84,21 @@ class Plates:
     Attributes:
         forces: forces along the laboratory's x, y and z by limb, or by `plate_1` and so on, shape (n, 3).
         units: units of the forces by limb.
-        time: times, shape (n,) [s]; 0 is the first frame of the trial, though the file may begin later.
+        time: times, shape (n,) [s]; 0 is the first frame of the trial, though the file may begin later. None
+            if the file states no rate.
         up: axis of the laboratory that points upward: "x", "y" or "z", with "-" for its other end.
         weight: weight of the animal [N], from files of this package, else None.
-        notes: messages about a baseline that was not subtracted.
+        notes: messages about counts that are not those of the data, and a baseline that was not subtracted.
+        own: True if this package wrote the file.
     """
 
     forces: dict[str, Floats]
     units: dict[str, str]
-    time: Floats
+    time: Floats | None
     up: str
     weight: float | None
     notes: list[str]
+    own: bool
 
 
 def read_plates(path: Path) -> Plates:
@@ -98,15 +111,20 @@ def read_plates(path: Path) -> Plates:
     library = importlib.util.find_spec("ezc3d")
     if library is None or library.origin is None:
         raise MissingExtraError('c3d needs ezc3d: pip install "hoof-env[lab]"')
-    first, last = frames_of(path)
+    head = head_of(path)
     # The child needs the folders of both libraries: it starts without the paths of this process.
     folders = [Path(file).parents[1] for file in (library.origin, np.__file__)]
-    content = _in_a_process(path, folders)
-    frames = int(content["frames"])
-    if frames < last - first + 1:
+    with tempfile.TemporaryDirectory() as place:
+        files, frames, stale = readable(path, head, Path(place))
+        try:
+            content = _joined([_in_a_process(file, path, folders) for file in files])
+        except DataFileError as error:
+            lacks = [name for name in NEEDED if name not in head.entries]
+            raise DataFileError(f"{error}; it lacks {', '.join(lacks)}" if lacks else str(error)) from None
+    if int(content["frames"]) < frames:
         raise DataFileError(
-            f"record {str(path)!r}: expected {last - first + 1} frames, as its header says, found {frames}: "
-            "is the file cut off?"
+            f"record {str(path)!r}: expected {frames} frames, as its header says, found "
+            f"{int(content['frames'])}: is the file cut off? Copy or export it again"
         )
     parameters = json.loads(str(content["parameters"]))
     raw = [content[name].T for name in content if name.startswith("force_")]
@@ -117,27 +135,40 @@ def read_plates(path: Path) -> Plates:
         )
     ours = parameters.get("HOOF_ENV", {})
     limbs = ours["LIMBS"] if "LIMBS" in ours else [f"plate_{k}" for k in range(1, len(raw) + 1)]
-    rate = float(np.ravel(parameters["ANALOG"]["RATE"])[0])
-    camera = float(np.ravel(parameters["POINT"]["RATE"])[0])
-    if not rate > 0 or len(limbs) != len(raw):
+    if len(limbs) != len(raw):
         raise DataFileError(
-            f"record {str(path)!r}: expected a rate (ANALOG:RATE) and {len(raw)} names of plates, got "
-            f"{rate:g} Hz and {len(limbs)}"
+            f"record {str(path)!r}: expected {len(raw)} names of plates (HOOF_ENV:LIMBS), got {len(limbs)}"
         )
-    start = max(first - 1, 0) / camera if camera > 0 else 0.0
-    time = start + np.arange(len(raw[0])) / rate
+    rate, camera = (float((*np.ravel(parameters[group]["RATE"]), 0.0)[0]) for group in ("ANALOG", "POINT"))
+    first, last = head.frames
+    first = first if 0 < first <= last else 1
+    start = (first - 1) / camera if camera > 0 else 0.0
+    time = start + np.arange(len(raw[0])) / rate if rate > 0 else None
     forces, notes = _without_baseline(raw, limbs, parameters, frames, first)
     units = {limb: _force_unit(parameters, k) for k, limb in enumerate(limbs)}
     weight = float(np.ravel(ours["WEIGHT"])[0]) if "WEIGHT" in ours else None
     up = _upward(content["corners"], content["middle"])
-    return Plates(dict(zip(limbs, forces, strict=True)), units, time, up, weight, notes)
+    return Plates(
+        dict(zip(limbs, forces, strict=True)), units, time, up, weight, [*stale, *notes], bool(ours)
+    )
 
 
-def _in_a_process(path: Path, folders: list[Path]) -> dict[str, Any]:
+def _joined(parts: list[dict[str, Any]]) -> dict[str, Any]:
+    """Return the arrays of the parts of a file as those of the whole."""
+    whole = dict(parts[0])
+    for name in whole:
+        if name.startswith("force_"):
+            whole[name] = np.concatenate([part[name] for part in parts], axis=1)
+    whole["frames"] = sum(int(part["frames"]) for part in parts)
+    return whole
+
+
+def _in_a_process(file: Path, path: Path, folders: list[Path]) -> dict[str, Any]:
     """Run `c3d_process.py` on a file and return its arrays by name.
 
     Args:
-        path: the file.
+        file: the file, or a copy of it.
+        path: the file, for error messages.
         folders: folders from which the script imports its libraries; it imports nothing from the current one.
 
     Raises:
@@ -148,10 +179,10 @@ def _in_a_process(path: Path, folders: list[Path]) -> dict[str, Any]:
     try:
         done = subprocess.run(
             # -P keeps the script's folder off the path of imports, where its modules could hide libraries.
-            [sys.executable, "-P", str(script), str(path.resolve())],
+            [sys.executable, "-P", str(script), str(file.resolve())],
             capture_output=True,
             check=False,
-            timeout=SECONDS + path.stat().st_size / BYTES_A_SECOND,
+            timeout=SECONDS + file.stat().st_size / BYTES_A_SECOND,
             stdin=subprocess.DEVNULL,
             # More threads of OpenBLAS would only reserve memory.
             env=os.environ | {"PYTHONPATH": places, "OPENBLAS_NUM_THREADS": "1"},

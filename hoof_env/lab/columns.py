@@ -113,6 +113,12 @@ def sources_of(
         named[limb_name(limb.removesuffix("force"))] = Source(
             _terms(path, table, forward) if forward else [], _terms(path, table, vertical)
         )
+    if not named and not known and table.lines and not table.line:
+        raise ParameterError(
+            f"map: expected a line of names above the numbers of {path.name}, which begin in line "
+            f"{table.lines[0]}, found none; columns may be named by number, as time=#1 force_y=#3 (--map-a, "
+            f"--map-b), of {few(table.names)}"
+        )
     if not named and not known:
         # Forces with names of ours, but several of each: the remedy is another than for unknown names.
         repeated = [text for name, text in table.repeated.items() if _limb_and_axis(name)]
@@ -124,7 +130,21 @@ def sources_of(
             f"{where} are {few(table.names)}"
         )
     limbs, notes = _renamed(path, named, known, renames)
+    notes += _shared(limbs)
     return limbs, str(mapping.get("time", "time")), notes
+
+
+def _shared(limbs: dict[str, list[Source]]) -> list[str]:
+    """Return notes on columns that are the vertical force of several limbs, as one plate under two legs."""
+    users: dict[str, list[str]] = {}
+    for limb, parts in limbs.items():
+        for name in {term.column for part in parts for term in part.upward}:
+            users.setdefault(name, []).append(limb)
+    return [
+        f"{name} is the vertical force of {' and of '.join(names)}: stances of one are counted for the other"
+        for name, names in users.items()
+        if len(names) > 1
+    ]
 
 
 def _recognised(table: Table, ahead: str, upward: str) -> dict[str, Source]:
@@ -150,7 +170,9 @@ def _recognised(table: Table, ahead: str, upward: str) -> dict[str, Source]:
 
 
 def _limb_and_axis(name: str) -> tuple[str, str] | None:
-    """Return limb and axis of a column of forces by its name, ours or OpenSim's; None for another column."""
+    """Return limb and axis of a column of forces by its name, ours or OpenSim's, None for another column;
+    blanks in the name are taken for underscores."""
+    name = "_".join(name.split())
     if (match := OURS.fullmatch(name)) is not None:
         limb = limb_name(match["limb"])
         # Our files have the forces at toe and heel next to those of the limb, which are their sums.

@@ -6,13 +6,17 @@ Both are resampled by linear interpolation to the higher of both rates, so that 
 There are three ways to align B with A:
 
 - "none": the times of the files.
-- "shift": one shift for all limbs. Candidates are the differences between touchdowns of A and of B. The shift
-  is the candidate under which the vertical forces of all limbs differ least (root mean square over at least
-  half of the shorter record; of candidates within 10 % of the least difference, the shortest, as strides
-  repeat), moved within two sampling intervals to the least difference.
-- "stances": under that shift, stances of a limb with the nearest touchdowns make pairs, and each pair is laid
-  touchdown on touchdown. If stride periods differ by more than 10 %, pairs begin with the two nearest
-  touchdowns and go on from there in order.
+- "shift": one shift for all limbs. Candidates are the differences between touchdowns of A and of B under
+  which the shorter record lies within the other, but for half a stride: no stride that both have is left
+  out. The shift is the candidate under which the vertical forces of all limbs differ least (root mean square;
+  of candidates within 10 % of the least difference, the shortest, as strides repeat), moved within two
+  sampling intervals to the least difference. If strides vary, a shift that leaves some out is taken where the
+  others agree three times as well as one stride with the next, as in records that began at different times.
+- "stances": under that shift, stances of a limb with the nearest touchdowns, less than half a stride apart,
+  make pairs, and each pair is laid touchdown on touchdown. If stride periods differ by more than 10 %, all
+  stances of the record that has fewer are paired in order.
+
+Stances without a partner are counted and said.
 """
 
 from __future__ import annotations
@@ -24,7 +28,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from hoof_env.errors import DataFileError, ParameterError, check_choice, check_number
+from hoof_env.errors import DataFileError, ParameterError, brief, check_choice, check_number
+from hoof_env.lab.doubts import baseline
 from hoof_env.lab.forces import THRESHOLD
 from hoof_env.lab.read import ForceRecord
 from hoof_env.lab.stances import MIN_STANCE_SECONDS, Pair, Side, Spans, best_shift, pairs_of, whole_stances
@@ -70,6 +75,7 @@ class LimbErrors:
 
     Attributes:
         pairs: number of pairs of stances.
+        stances: number of whole stances in A and in B.
         forces: errors by component: "vertical", "fore-aft", and of the latter "braking" and "propulsion"
             alone, with positive peaks and impulses; "vertical" alone if a record has no fore-aft force.
         contact, contact_error: duration of a stance in A, and its error [s].
@@ -79,6 +85,7 @@ class LimbErrors:
     """
 
     pairs: int
+    stances: tuple[int, int]
     forces: dict[str, Force]
     contact: float
     contact_error: float
@@ -138,6 +145,9 @@ def compare(
             overlap, or would be too long at the common rate.
         DataFileError: a record has no whole stance of the limbs that are compared.
     """
+    for name, record in (("a", a), ("b", b)):
+        if not isinstance(record, ForceRecord):
+            raise ParameterError(f"{name}: expected a record, as read_record returns it, got {brief(record)}")
     check_choice("align", align, ALIGNMENTS)
     check_choice("units", units, ("auto", "N", "BW"))
     unit, (by_a, by_b) = _common_unit(a, b, units)
@@ -168,9 +178,12 @@ def compare(
         )
         pairs = pairs_of(*sides, rate, by_touchdown=align == "stances")
         if pairs:
-            limbs[name] = _errors(pairs, rate)
+            limbs[name] = _errors(pairs, sides, rate)
             curves[name] = [(pair.time, pair.a, pair.b) for pair in pairs]
-            warnings += [f"{name}: {text}" for text in _warnings(sides, limbs[name])]
+            warnings += [f"{name}: {text}" for text in _warnings(sides, limbs[name], align)]
+            for which, side, level, moved in zip("AB", sides, levels, (0.0, shift), strict=True):
+                texts = baseline(side.force[:, 1], side.stances, level, side.time - moved, unit)
+                warnings += [f"{name}: {which}: {text}" for text in texts]
         else:
             missing[name] = _why_missing(sides, levels, unit)
     if not limbs:
@@ -295,8 +308,9 @@ def _unshared(a: ForceRecord, b: ForceRecord, names: list[tuple[str, str]]) -> d
     return missing | {limb: "only B has it" for limb in b.limbs if limb not in of_b}
 
 
-def _warnings(sides: tuple[Side, Side], errors: LimbErrors) -> list[str]:
-    """Return warnings about the errors of a limb: stances that one record lacks, touchdowns that scatter."""
+def _warnings(sides: tuple[Side, Side], errors: LimbErrors, align: str) -> list[str]:
+    """Return warnings about the errors of a limb: stances that one record lacks or that have no partner,
+    touchdowns that scatter."""
     a, b = sides
     period = a.period if a.period > 0 else b.period
     # Near the ends a stance may be whole in one record and cut off in the other.
@@ -305,10 +319,20 @@ def _warnings(sides: tuple[Side, Side], errors: LimbErrors) -> list[str]:
     high = min(a.time[-1], b.time[-1]) - edge
     counts = [side.whole_between(low, high) for side in sides]
     warnings = []
-    if counts[0] != counts[1]:
+    if counts[0] != counts[1] and errors.pairs < max(counts):
         warnings.append(
             f"A has {counts[0]} whole stances and B {counts[1]} in the same time, {errors.pairs} are "
-            "compared; if noise makes or splits stances, raise --threshold"
+            "compared; if noise makes or splits stances, raise --threshold; other causes are steps that one "
+            "record lacks, and limbs that share a plate"
+        )
+    fewer = min(errors.stances)
+    if errors.pairs < fewer:
+        remedy = (
+            "--align stances shifts B" if align == "none" else "--align none takes the times of the files"
+        )
+        warnings.append(
+            f"{fewer - errors.pairs} of {fewer} stances are not compared, as the other record has none at "
+            f"their time (A has {errors.stances[0]} whole stances, B {errors.stances[1]}); {remedy}"
         )
     if period > 0 and errors.touchdown_spread > MAX_TOUCHDOWN_SPREAD * period:
         warnings.append(
@@ -382,8 +406,8 @@ PARTS: dict[str, Callable[[Floats], Floats]] = {
 """Components by name, functions of forces forward and upward of shape (n, 2)."""
 
 
-def _errors(pairs: list[Pair], rate: float) -> LimbErrors:
-    """Compute the errors of a limb over pairs of stances at `rate` [Hz]."""
+def _errors(pairs: list[Pair], sides: tuple[Side, Side], rate: float) -> LimbErrors:
+    """Compute the errors of a limb over pairs of the stances of both sides at `rate` [Hz]."""
     forces = {}
     has_fore_aft = all(np.isfinite(force).all() for pair in pairs for force in (pair.a, pair.b))
     for name, part in PARTS.items():
@@ -415,6 +439,7 @@ def _errors(pairs: list[Pair], rate: float) -> LimbErrors:
     late = np.array([pair.late for pair in pairs])
     return LimbErrors(
         pairs=len(pairs),
+        stances=(len(sides[0].stances), len(sides[1].stances)),
         forces=forces,
         contact=float(contact[0]),
         contact_error=float(contact[1] - contact[0]),

@@ -13,7 +13,7 @@ from xml.etree import ElementTree as xml
 
 import numpy as np
 
-from hoof_env.errors import ParameterError
+from hoof_env.errors import ParameterError, brief
 from hoof_env.lab.forces import Columns, limb_name, limbs_of
 
 MOT_COLUMNS = {
@@ -87,8 +87,9 @@ def check_bodies(bodies: Mapping[str, Any], limbs: list[str]) -> dict[str, str]:
     """
     names = [limb_name(limb) for limb in limbs]
     for name, body in bodies.items():
-        if name not in names or not isinstance(body, str) or not body:
-            raise ParameterError(f"bodies: expected {', '.join(names)}=BODY, got {name}={body!r}")
+        # XML has no control characters, nor halves of pairs.
+        if name not in names or not isinstance(body, str) or not body or not body.isprintable():
+            raise ParameterError(f"bodies: expected {', '.join(names)}=BODY, got {name}={brief(body)}")
     return dict(bodies)
 
 

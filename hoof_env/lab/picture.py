@@ -8,10 +8,11 @@ from typing import Any
 
 import numpy as np
 
+from hoof_env._input import as_path
 from hoof_env._output import check_folder, markdown_table, staged
 from hoof_env._plotting import BLUE, GREY, ORANGE, STYLE
 from hoof_env.errors import MissingExtraError, ParameterError
-from hoof_env.lab.axis_checks import for_one
+from hoof_env.lab.axis_checks import for_one, of_model, propelling_first
 from hoof_env.lab.compare import Comparison, Force
 from hoof_env.lab.read import REVERSED, ForceRecord
 
@@ -26,8 +27,9 @@ POINTS = 201
 
 
 def report(found: Comparison) -> str:
-    """Return the report of a comparison as text: the records, a table of errors, and warnings of limbs that
-    are left out, of doubtful stances, and of fore-aft forces in opposite directions, with the remedy."""
+    """Return the report of a comparison as text: the records, a table of errors, the number of stances
+    without a partner, and warnings of limbs that are left out, of doubtful stances, and of fore-aft forces in
+    opposite directions, with the remedy."""
     lines = [
         _about("A", found.a),
         _about("B", found.b),
@@ -35,7 +37,15 @@ def report(found: Comparison) -> str:
         f"times of B {found.shift:+.3f} s. A's own value is in brackets. {_levels(found)}",
         "",
         _table(found),
+        *_alone(found),
     ]
+    remarks = [
+        f"{which}: {text}"
+        for which, record in (("A", found.a), ("B", found.b))
+        if record.own
+        for text in of_model(record.limbs, record.time)
+    ]
+    lines += ["", *remarks] if remarks else []
     # A record that is compared with itself shows its warnings once, with the options of both.
     same = (found.a.name, found.a.notes) == (found.b.name, found.b.notes)
     warnings = [f"{found.a.name}: {note if same else for_one(note, '-a')}" for note in found.a.notes]
@@ -43,19 +53,47 @@ def report(found: Comparison) -> str:
     warnings += [f"{limb} is not compared: {why}" for limb, why in found.missing.items()] + found.warnings
     for limb, errors in found.limbs.items():
         if "fore-aft" in errors.forces and errors.forces["fore-aft"].r < -0.5:
-            warnings.append(f"{limb}: fore-aft forces point opposite ways; {_remedy(found, limb)}")
+            warnings.append(f"{limb}: fore-aft forces point opposite ways; {_why_opposite(found, limb)}")
     return "\n".join([*lines, *(f"warning: {text}" for text in warnings)])
 
 
-def _remedy(found: Comparison, limb: str) -> str:
-    """Return the option that turns the fore-aft forces of a limb.
+def _alone(found: Comparison) -> list[str]:
+    """Return a line on stances without a partner, or none."""
+    limbs = []
+    for limb, errors in found.limbs.items():
+        alone = [
+            f"{count - errors.pairs} of {count} in {which}"
+            for which, count in zip("AB", errors.stances, strict=True)
+            if count > errors.pairs
+        ]
+        if alone:
+            limbs.append(f"{limb} {' and '.join(alone)}")
+    return ["", f"Whole stances that are not compared: {', '.join(limbs)}."] if limbs else []
 
-    The option counts from the file: if "auto" has turned both components, the vertical one alone is to be
-    turned. A is taken to be wrong if only A was turned, else B.
-    """
+
+def _why_opposite(found: Comparison, limb: str) -> str:
+    """Return why the fore-aft forces of a limb point opposite ways, or the option that turns them."""
     # The only limbs of two records are compared even with different names.
     of_b = limb if limb in found.b.limbs else next(iter(found.b.limbs))
-    at_a = limb in found.a.turned and of_b not in found.b.turned
+    if found.a.own and found.b.own:
+        return "both records are exports of this package, whose signs are right"
+    own, other, name = (found.a, found.b, of_b) if found.a.own else (found.b, found.a, limb)
+    if own.own and name not in propelling_first(other.limbs, other.time):
+        return (
+            f"braking and propulsion of {own.name} are the model's (Limits in docs/help.md); {other.name} "
+            "does not propel before it brakes, so nothing shows that its forces are to be turned"
+        )
+    return _remedy(found, limb, of_b)
+
+
+def _remedy(found: Comparison, limb: str, of_b: str) -> str:
+    """Return the option that turns the fore-aft forces of a limb, whose name in B is `of_b`.
+
+    The option counts from the file: if "auto" has turned both components, the vertical one alone is to be
+    turned. A is taken to be wrong if B is an export of this package, or if only A was turned; else B.
+    """
+    only_a = limb in found.a.turned and of_b not in found.b.turned
+    at_a = found.b.own or (only_a and not found.a.own)
     which, record, limb = ("a", found.a, limb) if at_a else ("b", found.b, of_b)
     forward, upward = record.signs.get(limb, (1, 1))
     # An option turns all limbs, so that it is no remedy if their signs differ.
@@ -75,11 +113,12 @@ def _about(which: str, record: ForceRecord) -> str:
     """Return a line on a record, `which` is "A" or "B"."""
     limbs = "" if len(record.turned) == len(record.limbs) else f" of {', '.join(record.turned)}"
     turned = f"; forces{limbs} pointed into the ground and are turned round" if record.turned else ""
+    own = "; an export of this package" if record.own else ""
     level = [limb for limb, force in record.limbs.items() if not np.isfinite(force[:, 0]).any()]
     only = f"; no fore-aft force of {', '.join(level)}" if level else ""
     return (
         f"{which}  {record.name}: {record.rate:g} Hz, {record.unit}, {', '.join(record.limbs)}, "
-        f"{record.time[0]:.4g} to {record.time[-1]:.4g} s{turned}{only}"
+        f"{record.time[0]:.4g} to {record.time[-1]:.4g} s{own}{turned}{only}"
     )
 
 
@@ -132,12 +171,13 @@ def _pair(error: float, of_a: float, places: int) -> str:
     return f"{round(error, places) + 0.0:+.{places}f} ({round(of_a, places) + 0.0:.{places}f})"
 
 
-def draw(found: Comparison, path: Path) -> Path:
+def draw(found: Comparison, path: Path | str) -> Path:
     """Write a picture of a comparison and return its path. Errors are those of `check_picture`.
 
     Each limb has a row of panels: the vertical and the fore-aft force of A and B from touchdown on, single
     stances thin and their mean thick. A force that a record lacks has no panel.
     """
+    path = as_path("path", path)
     check_picture(path)
     from matplotlib import style
     from matplotlib.figure import Figure

@@ -21,10 +21,12 @@ from hoof_env.errors import (
     ParameterError,
     check_choice,
     check_number,
+    printable,
 )
 from hoof_env.lab.axis_checks import suspect_axes, suspect_direction
 from hoof_env.lab.columns import Source, Term, few, sources_of
 from hoof_env.lab.columns import parse_mapping as parse_mapping
+from hoof_env.lab.gaps import GAPS, fill
 from hoof_env.lab.sample_times import times_of
 from hoof_env.lab.tables import READERS, Table
 
@@ -85,6 +87,7 @@ class ForceRecord:
         signs: factors of the forward and the upward component in the file by limb; (1, 1) for others.
         turned: limbs of which "auto" has turned both components.
         notes: warnings about the record, and their remedies.
+        own: True if this package wrote the file: its signs are right.
     """
 
     name: str
@@ -95,6 +98,7 @@ class ForceRecord:
     signs: dict[str, tuple[int, int]] = field(default_factory=dict)
     turned: tuple[str, ...] = ()
     notes: tuple[str, ...] = ()
+    own: bool = False
 
     @property
     def rate(self) -> float:
@@ -120,6 +124,7 @@ def read_record(
     mass: float | None = None,
     up: str = "auto",
     forward: str = "auto",
+    gaps: str = "auto",
 ) -> ForceRecord:
     """Read a force record from a file.
 
@@ -136,6 +141,7 @@ def read_record(
         mass: mass of the animal [kg], if the file does not state its weight.
         up: the file's axis that points upward, one of `AXES`; "auto" is y, or the normal of a c3d's plates.
         forward: the file's axis in which the animal travels; "auto" is x, or y if x is upward.
+        gaps: what missing values are, one of `lab.gaps.GAPS`; "auto" takes those in swing as 0.
 
     Raises:
         DataFileError: the file is missing, broken or empty, or has numbers that are not finite.
@@ -143,6 +149,7 @@ def read_record(
         ParameterError: an argument does not fit the file.
     """
     _check_arguments(unit, reverse, rate, mass, up, forward)
+    check_choice("gaps", gaps, GAPS)
     path = Path(path)
     table = _load(path)
     upward, ahead = _axes(path.name, table, up, forward)
@@ -154,6 +161,9 @@ def read_record(
             f"up, forward: expected neither with columns of {path.name} that --map names; name the columns "
             "of the axes there, with a minus for the opposite direction"
         )
+    if any(name.casefold() == time.casefold() for name in table.columns):
+        table.drop_empty()  # the steps of the times say whether one is missing
+    notes += fill(path, table, sources, gaps)
     columns = _components(path, table, sources)
     unit = _unit(path, table, unit, sources)
     rows = len(next(iter(columns.values()))[0])
@@ -164,10 +174,12 @@ def read_record(
     turned = tuple(limb for limb, which in down.items() if any(which))
     notes += table.notes + time_notes
     notes += suspect_axes(forces, _others(table, sources), ahead, upward, (up, forward))
-    notes += suspect_direction(forces, times, ahead, has_axes)
+    if not table.own:
+        notes += suspect_direction(forces, times, ahead, has_axes)
     # A given mass takes precedence over the weight in the file.
     weight = table.weight if mass is None else mass * GRAVITY
-    return ForceRecord(path.name, times, forces, unit, weight, signs, turned, tuple(notes))
+    name = printable(path.name)
+    return ForceRecord(name, times, forces, unit, weight, signs, turned, tuple(notes), table.own)
 
 
 def _check_arguments(
@@ -307,7 +319,11 @@ def _load(path: Path) -> Table:
             f"record {str(path)!r}: expected a {suffix} that can be read, cannot read it ({reason:.200})"
         ) from None
     if not table.names or any(len(values) < 2 for values in table.columns.values()):
-        raise DataFileError(f"record {str(path)!r}: expected two rows of numbers or more, found fewer")
+        found = f"found {table.rows} under the names in line {table.line}" if table.line else "found fewer"
+        raise DataFileError(
+            f"record {str(path)!r}: expected two rows of numbers or more, {found}; tabs, semicolons, commas "
+            "or blanks separate the cells of a row"
+        )
     return table
 
 
@@ -324,7 +340,8 @@ def _sum(path: Path, table: Table, terms: list[Term]) -> Floats:
         if not np.isfinite(values).all():
             row = int(np.argmin(np.isfinite(values)))
             raise DataFileError(
-                f"record {str(path)!r}: {name}: expected finite numbers, got {values[row]} in row {row + 1}"
+                f"record {str(path)!r}: {name}: expected finite numbers, got {values[row]} in "
+                f"{table.place(row)}"
             )
         total += sign * values
     return total

@@ -21,7 +21,14 @@ Floats = NDArray[np.float64]
 SECONDS_BY_UNIT = dict.fromkeys(("s", "sec", "secs", "second", "seconds"), 1.0) | dict.fromkeys(
     ("ms", "msec", "msecs", "millisecond", "milliseconds"), 1e-3
 )
+SECONDS_BY_UNIT |= {"us": 1e-6, "µs": 1e-6, "μs": 1e-6, "ns": 1e-9, "min": 60.0, "h": 3600.0, "d": 86_400.0}
 """Units of time in seconds, by their spellings in small letters."""
+
+GUESSED_UNITS = ("ms", "us", "ns", "d")
+"""Units of times without one, the likeliest first, if seconds give no plausible rate."""
+
+RATE_REMEDY = "; if the samples are evenly spaced, give their rate (--rate-a, --rate-b)"
+"""End of messages about times that cannot be read."""
 
 MAX_UNEVENNESS = 0.01
 """Largest difference of a sampling interval from the mean interval, as a share of the mean."""
@@ -79,28 +86,41 @@ def times_of(
         )
     unit = table.units.get(name)
     if unit and unit.casefold() not in SECONDS_BY_UNIT:
-        raise ParameterError(f"map: expected times of {path.name} in s or ms, got {unit}")
+        raise ParameterError(
+            f"map: expected times of {path.name} in s, ms, us, ns, min, h or d, got {unit}; if {name} has no "
+            "times, give the rate (--rate-a, --rate-b)"
+        )
     if name in table.unread:
-        raise DataFileError(f"record {str(path)!r}: {table.unread[name]}")
+        raise DataFileError(f"record {str(path)!r}: {name}: {table.unread[name]}{RATE_REMEDY}")
     column = table.columns[name]
     if not np.isfinite(column).all():
         row = int(np.argmin(np.isfinite(column)))
         raise DataFileError(
-            f"record {str(path)!r}: {name}: expected finite numbers, got {column[row]} in row {row + 1}"
+            f"record {str(path)!r}: {name}: expected finite numbers, got {column[row]} in {table.place(row)}"
+            f"{RATE_REMEDY}"
         )
-    time = _even(path, name, column) * SECONDS_BY_UNIT[(unit or "s").casefold()]
-    # An implausible rate suggests a wrong unit. The times are accepted, with a warning.
-    measured = (n - 1) / float(time[-1] - time[0])
-    if MIN_RATE_HZ <= measured <= MAX_RATE_HZ:
-        return time, []
+    even = _even(path, name, column)
+    by_unit = SECONDS_BY_UNIT[(unit or "s").casefold()]
+    rate_in = (n - 1) / float(even[-1] - even[0])
+    if MIN_RATE_HZ <= rate_in / by_unit <= MAX_RATE_HZ:
+        return even * by_unit, []
     if unit:
-        return time, [
-            f"times of {name} in {unit} imply {measured:g} Hz, implausible for a force plate; if the unit is "
-            "wrong, change it in the file, or give the rate (--rate-a, --rate-b)"
+        return even * by_unit, [
+            f"times of {name} in {unit} imply {rate_in / by_unit:g} Hz, implausible for a force plate; if "
+            "the unit is wrong, change it in the file, or give the rate (--rate-a, --rate-b)"
         ]
-    return time, [
-        f"times of {name} have no unit; read as s they imply {measured:g} Hz; if they are in ms, write "
-        f"{name} [ms] above them, or give the rate (--rate-a, --rate-b)"
+    said = f"times of {name} have no unit; in s they imply {rate_in:g} Hz"
+    # Steps of 1 may count samples as well as milliseconds.
+    for other in GUESSED_UNITS if rate_in != 1 else ():
+        by_other = SECONDS_BY_UNIT[other]
+        if MIN_RATE_HZ <= rate_in / by_other <= MAX_RATE_HZ:
+            return even * by_other, [
+                f"{said}, so they are read in {other}, {rate_in / by_other:g} Hz; if they are in s, write "
+                f"{name} [s] above them, and if they count samples, give the rate (--rate-a, --rate-b)"
+            ]
+    return even, [
+        f"{said}, implausible for a force plate; if they are in ms, write {name} [ms] above them, and if "
+        "they count samples, give the rate (--rate-a, --rate-b)"
     ]
 
 
@@ -121,8 +141,9 @@ def _start(table: Table, name: str, rate: float) -> tuple[float, list[str]]:
     if unit:
         scale = SECONDS_BY_UNIT.get(unit)
     else:
-        # Without a unit, s or ms, whichever agrees with the rate.
-        agrees = (seconds for seconds in (1.0, 1e-3) if abs(step * seconds * rate - 1) < MAX_RATE_ERROR)
+        # Without a unit, that which agrees with the rate.
+        units = (1.0, *(SECONDS_BY_UNIT[name] for name in GUESSED_UNITS))
+        agrees = (seconds for seconds in units if abs(step * seconds * rate - 1) < MAX_RATE_ERROR)
         scale = next(agrees, None)
     if scale is not None and (unit or abs(step * scale * rate - 1) < MAX_RATE_ERROR):
         notes = []
@@ -132,9 +153,7 @@ def _start(table: Table, name: str, rate: float) -> tuple[float, list[str]]:
                 "the record begins at the first of these times"
             ]
         return float(column[0]) * scale, notes
-    return 0.0, [
-        f"steps of {name}, {step:g}, fit {rate:g} Hz neither in s nor in ms; the record begins at 0 s"
-    ]
+    return 0.0, [f"steps of {name}, {step:g}, fit {rate:g} Hz in no unit of time; the record begins at 0 s"]
 
 
 def _even(path: Path, name: str, column: Floats) -> Floats:
@@ -155,8 +174,7 @@ def _even(path: Path, name: str, column: Floats) -> Floats:
     worst = int(np.abs(steps - mean).argmax())
     raise DataFileError(
         f"record {str(path)!r}: {name}: expected evenly spaced times, got steps of {steps.min():g} to "
-        f"{steps.max():g}, of {steps[worst]:g} after {column[worst]:g} in row {worst + 1}; if the samples "
-        "are evenly spaced, give their rate (--rate-a, --rate-b)"
+        f"{steps.max():g}, of {steps[worst]:g} after {column[worst]:g} in row {worst + 1}{RATE_REMEDY}"
     )
 
 

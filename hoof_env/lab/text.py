@@ -13,6 +13,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from hoof_env.errors import DataFileError
+from hoof_env.lab.clock import moment
 
 # A name, with its unit in brackets behind it if it has one.
 TITLE_PATTERN = re.compile(r"\s*(?P<name>.*?)\s*(?:[\[(]\s*(?P<unit>[^\[\]()]*?)\s*[\])])?\s*")
@@ -33,6 +34,9 @@ UNIT_WORDS = frozenset(
     for word in line.split()
 )
 """Words of a row of units below the names."""
+
+MISSING = frozenset(("", "nan", "na", "n/a", "#n/a", "nat", "null", "none", "-", "--", ".", "missing"))
+"""Words of cells without a number, in small letters."""
 
 SEPARATORS = ("\t", ";", ",", None)
 """Separators of cells; None stands for blanks."""
@@ -89,6 +93,11 @@ def number(cell: str, decimal_comma: bool = True) -> float:
     return float(cell.replace(",", ".") if decimal_comma else cell)
 
 
+def is_missing(cell: str) -> bool:
+    """Return True if a cell says that there is no number."""
+    return cell.strip().casefold() in MISSING
+
+
 def is_number(cell: str, decimal_comma: bool = True) -> bool:
     """Return True if a cell is a number."""
     try:
@@ -118,13 +127,30 @@ def _separator(line: str, least: int) -> tuple[bool, str | None]:
     for between in SEPARATORS:
         if between is not None and between not in line:
             continue
-        cells = [cell for cell in cells_of(line, between) if cell.strip()]
-        known = [is_number(cell, between != ",") for cell in cells]
-        share = sum(known) / len(known) if known and known[0] and len(known) >= least else 0.0
+        cells = cells_of(line, between)
+        # The first cell of a row is a number or a time, and most others are, as far as there are any.
+        known = [_is_value(cell, between) for cell in cells if not is_missing(cell)]
+        enough = len(cells) >= least and bool(known) and not is_missing(cells[0]) and known[0]
+        share = sum(known) / len(known) if enough else 0.0
         if share > best:
             best = share
             separator = between
     return best > 0.5, separator
+
+
+def is_empty(cells: list[str]) -> bool:
+    """Return True if a row has cells, and no value in any."""
+    return len(cells) > 1 and all(map(is_missing, cells))
+
+
+def _split(line: str) -> list[list[str]]:
+    """Return the cells of a line at each separator that it contains, but blanks."""
+    return [cells_of(line, between) for between in SEPARATORS if between is not None and between in line]
+
+
+def _is_value(cell: str, between: str | None) -> bool:
+    """Return True if a cell between separators is a number or a time."""
+    return is_number(cell, between != ",") or moment(cell) is not None
 
 
 def _first_row(lines: list[str]) -> tuple[int, str | None]:
@@ -138,7 +164,8 @@ def _first_row(lines: list[str]) -> tuple[int, str | None]:
         # Runs of rows of numbers: length, first row and separator.
         runs: list[tuple[int, int, str | None]] = []
         for k, line in enumerate(lines):
-            if not line.strip():
+            # Rows without any value break no run: programs write them in swing.
+            if not line.strip() or any(map(is_empty, _split(line))):
                 continue
             numeric, between = _separator(line, least)
             if not numeric:
@@ -159,6 +186,11 @@ def _first_row(lines: list[str]) -> tuple[int, str | None]:
 def parse(lines: list[str]) -> Text:
     """Parse the first table in the lines of a file."""
     begin, between = _first_row(lines)
+    first = begin
+    while begin < len(lines) and first and is_empty(cells_of(lines[first - 1], between)):
+        first -= 1
+    if first < begin and any(is_empty(cells_of(line, between)) for line in lines[begin:]):
+        begin = first  # the first rows have no value, either
     above = [k for k in range(begin) if lines[k].strip()]
     if begin == len(lines) and not above:
         return Text([], [])
@@ -177,8 +209,16 @@ def parse(lines: list[str]) -> Text:
         if len(rows) > 1 and _are_groups(rows[-2], titles):
             groups = _filled(rows[-2])
     table, after = _rows(lines, begin, between)
+    # Other lines above the numbers have fewer words, or are numbers, too.
+    if table and (len(titles) < width_of(table[0][1]) or all(_is_value(cell, between) for cell in titles)):
+        titles, units, groups, line = [], [], [], 0
     notes = [f"line {after}: another table begins there, which is not read"] if after else []
     return Text(titles, table, units, groups, line, between != ",", notes)
+
+
+def width_of(cells: list[str]) -> int:
+    """Return the number of cells of a row without those at its end that are blank."""
+    return max((k for k, cell in enumerate(cells, 1) if cell.strip()), default=0)
 
 
 def _between_names(line: str, between: str | None, row: str) -> str | None:
@@ -239,14 +279,19 @@ def _filled(cells: list[str]) -> list[str]:
 def _rows(lines: list[str], begin: int, between: str | None) -> tuple[list[Row], int]:
     """Return the rows from line `begin` on, and the number of the line where another table begins, else 0."""
     rows: list[Row] = []
+    empty: list[Row] = []
     blank = False
     for k in range(begin, len(lines)):
         cells = cells_of(lines[k], between)
         if not any(cell.strip() for cell in cells):
             blank = True
+            # Separators alone are a row without values if others follow.
+            empty += [(k + 1, cells)] if len(cells) > 1 else []
             continue
-        if blank and not _separator(lines[k], 1)[0]:
+        if blank and not (_separator(lines[k], 1)[0] or is_empty(cells)):
             return rows, k + 1
-        rows.append((k + 1, cells))
+        rows += [*empty, (k + 1, cells)]
+        empty = []
         blank = False
-    return rows, 0
+    # At the end such rows may be the padding of a spreadsheet, unless there were others.
+    return rows + (empty if empty and any(is_empty(cells) for _, cells in rows) else []), 0

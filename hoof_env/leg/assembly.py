@@ -144,7 +144,8 @@ def check_full_revolution(geometry: Geometry) -> None:
                 f"dyad {index + 1} ({dyad.first}-{dyad.point}-{dyad.second}, lengths {r1:.6g} and {r2:.6g} m)"
                 f" does not close at crank angle {np.degrees(angle) % 360:.2f} deg: its centres, "
                 f"{float(d[where]):.6g} m apart, are {reach} {miss:.3g} m; "
-                "expected a leg that turns through a full revolution"
+                "expected a leg that turns through a full revolution; hoof-env lengths --preset NAME prints"
+                " how far each length of a leg can change"
             )
 
 

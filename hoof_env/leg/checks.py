@@ -11,8 +11,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from hoof_env.errors import TEXTS, ParameterError, check_number, is_number
-from hoof_env.leg.mechanism import Mechanism
+from hoof_env.errors import TEXTS, ParameterError, brief, check_number, is_number
+from hoof_env.leg.mechanism import BodyPoint, Mechanism
 from hoof_env.leg.mechanism_list import read_mechanism, split_solids
 
 Solids = Mapping[str, Mapping[str, Any]]
@@ -23,7 +23,7 @@ def numbers_of(what: str, given: Any) -> dict[str, Any]:
     """Return the numbers, or lists of them, of a dataclass or mapping by name, as JSON can hold them."""
     found = asdict(given) if is_dataclass(given) and not isinstance(given, type) else given
     if not isinstance(found, Mapping) or not found:
-        raise ParameterError(f"{what}: expected numbers by name, got {given!r}")
+        raise ParameterError(f"{what}: expected numbers by name, got {brief(given)}")
     check_names(what, found)
     return {
         name: [check_number(f"{what}[{name!r}][{k}]", part) for k, part in enumerate(value)]
@@ -37,7 +37,30 @@ def check_names(what: str, given: Mapping[Any, Any]) -> None:
     """Raise `ParameterError` unless all names are texts; a file would store any other name as text."""
     for name in given:
         if not isinstance(name, str):
-            raise ParameterError(f"{what}: expected names that are texts, got {name!r}")
+            raise ParameterError(f"{what}: expected names that are texts, got {brief(name)}")
+
+
+MIN_LENGTH = 1e-3
+MAX_LENGTH = 1e3
+"""Smallest and largest length of a link [m]."""
+
+
+def check_length(mechanism: Mechanism, name: str, given: Any) -> float:
+    """Return a length [m]; an error of a negative one along or across a body says where its sign belongs."""
+    try:
+        return check_number(f"lengths[{name!r}]", given, low=MIN_LENGTH, high=MAX_LENGTH)
+    except ParameterError as error:
+        for step in mechanism.steps:
+            if not isinstance(step, BodyPoint):
+                continue
+            for axis, text in (("along", step.along), ("across", step.across)):
+                if text.lstrip("-") == name and is_number(given) and given < 0:
+                    other = name if text.startswith("-") else f"-{name}"
+                    raise ParameterError(
+                        f"{error}; a point on the other side has the sign in the list of points: {axis!r}:"
+                        f" {other!r} of {step.point!r}"
+                    ) from None
+        raise
 
 
 def checked_path(given: Any, suffix: str) -> Path:
@@ -47,10 +70,10 @@ def checked_path(given: Any, suffix: str) -> Path:
         ParameterError: no path, or a path with another suffix.
     """
     if not isinstance(given, (str, Path)):
-        raise ParameterError(f"path: expected the path of a file that ends in {suffix}, got {given!r}")
+        raise ParameterError(f"path: expected the path of a file that ends in {suffix}, got {brief(given)}")
     path = Path(given)
     if path.suffix != suffix:
-        raise ParameterError(f"path: expected a file that ends in {suffix}, got {str(path)!r}")
+        raise ParameterError(f"path: expected a file that ends in {suffix}, got {brief(str(path))}")
     return path
 
 
@@ -58,7 +81,7 @@ def check_keys(what: str, given: Any, expected: Sequence[str], optional: Sequenc
     """Raise `ParameterError` unless a mapping has all expected keys and no unknown ones."""
     names = ", ".join(expected or optional) or "no entries"
     if not isinstance(given, Mapping):
-        raise ParameterError(f"{what}: expected a mapping with {names}, got {given!r}")
+        raise ParameterError(f"{what}: expected a mapping with {names}, got {brief(given)}")
     missing, unknown = set(expected) - set(given), set(given) - {*expected, *optional}
     if missing or unknown:
         parts = [f"missing {', '.join(sorted(missing))}"] if missing else []
@@ -81,14 +104,14 @@ def check_signs(signs: Mapping[str, Any]) -> None:
     """Raise `ParameterError` unless all values are +1 or -1."""
     for name, sign in signs.items():
         if not is_number(sign) or sign not in (1, -1):
-            raise ParameterError(f"{name}: expected +1 or -1, got {sign!r}")
+            raise ParameterError(f"{name}: expected +1 or -1, got {brief(sign)}")
 
 
 def check_texts(texts: Mapping[str, Any]) -> None:
     """Raise `ParameterError` unless all values are texts."""
     for name, text in texts.items():
         if not isinstance(text, str):
-            raise ParameterError(f"{name}: expected a text, got {text!r}")
+            raise ParameterError(f"{name}: expected a text, got {brief(text)}")
 
 
 def checked_masses(given: Any, bodies: int) -> tuple[float, ...]:
@@ -98,7 +121,7 @@ def checked_masses(given: Any, bodies: int) -> tuple[float, ...]:
         ParameterError: a wrong number of masses, or a mass that is not finite or not above 0.
     """
     if count_of(given) != bodies:
-        raise ParameterError(f"masses: expected {bodies} link masses, got {given!r}")
+        raise ParameterError(f"masses: expected {bodies} link masses, got {brief(given)}")
     return tuple(check_number(f"masses[{i}]", m, low=0, exclusive_low=True) for i, m in enumerate(given))
 
 
@@ -108,7 +131,7 @@ def check_feet(toe: Any, heel: Any, feet: Sequence[str]) -> None:
     given = [foot for foot in (toe, heel) if foot is not None]
     if not all(isinstance(foot, str) for foot in given) or toe is None or sorted(given) != sorted(feet):
         expected = f"{' and '.join(sorted(feet))}, one each" if len(feet) == 2 else f"{feet[0]} and None"
-        raise ParameterError(f"toe and heel: expected {expected}, got {toe!r} and {heel!r}")
+        raise ParameterError(f"toe and heel: expected {expected}, got {brief(toe)} and {heel!r}")
 
 
 def checked_pivot(given: Any, pivots: Sequence[str]) -> Any:
@@ -122,12 +145,12 @@ def checked_pivot(given: Any, pivots: Sequence[str]) -> Any:
     elif len(pivots) == 1:
         given = {pivots[0]: given}
     else:
-        raise ParameterError(f"pivot: expected the places of {', '.join(pivots)} by name, got {given!r}")
+        raise ParameterError(f"pivot: expected the places of {', '.join(pivots)} by name, got {brief(given)}")
     places = {}
     for name in pivots:
         if count_of(given[name]) != 2:
             raise ParameterError(
-                f"pivot: expected two numbers ({name}_x, {name}_y) in metres, got {given[name]!r}"
+                f"pivot: expected two numbers ({name}_x, {name}_y) in metres, got {brief(given[name])}"
             )
         where = "pivot" if len(pivots) == 1 else f"pivot[{name!r}]"
         places[name] = tuple(check_number(f"{where}[{i}]", c) for i, c in enumerate(given[name]))
@@ -184,7 +207,7 @@ def checked_solids(
             if count_of(solid["centre"]) != 2:
                 raise ParameterError(
                     f"{what}['centre']: expected two numbers, along and across from the tail, in metres, "
-                    f"got {solid['centre']!r}"
+                    f"got {brief(solid['centre'])}"
                 )
             # a tuple, which the caller cannot change
             checked["centre"] = tuple(check_number(f"{what}['centre']", part) for part in solid["centre"])

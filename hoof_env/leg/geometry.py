@@ -16,10 +16,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hoof_env._output import staged
-from hoof_env.errors import ParameterError, check_choice, check_number, flag
+from hoof_env.errors import ParameterError, brief, check_choice, check_number, flag
 from hoof_env.leg.checks import (
     check_feet,
     check_keys,
+    check_length,
     check_names,
     check_signs,
     check_texts,
@@ -94,7 +95,7 @@ class Geometry:
         object.__setattr__(self, "mechanism", mechanism)
         check_keys("lengths", self.lengths, mechanism.lengths)
         given = ((name, self.lengths[name]) for name in mechanism.lengths)
-        lengths = {name: check_number(f"lengths[{name!r}]", x, low=1e-3, high=1e3) for name, x in given}
+        lengths = {name: check_length(mechanism, name, x) for name, x in given}
         points = [dyad.point for dyad in mechanism.dyads]
         check_keys("assembly", self.assembly, points)
         check_signs({f"assembly[{p!r}]": self.assembly[p] for p in points} | {"travel": self.travel})
@@ -180,6 +181,9 @@ class Geometry:
     ) -> Pose:
         """Return places, angles, velocities and accelerations of all points and bodies, with O at rest at 0.
 
+        `points` of the result has shape (points, 2), with rows in the order of `mechanism.points`, and
+        `point(name)` is one of them.
+
         Args:
             theta, theta_rate, theta_acc: crank angle from the leg's frame, clockwise in that frame before the
                 mirror of `travel` [rad, rad/s, rad/s^2].
@@ -205,11 +209,12 @@ class Geometry:
 
         Args:
             path: of the file, which ends in .xml.
-            theta, swing: crank angle and swing of the pose in which the model begins [rad].
+            theta, swing: crank angle and swing of the pose in which the model begins [rad]; the commands of
+                the keyframe "pose" hold it.
             trunk: a `Trunk` that carries the leg, at its height; without one, O is held at `hip_height`.
             motor: a `Motor` that drives the crank; without one, the crank turns freely.
             ground: a `Ground`, of which only the friction is used; no ground if None.
-            timestep: of the simulation [s].
+            timestep: of the simulation [s]; a small leg of much less mass per length needs a shorter one.
 
         Raises:
             ParameterError: an invalid number, type or suffix, or no leg at this `theta`.
@@ -308,7 +313,7 @@ def _preset_content(
         }
     if gaits is not None:
         if not isinstance(gaits, Mapping):
-            raise ParameterError(f"gaits: expected a mapping of gaits by name, got {gaits!r}")
+            raise ParameterError(f"gaits: expected a mapping of gaits by name, got {brief(gaits)}")
         check_names("gaits", gaits)
         content["gaits"] = {name: numbers_of(f"gaits[{name!r}]", gait) for name, gait in gaits.items()}
     return content

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from hoof_env.errors import ParameterError, check_choice, check_number, one_of
+from hoof_env.errors import ParameterError, brief, check_choice, check_number, one_of
 from hoof_env.leg.assembly import centres, solve
 from hoof_env.leg.checks import count_of
 from hoof_env.leg.closed_form import Vectors
@@ -89,7 +89,7 @@ class FrameMotion:
         for name in ("position", "velocity", "acceleration"):
             pair = getattr(self, name)
             if count_of(pair) != 2:
-                raise ParameterError(f"frame.{name}: expected two numbers (x, y), got {pair!r}")
+                raise ParameterError(f"frame.{name}: expected two numbers (x, y), got {brief(pair)}")
             object.__setattr__(self, name, tuple(check_number(f"frame.{name}", part) for part in pair))
 
 
@@ -117,6 +117,10 @@ class Pose:
     angles: NDArray[np.float64]
     angular_velocities: NDArray[np.float64]
     angular_accelerations: NDArray[np.float64]
+
+    def __repr__(self) -> str:
+        points, bodies = ", ".join(self.mechanism.points), len(self.angles)
+        return f"<Pose: points, shape {self.points.shape}, of {points}; {bodies} bodies; point(name) is one>"
 
     def point(self, name: str) -> NDArray[np.float64]:
         """Position (x, y) of a named point [m].
@@ -151,7 +155,7 @@ def pose(
     frame = FrameMotion() if frame is None else one_of("frame", frame, FrameMotion)
     mechanism = getattr(geometry, "mechanism", None)
     if not isinstance(mechanism, Mechanism):
-        raise ParameterError(f"geometry: expected Geometry, got {geometry!r}")
+        raise ParameterError(f"geometry: expected Geometry, got {brief(geometry)}")
     z, dz, ddz = (Vectors(w.real[0], w.imag[0]) for w in solve(geometry, [theta]))
     swing = frame.phi, frame.phi_rate, frame.phi_acc
     motion = place(z, dz, ddz, theta_rate, theta_acc, *swing, float(geometry.travel))

@@ -8,7 +8,7 @@ from functools import cache
 from importlib import resources
 from typing import Any
 
-from hoof_env.errors import ParameterError
+from hoof_env.errors import ParameterError, brief
 from hoof_env.leg.mechanism import FRAME, FRAME_NAME, Body, BodyPoint, Dyad, Joint, Mechanism
 
 PARTS = ("fixed", "crank", "points", "bodies", "joints", "feet")
@@ -101,14 +101,14 @@ def _read_bodies(given: Any) -> dict[str, dict[str, Any]]:
         keys = _entries(where, entry, ("name", "tail", "head"), ("length", "points", "role"))
         name = _name(f"{where}.name", keys["name"])
         if name in bodies or name == FRAME_NAME:
-            raise ParameterError(f"{where}: expected a name that no other body has, got {name!r}")
+            raise ParameterError(f"{where}: expected a name that no other body has, got {brief(name)}")
         ends = [_name(f"{where}.{end}", keys[end]) for end in ("tail", "head")]
         points = _names(f"{where}.points", keys.get("points", ()))
         if len({*ends, *points}) < 2 + len(points):
             raise ParameterError(f"{where}: expected points that differ, got {', '.join([*ends, *points])}")
         role = keys.get("role", "")
         if not isinstance(role, str):
-            raise ParameterError(f"{where}.role: expected a text, got {role!r}")
+            raise ParameterError(f"{where}.role: expected a text, got {brief(role)}")
         length = _name(f"{where}.length", keys.get("length", name))
         bodies[name] = {
             "where": where,
@@ -155,7 +155,7 @@ def _read_body_point(
     ends = [body.tail, body.head]
     origin = keys.get("from", body.tail)
     if not _known(origin, ends):
-        raise ParameterError(f"{where}.from: expected an end of {body.name!r}, {ends}, got {origin!r}")
+        raise ParameterError(f"{where}.from: expected an end of {body.name!r}, {ends}, got {brief(origin)}")
     _check_found(where, f"{point!r} lies on body {body.name!r} between", ends, known)
     along, across = (_coordinate(f"{where}.{axis}", keys.get(axis, "")) for axis in ("along", "across"))
     if not along and not across:
@@ -183,7 +183,7 @@ def _measured(read: Mapping[str, Any], known: Mapping[str, None], distances: Any
         apart = ", ".join(sorted("-".join(sorted(pair)) for pair in distances))
         raise ParameterError(
             f"{read['where']}: {body.name!r} needs ends whose distance is a length of the list ({apart}), "
-            f"got {body.tail!r} and {body.head!r}"
+            f"got {brief(body.tail)} and {body.head!r}"
         )
     if length != body.length:
         raise ParameterError(
@@ -199,20 +199,20 @@ def _read_joints(
     for k, entry in enumerate(_list("mechanism.joints", given)):
         where = f"mechanism.joints[{k}]"
         if not isinstance(entry, (list, tuple)) or len(entry) != 3:
-            raise ParameterError(f"{where}: expected [point, body, body or 'frame'], got {entry!r}")
+            raise ParameterError(f"{where}: expected [point, body, body or 'frame'], got {brief(entry)}")
         point, *names = entry
         for name, able in zip(names, (numbers, (*numbers, FRAME_NAME)), strict=True):
             if not _known(name, able):
                 raise ParameterError(
                     f"{where}: expected [point, body, body or 'frame'] with bodies of the list "
-                    f"({', '.join(numbers)}), got {entry!r}"
+                    f"({', '.join(numbers)}), got {brief(entry)}"
                 )
         i, j = (FRAME if name == FRAME_NAME else numbers[name] for name in names)
         for number, name in ((i, names[0]), (j, names[1])):
             points = fixed if number == FRAME else bodies[number].all_points
             if not _known(point, points):
                 raise ParameterError(
-                    f"{where}: expected a point of {name!r}, one of {', '.join(points)}, got {point!r}"
+                    f"{where}: expected a point of {name!r}, one of {', '.join(points)}, got {brief(point)}"
                 )
         yield Joint(point, i, j)
 
@@ -222,7 +222,7 @@ def _read_welds(given: Any, numbers: Mapping[str, int]) -> Iterator[tuple[int, i
         pair = entry if isinstance(entry, (list, tuple)) else ()
         if len(pair) != 2 or not all(_known(name, numbers) for name in pair):
             raise ParameterError(
-                f"mechanism.welds[{k}]: expected two bodies of {', '.join(numbers)}, got {entry!r}"
+                f"mechanism.welds[{k}]: expected two bodies of {', '.join(numbers)}, got {brief(entry)}"
             )
         yield numbers[pair[0]], numbers[pair[1]]
 
@@ -318,7 +318,7 @@ def _check_groups(mechanism: Mechanism) -> None:
 
 def _entries(where: str, given: Any, required: Sequence[str], optional: Sequence[str] = ()) -> dict[str, Any]:
     if not isinstance(given, Mapping):
-        raise ParameterError(f"{where}: expected an object with {', '.join(required)}, got {given!r}")
+        raise ParameterError(f"{where}: expected an object with {', '.join(required)}, got {brief(given)}")
     missing = [name for name in required if name not in given]
     unknown = [str(name) for name in given if name not in (*required, *optional)]
     if missing or unknown:
@@ -336,17 +336,17 @@ def _known(given: Any, names: Container[str]) -> bool:
 
 def _list(where: str, given: Any) -> Sequence[Any]:
     if not isinstance(given, (list, tuple)):
-        raise ParameterError(f"{where}: expected a list, got {given!r}")
+        raise ParameterError(f"{where}: expected a list, got {brief(given)}")
     return given
 
 
 def _name(where: str, given: Any) -> str:
     if not isinstance(given, str) or not given or given.startswith("-"):
-        raise ParameterError(f"{where}: expected a name, got {given!r}")
+        raise ParameterError(f"{where}: expected a name, got {brief(given)}")
     # Names become columns of files, with these characters as separators.
     if not given.isprintable() or any(letter in given for letter in ',;"'):
         raise ParameterError(
-            f"{where}: expected a name that prints, without comma, semicolon and quotes, got {given!r}"
+            f"{where}: expected a name that prints, without comma, semicolon and quotes, got {brief(given)}"
         )
     return given
 
@@ -362,7 +362,7 @@ def _coordinate(where: str, given: Any) -> str:
     if isinstance(given, str) and not given:
         return ""
     if not isinstance(given, str) or not given.removeprefix("-") or given.startswith("--"):
-        raise ParameterError(f"{where}: expected the name of a length, or '-' and a name, got {given!r}")
+        raise ParameterError(f"{where}: expected the name of a length, or '-' and a name, got {brief(given)}")
     return given
 
 

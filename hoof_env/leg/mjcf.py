@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 
 from hoof_env._output import staged
 from hoof_env.constants import GRAVITY
-from hoof_env.errors import GeometryError, ParameterError, check_number
+from hoof_env.errors import GeometryError, ParameterError, brief, check_number
 from hoof_env.leg.checks import checked_path
 from hoof_env.leg.kinematics import FrameMotion, Pose, pose
 from hoof_env.leg.link_tree import CRANK_LINK, LinkTree, link_tree
@@ -39,11 +39,23 @@ does."""
 IMPEDANCE = "0.9999 0.9999 0.001 0.5 2"
 """Impedance of the loops, as near to rigid as MuJoCo goes."""
 
+HIP_HEIGHT = 1.7
+"""Hip height of the leg for which the servo's gains are given, about that of the default one [m]."""
+
 SWING_STIFFNESS = 2e4
-"""Stiffness of the servo that holds the swing [N m/rad]: 500 N at a hoof 1.4 m below turn it by 2 degrees."""
+"""Stiffness of the servo that holds the swing [N m/rad]: 500 N at a hoof 1.4 m below turn it by 2 degrees.
+
+The gains of other legs go with the cube of the hip height, as inertias do, so that frequency and damping
+ratio stay, and with them the time step that MuJoCo needs."""
 
 SWING_DAMPING = 400.0
 """Damping of the servo that holds the swing [N m s/rad]."""
+
+POSE = "pose"
+"""Name of the keyframe whose commands hold the pose that is written."""
+
+MAX_ANGLE = 1e3
+"""Largest angle of a pose [rad]; of larger ones rounding takes digits."""
 
 LIGHT = 1e-6
 """Placeholder mass [kg] and inertia [kg m^2] of the massless swing frame; MuJoCo requires positive values."""
@@ -164,8 +176,10 @@ def leg_to_mjcf(
     timestep: float,
 ) -> str:
     """Check the arguments of `Geometry.to_mjcf`, return the model, write it; angles are theta and swing."""
-    theta = check_number("theta", angles[0])
-    swing = check_number("swing", angles[1])
+    theta, swing = (
+        check_number(name, angle, low=-MAX_ANGLE, high=MAX_ANGLE)
+        for name, angle in zip(("theta", "swing"), angles, strict=True)
+    )
     timestep = check_number("timestep", timestep, low=0, high=0.1, exclusive_low=True)
     for name, given, kind, needed in (
         ("trunk", trunk, TrunkLike, "a Trunk"),
@@ -174,7 +188,7 @@ def leg_to_mjcf(
     ):
         # a class has the names of its fields' defaults, but is no part
         if given is not None and (isinstance(given, type) or not isinstance(given, kind)):
-            raise ParameterError(f"{name}: expected {needed} of this package or None, got {given!r}")
+            raise ParameterError(f"{name}: expected {needed} of this package or None, got {brief(given)}")
     if not np.isfinite(geometry.pose(theta, swing).points).all():
         raise GeometryError(f"theta: the leg cannot be assembled at a crank angle of {theta:g} rad")
     trunk = trunk or Held(geometry.hip_height)
@@ -219,9 +233,13 @@ def write_mjcf(
     body = ET.SubElement(world, "body", name="trunk", pos=_place(complex(*position)))
     _add_inertia(body, 0j, trunk.mass, trunk.pitch_inertia)
     _hang(body, trunk, position, sum(leg.geometry.mass for leg in legs))
-    parts = {name: ET.SubElement(root, name) for name in ("equality", "tendon", "actuator")}
+    parts = {name: ET.SubElement(root, name) for name in ("equality", "tendon", "actuator", "keyframe")}
     for leg in legs:
         _add_leg(body, parts, leg, trunk, options)
+    commands = {f"swing{leg.label}": leg.swing for leg in legs}
+    held = [commands.get(actuator.attrib["name"], 0.0) for actuator in parts["actuator"]]
+    if held:
+        ET.SubElement(parts["keyframe"], "key", name=POSE, ctrl=" ".join(map(_text, held)))
     for name, part in parts.items():
         if not len(part):
             root.remove(root.find(name))  # type: ignore[arg-type]
@@ -279,13 +297,14 @@ def _add_leg(
         hinge = ET.SubElement(frame, "joint", name=f"swing{leg.label}", type="hinge")
         hinge.set("axis", _axis(leg.geometry.travel))
         hinge.set("ref", _text(leg.swing))
+        size = (leg.geometry.hip_height / HIP_HEIGHT) ** 3
         ET.SubElement(
             parts["actuator"],
             "position",
             name=f"swing{leg.label}",
             joint=f"swing{leg.label}",
-            kp=_text(SWING_STIFFNESS),
-            kv=_text(SWING_DAMPING),
+            kp=_text(size * SWING_STIFFNESS),
+            kv=_text(size * SWING_DAMPING),
         )
         hip = 0j
     turns = trunk.kind == "free" or options.swings

@@ -13,7 +13,8 @@ from importlib import resources
 from pathlib import Path
 from typing import Any
 
-from hoof_env.errors import DataFileError, ParameterError, check_choice
+from hoof_env._input import read_text
+from hoof_env.errors import DataFileError, ParameterError, brief, check_choice
 
 DEFAULT_PRESET = "identified"
 """The leg of the paper's reproduction."""
@@ -69,10 +70,16 @@ def read_preset(source: Preset) -> dict[str, Any]:
 
 
 def _read_file(source: str | Path) -> dict[str, Any]:
+    """Return the content of a preset by name or path."""
+    if not isinstance(source, (str, Path)):
+        raise ParameterError(
+            f"preset: expected one of {', '.join(_shipped())}, a file that ends in .json, as"
+            f" Geometry.save writes it with gaits, or the content of one, got {brief(source)}"
+        )
     is_path = isinstance(source, Path) or str(source).endswith(".json")
     label = Path(source) if is_path else check_choice("preset", source, _shipped())
     try:
-        data = json.loads(Path(source).read_text(encoding="utf-8") if is_path else _shipped_text(str(label)))
+        data = json.loads(read_text(Path(source)) if is_path else _shipped_text(str(label)))
     except OSError as error:
         raise DataFileError(f"cannot read {label}: {error.strerror or error}") from None
     except (ValueError, RecursionError) as error:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import sys
 import traceback
 from collections.abc import Callable
@@ -13,15 +14,16 @@ from typing import Any
 import gymnasium as gym
 import numpy as np
 
+from hoof_env._input import as_path
 from hoof_env.envs.open_loop import load_open_loop, open_loop_record
 from hoof_env.envs.policies import constant_gait, make_policy, policy_names
 from hoof_env.envs.shipped import SHIPPED
-from hoof_env.errors import DataFileError, MissingExtraError, ParameterError, count
+from hoof_env.errors import DataFileError, MissingExtraError, ParameterError, brief, count
 from hoof_env.gait import PARAMETERS, GaitParameters
 from hoof_env.policies.onnx_file import FILE, OnnxPolicy
 from hoof_env.policies.plain import ABOUT, NumpyPolicy
-from hoof_env.policies.record import own_id, same_id
-from hoof_env.policies.saved import CHECKPOINTS, SavedModel
+from hoof_env.policies.record import describe_spaces, own_id, refuse_misfit, same_id
+from hoof_env.policies.saved import CHECKPOINTS, SavedModel, TrainedPolicy
 
 MODEL = "model.zip"
 
@@ -41,14 +43,15 @@ def shipped_policy(env_id: str) -> NumpyPolicy:
     return NumpyPolicy(SHIPPED / own_id(env_id).rpartition("/")[2])
 
 
-def find_saved(path: Path) -> OnnxPolicy | SavedModel:
+def find_saved(path: Path | str) -> OnnxPolicy | SavedModel:
     """Return the policy in a file or a folder: the .onnx if there is one, else the model of agents.train.
 
     Raises:
         DataFileError: there is no policy, or its file or record cannot be read.
         HoofEnvError: the .onnx needs onnxruntime, which is not installed.
     """
-    is_onnx = path.suffix.lower() == ".onnx" or (path / FILE).is_file()
+    path = as_path("path", path)
+    is_onnx = path.suffix.lower() == ".onnx" or os.path.isfile(path / FILE)
     return OnnxPolicy(path) if is_onnx else SavedModel.find(path)
 
 
@@ -59,7 +62,7 @@ def is_model(name: str) -> bool:
     is_path = (
         name.lower().endswith((".zip", ".onnx"))
         or Path(name).name != name
-        or any((Path(name) / part).exists() for part in (MODEL, ABOUT, FILE, CHECKPOINTS))
+        or any(os.path.exists(Path(name) / part) for part in (MODEL, ABOUT, FILE, CHECKPOINTS))
     )
     return (is_path and not name.endswith(".json")) or name == "shipped"
 
@@ -127,8 +130,9 @@ def is_function(name: str) -> bool:
     return function.isidentifier() and all(part.isidentifier() for part in module.split("."))
 
 
-def find_function(name: str, actions: int) -> Function:
-    """Return the function MODULE:NAME, of this folder or installed; `ParameterError` if there is none."""
+def find_function(name: str, env: gym.Env[Any, Any]) -> Any:
+    """Return the policy MODULE:NAME, a function or an object with `predict`, of this folder or installed;
+    `ParameterError` if there is none."""
     module, _, function = name.partition(":")
     # MODULE may lie in the working folder, which not every interpreter searches.
     if "" not in sys.path:
@@ -136,13 +140,33 @@ def find_function(name: str, actions: int) -> Function:
     try:
         act = getattr(import_module(module), function)
     except (ImportError, AttributeError, SyntaxError) as error:
-        raise ParameterError(f"policy: expected MODULE:NAME, got {name!r}: {error}") from error
+        raise ParameterError(f"policy: expected MODULE:NAME, got {brief(name)}: {error}") from error
     # The module is the user's, and may fail in any way.
     except Exception as error:
-        raise ParameterError(f"policy: expected MODULE:NAME, got {name!r}; {_place(error)}") from error
-    if not callable(act):
-        raise ParameterError(f"policy {name}: expected a function of observations, got {act!r}")
-    return Function(name, act, actions)
+        raise ParameterError(f"policy: expected MODULE:NAME, got {brief(name)}; {_place(error)}") from error
+    if not isinstance(act, type) and hasattr(act, "predict"):
+        return policy_of(act, env)
+    if not callable(act) or isinstance(act, type):
+        raise ParameterError(
+            f"policy {name}: expected a function of observations, or an object with predict, got {brief(act)}"
+        )
+    return Function(name, act, gym.spaces.flatdim(env.action_space))
+
+
+def policy_of(policy: Any, env: gym.Env[Any, Any] | None) -> Any:
+    """Return a policy that is an object with `predict`: a model of Stable-Baselines3 with the normalisation
+    of its environment, and any other one as it is.
+
+    Raises:
+        DataFileError: a model of other spaces.
+    """
+    if not hasattr(policy, "get_vec_normalize_env"):
+        return policy
+    if env is not None:
+        refuse_misfit(Path(type(policy).__name__), describe_spaces(policy), describe_spaces(env))
+    statistics = policy.get_vec_normalize_env()
+    is_normalised = statistics is not None and statistics.norm_obs
+    return TrainedPolicy(policy, statistics.normalize_obs if is_normalised else None)
 
 
 # -- all policies ------------------------------------------------------------------------------
@@ -182,14 +206,15 @@ def find_policy(name: str | None, env: gym.Env[Any, Any], env_id: str, seed: int
         return make_policy(str(name), env, seed)
     text = str(name)
     if is_function(text):
-        return find_function(text, gym.spaces.flatdim(env.action_space))
+        return find_function(text, env)
     if text == "shipped" or text in shipped_ids():
         return shipped_policy(env_id if text == "shipped" else text).load(env, env_id)
-    if is_model(text) or (text and Path(text).is_dir()):
+    if is_model(text) or (text and os.path.isdir(text)):
         return _load_saved(find_saved(Path(text)), env, env_id)
     if not is_ours:
         raise ParameterError(
-            f"policy: expected the path of a trained model, for none is scripted for {env_id}, got {name!r}"
+            f"policy: expected the path of a trained model, for none is scripted for {env_id}, got"
+            f" {brief(name)}"
         )
     if text.endswith(".json"):
         return load_open_loop(text, env)
@@ -203,7 +228,8 @@ def find_policy(name: str | None, env: gym.Env[Any, Any], env_id: str, seed: int
         return constant_gait(GaitParameters(*numbers), env, starts_in_it=True)
     raise ParameterError(
         f"policy: expected a name ({', '.join(names_of(env))}), four gait parameters as "
-        f"6.28,0.7,-0.2,-0.3, module:function, or the path of a trained model or a gait's .json, got {name!r}"
+        f"6.28,0.7,-0.2,-0.3, module:function, or the path of a trained model or a gait's .json, got"
+        f" {brief(name)}"
     )
 
 
@@ -243,9 +269,11 @@ def load_policy(policy: Any, env: gym.Env[Any, Any] | None = None, seed: int = 0
             - the path of an open-loop gait, a .json;
             - a gait of one leg, in which episodes start: `GaitParameters`, or crank speed [rad/s], swing
               offset, sine and cosine coefficient [rad] as four numbers or as a text "6.28,0.7,-0.2,-0.3";
-            - "module:function", or a function of observations, shape (n, k), that returns actions.
-        env: the environment that it is to play. It may be left out for an id that ships and for an .onnx
-            file, which are then not compared with any environment.
+            - "module:name", or what it names: a function of observations, shape (n, k), that returns actions,
+              or an object with `predict`, such as a model of Stable-Baselines3, which plays with the
+              normalisation of its environment.
+        env: the environment that it is to play. It may be left out for an id that ships, an .onnx file and an
+            object, which are then not compared with any environment.
         seed: seed of the policy "random".
 
     Raises:
@@ -254,15 +282,19 @@ def load_policy(policy: Any, env: gym.Env[Any, Any] | None = None, seed: int = 0
         ParameterError: no such name, or an environment is needed.
         MissingExtraError: an extra is missing that the file needs.
     """
+    is_object = hasattr(policy, "predict") and not isinstance(policy, type)
     if env is None:
-        return _load_alone(policy)
+        return policy_of(policy, env) if is_object else _load_alone(policy)
     if not isinstance(env, gym.Env):
         raise ParameterError(
             "env: expected a single environment, as gymnasium.make returns it, for its policy plays many"
-            f" observations, too: load_policy(policy, env); got {env!r}"
+            f" observations, too: load_policy(policy, env); got {brief(env)}"
         )
     count("seed", seed, low=0)
     spec = env.spec
+    # Before functions: a network is callable, and would return more than actions.
+    if is_object:
+        return policy_of(policy, env)
     if callable(policy) and not isinstance(policy, type):
         actions = gym.spaces.flatdim(env.action_space)
         return Function(getattr(policy, "__name__", repr(policy)), policy, actions)
@@ -271,10 +303,10 @@ def load_policy(policy: Any, env: gym.Env[Any, Any] | None = None, seed: int = 0
     if isinstance(policy, (tuple, list, np.ndarray)):
         values = policy.tolist() if isinstance(policy, np.ndarray) else list(policy)
         if not isinstance(values, list) or len(values) != len(PARAMETERS):
-            raise ParameterError(f"policy: expected four gait parameters, got {policy!r}")
+            raise ParameterError(f"policy: expected four gait parameters, got {brief(policy)}")
         return constant_gait(GaitParameters(*values), env, starts_in_it=True)
     if not isinstance(policy, (str, Path)):
-        raise ParameterError(f"policy: expected a name, a path, a gait or a function, got {policy!r}")
+        raise ParameterError(f"policy: expected a name, a path, a gait or a function, got {brief(policy)}")
     name = str(policy)
     # An environment that gymnasium.make has not made has no id: it is taken for that of the file.
     env_id = spec.id if spec else read_policy_record(name).get("env_id", type(env.unwrapped).__name__)
@@ -288,9 +320,9 @@ def _load_alone(policy: Any) -> Any:
         for env_id in shipped_ids():
             if same_id(text, env_id):
                 return shipped_policy(env_id)
-        if Path(text).suffix.lower() == ".onnx" or (Path(text) / FILE).is_file():
+        if Path(text).suffix.lower() == ".onnx" or os.path.isfile(Path(text) / FILE):
             return OnnxPolicy(Path(text))
     raise ParameterError(
-        f"policy {policy!r}: expected the environment, too, load_policy(policy, env); without it, an .onnx"
-        f" file or one of {', '.join(shipped_ids())}"
+        f"policy {brief(policy)}: expected the environment, too, load_policy(policy, env); without it, an"
+        f" .onnx file or one of {', '.join(shipped_ids())}"
     )

@@ -8,6 +8,7 @@ nor what its actions mean.
 from __future__ import annotations
 
 import json
+import os
 from copy import deepcopy
 from pathlib import Path
 from typing import Any
@@ -16,8 +17,9 @@ import gymnasium as gym
 import numpy as np
 from numpy.typing import NDArray
 
+from hoof_env._input import as_path, check_regular
 from hoof_env._output import staged
-from hoof_env.errors import DataFileError, HoofEnvError, MissingExtraError, ParameterError, parse_json
+from hoof_env.errors import DataFileError, HoofEnvError, MissingExtraError, ParameterError, brief, parse_json
 from hoof_env.policies.file_policy import FilePolicy
 from hoof_env.policies.record import about
 
@@ -55,22 +57,25 @@ class OnnxPolicy(FilePolicy):
         HoofEnvError: onnxruntime is not installed.
     """
 
-    def __init__(self, path: Path, content: bytes | None = None) -> None:
+    def __init__(self, path: Path | str, content: bytes | None = None) -> None:
+        path = as_path("path", path)
         try:
             import onnxruntime
         except ImportError:
             raise HoofEnvError(
                 f'policy {path}: reading it needs onnxruntime: pip install "hoof-env[onnx]"'
             ) from None
-        super().__init__(path / FILE if path.is_dir() else path)
+        super().__init__(path / FILE if os.path.isdir(path) else path)
         options = onnxruntime.SessionOptions()
         # One thread: in a small network, waiting for other threads takes longer than the arithmetic.
         options.intra_op_num_threads = 1
         options.inter_op_num_threads = 1
         options.log_severity_level = 3  # errors only
         try:
-            read = self.path.read_bytes() if content is None else content
-            self._session = onnxruntime.InferenceSession(read, options, ["CPUExecutionProvider"])
+            if content is None:
+                check_regular(self.path)
+                content = self.path.read_bytes()
+            self._session = onnxruntime.InferenceSession(content, options, ["CPUExecutionProvider"])
             metadata = self._session.get_modelmeta().custom_metadata_map
             self.record = {key: _entry(key, text) for key, text in metadata.items()}
             self._read_graph()
@@ -129,7 +134,7 @@ def _entry(key: str, text: str) -> Any:
         value = None
     kind, words = (dict, "object") if key in OBJECTS else (list, "list")
     if not isinstance(value, kind):
-        raise ValueError(f"metadata {key}: expected a JSON {words}, got {text[:80]!r}")
+        raise ValueError(f"metadata {key}: expected a JSON {words}, got {brief(text[:80])}")
     return value
 
 
@@ -165,17 +170,18 @@ def stamp_onnx(path: str | Path, env: gym.Env[Any, Any], **record: str) -> OnnxP
         raise MissingExtraError('stamping an ONNX file needs onnx: pip install "hoof-env[onnx]"') from None
     if not isinstance(env, gym.Env) or env.spec is None:
         raise ParameterError(
-            f"env: expected a single environment made by gymnasium.make, stamp_onnx(path, env), got {env!r}"
+            f"env: expected a single environment made by gymnasium.make, stamp_onnx(path, env), got"
+            f" {brief(env)}"
         )
     if not isinstance(path, (str, Path)) or Path(path).suffix.lower() != ".onnx":
-        raise ParameterError(f"path: expected that of a file that ends in .onnx, got {path!r}")
+        raise ParameterError(f"path: expected that of a file that ends in .onnx, got {brief(path)}")
     file = Path(path)
     known = about(env, env.spec.id, arguments_of(env), {})
     if taken := sorted(known.keys() & record):
         raise ParameterError(f"record: expected entries besides those that are read off env, got {taken}")
     for key, value in record.items():
         if not isinstance(value, str):
-            raise ParameterError(f'{key}: expected a text, as in seed="3", got {value!r}')
+            raise ParameterError(f'{key}: expected a text, as in seed="3", got {brief(value)}')
     metadata = known | record
     try:
         graph = onnx.load(file)

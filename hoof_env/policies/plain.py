@@ -17,6 +17,7 @@ import numpy as np
 from gymnasium import spaces
 from numpy.typing import NDArray
 
+from hoof_env._input import as_path, check_regular, read_text
 from hoof_env.errors import DataFileError, parse_json
 from hoof_env.policies.file_policy import FilePolicy
 from hoof_env.policies.record import read_record
@@ -53,11 +54,12 @@ class NumpyPolicy(FilePolicy):
         DataFileError: the files cannot be read, or are of a policy that `is_known` does not know.
     """
 
-    def __init__(self, path: Path) -> None:
+    def __init__(self, path: Path | str) -> None:
+        path = as_path("path", path)
         super().__init__(path)
         self.record = read_record(path)
         try:
-            about = parse_json((path / ABOUT).read_text(encoding="utf-8"))
+            about = parse_json(read_text(path / ABOUT))
             if not is_known(about):
                 raise ValueError(f"a policy that NumPy does not play: {about.get('algo')} {about['policy']}")
             self.observation_space = built_box(**about["observation_space"])
@@ -104,13 +106,15 @@ def is_known(about: Mapping[str, Any]) -> bool:
     return is_kind and set(arguments) <= set(KNOWN) and kind.get("torch.nn") in ACTIVATIONS
 
 
-def read_tensors(path: Path) -> dict[str, Floats]:
+def read_tensors(path: Path | str) -> dict[str, Floats]:
     """Read a file of safetensors with numbers of float32, by name.
 
     Raises:
         OSError, ValueError, TypeError, KeyError: there is no such file, it is damaged, or its numbers are of
             another type or not finite.
     """
+    path = as_path("path", path)
+    check_regular(path)
     content = path.read_bytes()
     start = 8 + int.from_bytes(content[:8], "little")
     tensors = {}

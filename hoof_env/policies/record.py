@@ -14,8 +14,9 @@ from typing import Any
 
 import gymnasium as gym
 
+from hoof_env._input import as_path, read_text
 from hoof_env._version import __version__
-from hoof_env.errors import DataFileError, parse_json
+from hoof_env.errors import DataFileError, bounded, brief, parse_json
 
 RECORD = {
     "env_kwargs": dict,
@@ -26,16 +27,6 @@ RECORD = {
     "resumed": list,
 }
 """Types of the optional entries of run.json that are checked; env_id and algo are required."""
-
-
-MOST_LETTERS = 120
-"""Number of letters of a setting in a warning."""
-
-
-def _short(value: Any) -> str:
-    """Return a setting in a warning: the begin of one that takes many lines, as a leg of one's own does."""
-    text = repr(value)
-    return text if len(text) <= MOST_LETTERS else f"{text[:MOST_LETTERS]}..."
 
 
 def describe_spaces(env: Any) -> dict[str, Any]:
@@ -120,7 +111,7 @@ def environment_of(
         return env_id, {}  # arguments of another environment would not fit
     kwargs: dict[str, Any] = record.get("env_kwargs", {})
     if not isinstance(kwargs, dict):
-        raise DataFileError(f"{path}: env_kwargs: expected arguments by name, got {kwargs!r}")
+        raise DataFileError(f"{path}: env_kwargs: expected arguments by name, got {brief(kwargs)}")
     # Ids that the file alone asks for. An `env_id` of the user is trusted and may import its module.
     asks = {"env_id": trained_id} if env_id is None else {}
     asks |= {"task": kwargs["task"]} if ":" in str(kwargs.get("task", "")) else {}
@@ -209,7 +200,7 @@ def check_record(path: Path, record: dict[str, Any], env: Any, env_id: str) -> N
     # Environments of other packages have no settings to compare.
     names = sorted({*here, *record.get("settings", {})}) if here else []
     unlike = [
-        f"{key}={_short(there.get(key))}, here {_short(here.get(key))}"
+        f"{key}={brief(there.get(key))}, here {brief(here.get(key))}"
         for key in names
         if there.get(key) != here.get(key)
     ]
@@ -217,17 +208,18 @@ def check_record(path: Path, record: dict[str, Any], env: Any, env_id: str) -> N
     if made_with != __version__:
         unlike.append(f"hoof-env {made_with}, here {__version__}")
     if unlike:
-        warnings.warn(f"policy {path}: trained with {'; '.join(unlike)}", stacklevel=3)
+        warnings.warn(bounded(f"policy {path}: trained with {'; '.join(unlike)}"), stacklevel=3)
 
 
-def read_record(folder: Path) -> dict[str, Any]:
+def read_record(folder: Path | str) -> dict[str, Any]:
     """Return the content of run.json in `folder`, empty if the file is missing; raise `DataFileError` if it
     cannot be read."""
+    folder = as_path("folder", folder)
     path = folder / "run.json"
     if not path.is_file():
         return {}
     try:
-        record: dict[str, Any] = parse_json(path.read_text(encoding="utf-8"))
+        record: dict[str, Any] = parse_json(read_text(path))
         kinds = {"env_id": str, "algo": str} | {key: kind for key, kind in RECORD.items() if key in record}
         if unlike := [key for key, kind in kinds.items() if not isinstance(record[key], kind)]:
             raise TypeError(f"{unlike[0]}: {record[unlike[0]]!r}")
@@ -236,7 +228,7 @@ def read_record(folder: Path) -> dict[str, Any]:
             seconds = record["finished"]["seconds"]
             record["finished"] |= {"steps": int(steps), "seconds": float(seconds)}
         return record
-    except (OSError, ValueError, TypeError, KeyError) as error:
+    except (OSError, ValueError, TypeError, KeyError, OverflowError) as error:
         raise DataFileError(
             f"{path}: expected the JSON object of agents.train with env_id and algo: {error!r}"
         ) from None

@@ -14,6 +14,7 @@ from __future__ import annotations
 
 import json
 import math
+import os
 import warnings
 import zipfile
 from dataclasses import dataclass
@@ -24,13 +25,17 @@ from typing import Any
 import gymnasium as gym
 
 from hoof_env._collector import paused
+from hoof_env._input import as_path, read_text
 from hoof_env.errors import (
     DataFileError,
     MissingExtraError,
     ParameterError,
+    brief,
     check_choice,
     parse_json,
 )
+from hoof_env.policies.normalisation import STATISTICS as STATISTICS
+from hoof_env.policies.normalisation import normaliser_of
 from hoof_env.policies.plain import ABOUT as ABOUT
 from hoof_env.policies.plain import FORMAT, Normalizer, built_box
 from hoof_env.policies.plain import WEIGHTS as WEIGHTS
@@ -45,7 +50,6 @@ from hoof_env.policies.record import read_record as read_record
 from hoof_env.policies.record import settings_of as settings_of
 
 FILE = "policy.onnx"
-STATISTICS = "vecnormalize.pkl"
 CHECKPOINTS = "checkpoints"
 
 ALGORITHMS = {
@@ -61,13 +65,14 @@ MARKS = {"tqc": "top_quantiles_to_drop_per_net", "sac": "target_entropy", "td3":
 """Entry by which the data in a .zip are known to be of an algorithm; TQC has that of SAC, too."""
 
 
-def algorithm_of(path: Path) -> str:
+def algorithm_of(path: Path | str) -> str:
     """Return the algorithm of `ALGORITHMS` that plays a .zip of Stable-Baselines3, "ppo" for those without a
     mark, among them A2C, whose policy is that of PPO. Nothing is unpickled.
 
     Raises:
         OSError, KeyError, ValueError, zipfile.BadZipFile: not such a file.
     """
+    path = as_path("path", path)
     with zipfile.ZipFile(path) as file:
         entries = parse_json(file.read("data"))
     return next((algo for algo, mark in MARKS.items() if mark in entries), "ppo")
@@ -123,17 +128,19 @@ class SavedModel:
     record: dict[str, Any]
 
     @classmethod
-    def find(cls, path: Path) -> SavedModel:
+    def find(cls, path: Path | str) -> SavedModel:
         """Return the model at `path`, a .zip or a run folder; raise `DataFileError` if there is none.
 
         A run folder without a model, as its training has not ended, gives its last checkpoint.
         """
-        saved = cls(path / "model.zip" if path.is_dir() else path, {})
-        if path.is_dir() and not (saved.path.is_file() or saved.is_plain):
+        path = as_path("path", path)
+        is_folder = os.path.isdir(path)
+        saved = cls(path / "model.zip" if is_folder else path, {})
+        if is_folder and not (os.path.isfile(saved.path) or saved.is_plain):
             folders = [folder for folder in (path / CHECKPOINTS).glob("*") if folder.name.isdigit()]
             last = max(folders, key=lambda folder: int(folder.name), default=path)
             saved = cls(last / "model.zip", {})
-        if not (saved.path.is_file() or saved.is_plain):
+        if not (os.path.isfile(saved.path) or saved.is_plain):
             raise DataFileError(
                 f"model {path}: expected a .zip of agents.train or its run folder, found no {saved.path}"
             )
@@ -176,6 +183,9 @@ class SavedModel:
             origin = "a model saved by Stable-Baselines3"
         try:
             policy = read_plain(self.path.parent) if self.is_plain else self._unpickle(env)
+        # A warning where a caller makes errors of warnings
+        except (DataFileError, UserWarning):
+            raise
         # Damaged files raise exceptions of any type.
         except Exception as error:
             reason = f"{type(error).__name__}: {error}".splitlines()[0]
@@ -184,29 +194,23 @@ class SavedModel:
         return policy
 
     def _unpickle(self, env: gym.Env[Any, Any]) -> TrainedPolicy:
-        """Load the .zip and the statistics of observations next to it, if there are any."""
-        from stable_baselines3.common.vec_env import DummyVecEnv, VecNormalize
-
+        """Load the .zip and the statistics of observations beside it, if there are any."""
         algo = self.record.get("algo") or algorithm_of(self.path)
         model = algorithm_class(algo).load(self.path, device="cpu")
-        statistics = self.path.with_name(STATISTICS)
-        if not statistics.is_file():
-            return TrainedPolicy(model, None)
-        return TrainedPolicy(
-            model, VecNormalize.load(str(statistics), DummyVecEnv([lambda: env])).normalize_obs
-        )
+        return TrainedPolicy(model, normaliser_of(model, self.path, env))
 
 
 # -- the same as plain data --------------------------------------------------------------------
 
 
-def save_policy(model: Any, folder: Path) -> bool:
+def save_policy(model: Any, folder: Path | str) -> bool:
     """Write the policy of a Stable-Baselines3 model into `folder` as plain data.
 
     Returns:
         True, or False if nothing is written, because the policy's arguments are not plain data or its spaces
         are not boxes.
     """
+    folder = as_path("folder", folder)
     from safetensors.torch import save
 
     envs: Any = model.get_vec_normalize_env()
@@ -241,12 +245,13 @@ def save_policy(model: Any, folder: Path) -> bool:
     return True
 
 
-def read_plain(folder: Path) -> TrainedPolicy:
+def read_plain(folder: Path | str) -> TrainedPolicy:
     """Read the policy that `save_policy` wrote into `folder`, without a model's other parts. Damaged files
     raise exceptions of any type."""
+    folder = as_path("folder", folder)
     from safetensors.torch import load_file
 
-    about = parse_json((folder / ABOUT).read_text(encoding="utf-8"))
+    about = parse_json(read_text(folder / ABOUT))
     if about["format"] != FORMAT:
         raise ValueError(f"format {about['format']!r}, expected {FORMAT}")
     # Without set-up, which needs an environment and makes a replay buffer; only the policy is built.
@@ -306,7 +311,7 @@ def _built(value: Any) -> Any:
         if value.keys() == {"torch.nn"}:
             kind = getattr(nn, str(value["torch.nn"]))
             if not (isinstance(kind, type) and issubclass(kind, nn.Module)):
-                raise ValueError(f"expected the name of a torch.nn module, got {value['torch.nn']!r}")
+                raise ValueError(f"expected the name of a torch.nn module, got {brief(value['torch.nn'])}")
             return kind
         return {key: _built(inner) for key, inner in value.items()}
     return [_built(inner) for inner in value] if isinstance(value, list) else value

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from hoof_env.errors import ParameterError, count
+from hoof_env.errors import ParameterError, brief, count
 
 MIN_SIZE = (480, 270)  # below this the lettering is not readable [pixels]
 USUAL_SIZE = 960, 540  # [pixels]
@@ -27,6 +27,7 @@ def check_size(size: Any) -> tuple[int, int]:
         good = False
     if not good:
         raise ParameterError(
-            f"size: expected (width, height) from {low_w} x {low_h} to {high} x {high} pixels, got {size!r}"
+            f"size: expected (width, height) from {low_w} x {low_h} to {high} x {high} pixels, got"
+            f" {brief(size)}"
         )
     return int(width), int(height)

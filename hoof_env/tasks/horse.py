@@ -26,7 +26,7 @@ from numpy.typing import NDArray
 from hoof_env.constants import GRAVITY
 from hoof_env.dynamics.engine import TrunkEngine
 from hoof_env.dynamics.parts import FREE, TRUNKS, Drive, HoofSpring, Limb, Limits, Motor, Trunk
-from hoof_env.errors import ParameterError, check_choice, check_number, count
+from hoof_env.errors import ParameterError, brief, check_choice, check_number, count
 from hoof_env.gait import PARAMETERS, QUICK, WIDEST, FilterSettings
 from hoof_env.ground.contact import Ground
 from hoof_env.ground.terrain import Terrain
@@ -174,7 +174,7 @@ class Horse:
         self.size = checked_size(s.size)
         self.speed_scale = math.sqrt(self.size)
         if s.trunk != TRUNKS[FREE]:
-            raise ParameterError(f'trunk: expected "free" of a horse, got {s.trunk!r}')
+            raise ParameterError(f'trunk: expected "free" of a horse, got {brief(s.trunk)}')
         self.geometry = _leg_of(s.preset, self.size)
         self.height = HIP_HEIGHT * self.size
         self.hips: Hips = {f"{leg}_": (HIPS[leg.partition("_")[2]] * self.size, 0.0) for leg in LEGS}
@@ -187,7 +187,7 @@ class Horse:
         self.filters = FILTERS[filters].sped_up(1 / self.speed_scale)
         if s.hip_height is not None:
             raise ParameterError(
-                f"hip_height: expected `size` in place of it for a horse, got {s.hip_height!r}"
+                f"hip_height: expected `size` in place of it for a horse, got {brief(s.hip_height)}"
             )
         self.command_step = COMMAND_STEP * self.speed_scale
         self.lowest, self.highest = (self.size * height for height in HEIGHT)
@@ -236,7 +236,7 @@ class Horse:
         if s.hoof_stiffness is None:
             if s.hoof_damping is not None:
                 raise ParameterError(
-                    f"hoof_damping: expected a hoof_stiffness beside it, got {s.hoof_damping!r}"
+                    f"hoof_damping: expected a hoof_stiffness beside it, got {brief(s.hoof_damping)}"
                 )
             return None
         stiffness = check_number("hoof_stiffness", s.hoof_stiffness, low=0, exclusive_low=True)

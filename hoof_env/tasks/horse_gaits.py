@@ -20,7 +20,7 @@ from typing import Annotated, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from hoof_env.errors import ParameterError, check_choice, check_number
+from hoof_env.errors import ParameterError, brief, check_choice, check_number
 from hoof_env.gait import WIDEST
 from hoof_env.simd import (
     Lanes,
@@ -115,7 +115,7 @@ class HorseGait:
             except TypeError:
                 numbers = ()
             if len(numbers) != len(PAIR):
-                raise ParameterError(f"{pair}: expected {len(PAIR)} numbers {PAIR}, got {given!r}")
+                raise ParameterError(f"{pair}: expected {len(PAIR)} numbers {PAIR}, got {brief(given)}")
             checked = (
                 check_number(f"{pair}[{name!r}]", value, low=low, high=high)
                 for value, (name, (low, high)) in zip(numbers, LIMITS.items(), strict=True)

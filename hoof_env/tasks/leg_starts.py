@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from hoof_env.dynamics.parts import Trunk
-from hoof_env.errors import ParameterError, check_choice, check_number
+from hoof_env.errors import ParameterError, brief, check_choice, check_number
 from hoof_env.gait import GaitParameters, gait_array, paper_gaits
 from hoof_env.ground.terrain import Terrain
 from hoof_env.leg.profile import LegProfile, by_name
@@ -204,7 +204,9 @@ def checked_options(options: Any, numbers: Mapping[str, tuple[float, float]]) ->
     if isinstance(options, Mapping):
         options = {key: value for key, value in options.items() if key not in FOREIGN_OPTIONS}
     if not isinstance(options, Mapping) or not set(options) <= set(known):
-        raise ParameterError(f"options: expected a mapping with some of {', '.join(known)}, got {options!r}")
+        raise ParameterError(
+            f"options: expected a mapping with some of {', '.join(known)}, got {brief(options)}"
+        )
     checked = dict(options)
     for name, (low, high) in numbers.items():
         if name in checked:
@@ -270,7 +272,7 @@ def _gait(value: Any, gaits: Mapping[str, GaitParameters]) -> GaitParameters:
     except TypeError:
         raise ParameterError(
             f"options['gait']: expected a gait name ({', '.join(sorted(gaits))}) or a mapping of the four "
-            f"gait parameters, got {value!r}"
+            f"gait parameters, got {brief(value)}"
         ) from None
 
 

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from hoof_env.errors import ParameterError
+from hoof_env.errors import ParameterError, brief
 from hoof_env.gait import LIMITS, FilterSettings
 from hoof_env.ground.terrain import surface
 from hoof_env.simd import Lanes, Number, where
@@ -98,12 +98,12 @@ class Entry:
     def __post_init__(self) -> None:
         for text in (self.name, self.group):
             if not isinstance(text, str) or not text:
-                raise ParameterError(f"name and group: expected a text, got {text!r}")
+                raise ParameterError(f"name and group: expected a text, got {brief(text)}")
         constants = check_parts(f"{self.title}: constants", Constant, self.constants)
         object.__setattr__(self, "constants", constants)
         check_arguments(f"{self.title}: measure", self.measure, 1, constants)
         if not isinstance(self.scale, Scale):
-            raise ParameterError(f"{self.title}: scale: expected a hoof_env.Scale, got {self.scale!r}")
+            raise ParameterError(f"{self.title}: scale: expected a hoof_env.Scale, got {brief(self.scale)}")
 
     @property
     def title(self) -> str:
@@ -278,5 +278,5 @@ def check_groups(groups: Any, known: Iterable[str], name: str = "observation") -
     names = tuple(known)
     chosen = tuple(groups) if isinstance(groups, (list, tuple)) else ()
     if not chosen or not all(group in names and chosen.count(group) == 1 for group in chosen):
-        raise ParameterError(f"{name}: expected a list of some of {', '.join(names)}, got {groups!r}")
+        raise ParameterError(f"{name}: expected a list of some of {', '.join(names)}, got {brief(groups)}")
     return chosen

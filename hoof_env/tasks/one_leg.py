@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from hoof_env.dynamics.engine import TrunkEngine
 from hoof_env.dynamics.parts import ONE_LEG, Limb, Limits, Trunk
-from hoof_env.errors import ParameterError, check_choice, check_number
+from hoof_env.errors import ParameterError, brief, check_choice, check_number
 from hoof_env.gait import (
     INNER,
     PARAMETERS,
@@ -211,7 +211,7 @@ class OneLeg:
             if isinstance(gait, HarmonicGait):
                 raise preset_error_type(s.preset)(
                     f"{preset_label(s.preset)}, gait {name!r}: expected the four parameters of one harmonic, "
-                    f"which environments of one leg take, got {gait!r}"
+                    f"which environments of one leg take, got {brief(gait)}"
                 )
             self.check_reachable(
                 f"{preset_label(s.preset)}, gait {name!r}", gait.to_array(), preset_error_type(s.preset)
@@ -330,7 +330,7 @@ class OneLeg:
         if values.shape not in ((4,), (engine.num_envs, 4)) or not np.isfinite(values).all():
             raise ParameterError(
                 f"gait: expected one of {', '.join(self.gaits)}, GaitParameters or an array of shape (4,) or "
-                f"({engine.num_envs}, 4), got {gaits!r}"
+                f"({engine.num_envs}, 4), got {brief(gaits)}"
             )
         self.check_reachable("gait", values)
         return action_towards(values, heading_now(engine, dt), self.reach(engine, dt))

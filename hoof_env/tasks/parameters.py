@@ -10,11 +10,22 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from hoof_env.dynamics.parts import Drive, HoofSpring, Motor, Prescribed
-from hoof_env.errors import ParameterError, check_choice, check_number
+from hoof_env.errors import ParameterError, brief, check_choice, check_number
 from hoof_env.ground.contact import Ground, load_ground
 from hoof_env.ground.terrain import Terrain
 from hoof_env.leg.presets import preset_error_type, preset_label, read_preset
 from hoof_env.tasks.settings import PER_EPISODE, SOLVERS, ResolvedSettings, Settings, check_effect
+
+BOUNDS = {
+    "trunk_mass": (1e-6, 1e6),
+    "trunk_stiffness": (0.0, 1e12),
+    "trunk_damping": (0.0, 1e12),
+    "trunk_drag": (0.0, 1e12),
+    "hoof_stiffness": (1.0, 1e12),
+    "hoof_damping": (1e-6, 1e12),
+}
+"""Lowest and highest value of what carries the leg, in its unit: far beyond any animal, and such that a step
+that ground and springs allow exists and every number of an episode is finite."""
 
 MAX_SUBSTEPS = 100_000  # largest number of substeps of a control step
 
@@ -23,11 +34,14 @@ def resolved(settings: Settings) -> ResolvedSettings:
     """Return the settings with defaults in place of None: the preset's ground, the solver's scheme and step.
 
     Raises:
-        ParameterError: an unknown solver.
+        ParameterError: an unknown solver, or a value beyond `BOUNDS`.
         Exception: the preset has no ground and the settings lack one; of the type of the preset's errors.
     """
     is_paper = check_choice("solver", settings.solver, SOLVERS) == "paper"
     values = dict(vars(settings))
+    for name, (low, high) in BOUNDS.items():
+        if values[name] is not None:
+            check_number(name, values[name], low=low, high=high)
     if settings.stiffness is None or settings.exponent is None:
         if "ground" not in read_preset(settings.preset):
             raise preset_error_type(settings.preset)(
@@ -63,7 +77,7 @@ def check_range(
     try:
         first, last = value
     except (TypeError, ValueError):
-        raise ParameterError(f"{name}: expected two numbers, got {value!r}") from None
+        raise ParameterError(f"{name}: expected two numbers, got {brief(value)}") from None
     first = check_number(f"{name}[0]", first, low=low, high=high)
     return first, check_number(f"{name}[1]", last, low=first, high=high)
 
@@ -123,7 +137,7 @@ def hoof_spring(settings: Settings) -> HoofSpring | None:
     damping = settings.hoof_damping
     if stiffness is None:
         if damping is not None:
-            raise ParameterError(f"hoof_damping: expected a hoof_stiffness beside it, got {damping!r}")
+            raise ParameterError(f"hoof_damping: expected a hoof_stiffness beside it, got {brief(damping)}")
         return None
     check_number("hoof_stiffness", stiffness, low=0, exclusive_low=True)
     if damping is None:
@@ -146,7 +160,7 @@ def check_parameters(name: str, given: Any, settings: Settings) -> dict[str, flo
     """
     if not isinstance(given, Mapping) or not set(given) <= set(PER_EPISODE):
         raise ParameterError(
-            f"{name}: expected a mapping with some of {', '.join(PER_EPISODE)}, got {given!r}"
+            f"{name}: expected a mapping with some of {', '.join(PER_EPISODE)}, got {brief(given)}"
         )
     for key in given:
         check_effect(key, settings, name)
@@ -154,13 +168,16 @@ def check_parameters(name: str, given: Any, settings: Settings) -> dict[str, flo
     for key, value in given.items():
         if isinstance(value, (list, tuple)):
             if len(value) != 2:
-                raise ParameterError(f"{name}[{key!r}]: expected a number or two, got {value!r}")
+                raise ParameterError(f"{name}[{key!r}]: expected a number or two, got {brief(value)}")
             low, high = (check_number(f"{name}[{key!r}][{k}]", v) for k, v in enumerate(value))
             if low > high:
-                raise ParameterError(f"{name}[{key!r}]: expected the lower one first, got {value!r}")
+                raise ParameterError(f"{name}[{key!r}]: expected the lower one first, got {brief(value)}")
             checked[key] = low, high
         else:
-            checked[key] = check_number(f"{name}[{key!r}]", value)
+            low = high = checked[key] = check_number(f"{name}[{key!r}]", value)
+        for end in (low, high):
+            least, most = BOUNDS.get(key, (-np.inf, np.inf))
+            check_number(f"{name}: {key}", end, low=least, high=most)
     return checked
 
 
@@ -304,7 +321,7 @@ def make_terrain(description: Any) -> Terrain:
     if description is None:
         return Terrain.flat()
     if not isinstance(description, Mapping):
-        raise ParameterError(f"terrain: expected None or a mapping, got {description!r}")
+        raise ParameterError(f"terrain: expected None, a Terrain or a mapping, got {brief(description)}")
     if "kind" not in description:
         return Terrain.from_dict(description)
     rest = dict(description)

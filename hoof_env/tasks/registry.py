@@ -18,7 +18,7 @@ from typing import Any, TypeVar
 import gymnasium as gym
 import numpy as np
 
-from hoof_env.errors import ParameterError, UnknownArgumentError, check_choice, one_of
+from hoof_env.errors import ParameterError, UnknownArgumentError, brief, check_choice, one_of
 from hoof_env.simd.user_functions import check_function, function_name
 from hoof_env.tasks.body import Body
 from hoof_env.tasks.disturbances import rough_ground
@@ -346,7 +346,7 @@ def _several(name: str, values: Any, kind: type[Part]) -> tuple[Part, ...]:
     parts = tuple(values) if isinstance(values, Iterable) else (values,)
     for part in parts:
         if not isinstance(values, Iterable) or not isinstance(part, kind):
-            raise ParameterError(f"{name}: expected a list of hoof_env.{kind.__name__}, got {part!r}")
+            raise ParameterError(f"{name}: expected a list of hoof_env.{kind.__name__}, got {brief(part)}")
     return parts
 
 
@@ -412,7 +412,9 @@ def register(
     new_terms = _several(f"{env_id}: terms", terms, Term)
     new_entries = _several(f"{env_id}: entries", entries, Entry)
     if not isinstance(env_id, str) or not re.fullmatch(r"(?!hoof_env/)[\w-]+/[\w-]+-v\d+", env_id):
-        raise ParameterError(f"env_id: expected 'namespace/Name-v0' of a namespace of yours, got {env_id!r}")
+        raise ParameterError(
+            f"env_id: expected 'namespace/Name-v0' of a namespace of yours, got {brief(env_id)}"
+        )
     old = task_of(base)
     _check_laws(env_id, contact_law, action_map)
     _check_twice(env_id, [term.name for term in new_terms])

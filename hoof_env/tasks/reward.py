@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from hoof_env.errors import ParameterError, check_choice, check_number
+from hoof_env.errors import ParameterError, brief, check_choice, check_number
 from hoof_env.simd import Lanes, Number, absolute, maximum, minimum, where
 from hoof_env.simd.user_functions import inputs
 from hoof_env.tasks.user_parts import Constant, TermState, check_arguments, check_parts
@@ -159,7 +159,7 @@ class Term:
 
     def __post_init__(self) -> None:
         if not isinstance(self.name, str) or not self.name:
-            raise ParameterError(f"name: expected a text, got {self.name!r}")
+            raise ParameterError(f"name: expected a text, got {brief(self.name)}")
         check_number(f"{self.title}: weight", self.weight, low=0, high=1e6)
         # Without one the term is divided among all objectives.
         if self.objective is not None:
@@ -257,7 +257,7 @@ def check_weights(changes: Mapping[str, float] | None, terms: tuple[Term, ...] =
         return weights
     if not isinstance(changes, Mapping) or not set(changes) <= set(weights):
         raise ParameterError(
-            f"reward_weights: expected a mapping with some of {', '.join(weights)}, got {changes!r}"
+            f"reward_weights: expected a mapping with some of {', '.join(weights)}, got {brief(changes)}"
         )
     weights |= changes
     return {

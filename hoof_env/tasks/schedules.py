@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from hoof_env.errors import ParameterError, check_number, count
+from hoof_env.errors import ParameterError, brief, check_number, count
 from hoof_env.tasks.body import Body
 from hoof_env.tasks.disturbances import MAX_STRENGTH
 from hoof_env.tasks.parameters import check_parameters
@@ -89,7 +89,7 @@ def check_schedule(given: Any, settings: Settings, body: Body) -> dict[str, Ramp
         return {}
     if not isinstance(given, Mapping) or not set(given) <= set(SCHEDULED):
         raise ParameterError(
-            f"schedule: expected a mapping with some of {', '.join(SCHEDULED)}, got {given!r}"
+            f"schedule: expected a mapping with some of {', '.join(SCHEDULED)}, got {brief(given)}"
         )
     return {name: _ramp(name, each, settings, body) for name, each in given.items()}
 
@@ -98,10 +98,10 @@ def _ramp(name: str, given: Any, settings: Settings, body: Body) -> Ramp:
     """Return the ramp of one setting."""
     title = f"schedule[{name!r}]"
     if not isinstance(given, (list, tuple)) or len(given) != 3:
-        raise ParameterError(f"{title}: expected [first, last, control steps], got {given!r}")
+        raise ParameterError(f"{title}: expected [first, last, control steps], got {brief(given)}")
     steps = count(f"{title}, control steps", given[2], most=MAX_STEPS)
     if name in (settings.randomize or {}):
-        raise ParameterError(f"{title}: expected none beside randomize[{name!r}], got {given!r}")
+        raise ParameterError(f"{title}: expected none beside randomize[{name!r}], got {brief(given)}")
     first, last = (
         _range(name, f"{title}, {which}", value, settings, body)
         for which, value in zip(("first", "last"), given, strict=False)
@@ -123,7 +123,7 @@ def _range(name: str, title: str, value: Any, settings: Settings, body: Body) ->
         except ParameterError as error:
             raise ParameterError(f"{title}: {error}") from None
         if speeds is None:
-            raise ParameterError(f"{title}: expected a speed or two, got {value!r}")
+            raise ParameterError(f"{title}: expected a speed or two, got {brief(value)}")
         return speeds
     checked = check_parameters(title, {name: value}, settings)[name]
     return checked if isinstance(checked, tuple) else (checked, checked)

@@ -13,7 +13,8 @@ from typing import Annotated, Any, NamedTuple, get_type_hints
 
 import numpy as np
 
-from hoof_env.errors import ParameterError
+from hoof_env.errors import ParameterError, brief
+from hoof_env.ground.terrain import Terrain
 from hoof_env.leg.presets import DEFAULT_PRESET, Preset
 
 PRINTED_BETA = math.sqrt(2 * 15.0)
@@ -217,13 +218,13 @@ class Settings:
         ),
     ] = None
     terrain: Annotated[
-        Mapping[str, Any] | None,
+        Terrain | Mapping[str, Any] | None,
         About(
             "",
             (
                 'None for level ground, {"kind": "slope", "angle": rad}, {"kind": "hills", ...} as in '
-                "[HorseLegTerrain](HorseLegTerrain.md#terrain), or what `Terrain.to_dict` returns; a "
-                "suspended trunk and a rail keep their height, so ground that drifts from y = 0 is refused"
+                "[HorseLegTerrain](HorseLegTerrain.md#terrain), a `Terrain`, or what its `to_dict` returns; "
+                "a suspended trunk and a rail keep their height, so ground that drifts from y = 0 is refused"
             ),
         ),
     ] = None
@@ -557,7 +558,8 @@ def to_json(settings: Settings) -> dict[str, Any]:
 
 def as_plain(name: str, value: Any) -> Any:
     """Convert a value to plain Python: numbers of NumPy and pandas to numbers, arrays and other sequences to
-    lists, paths to text, enumerations to their value. Other objects are returned unchanged.
+    lists, paths to text, enumerations to their value, a terrain to its mapping. Other objects are returned
+    unchanged.
 
     Args:
         name: name of the value in messages.
@@ -575,6 +577,8 @@ def as_plain(name: str, value: Any) -> Any:
         return as_plain(name, value.value)
     if isinstance(value, PurePath):
         return str(value)
+    if isinstance(value, Terrain):
+        return value.to_dict()
     if isinstance(value, Mapping):
         return {str(key): as_plain(f"{name}[{key!r}]", inner) for key, inner in value.items()}
     # Any sequence, such as the lists of a configuration library.
@@ -586,7 +590,7 @@ def as_plain(name: str, value: Any) -> Any:
         return next(kind(value) for kind in (int, float, str) if isinstance(value, kind))
     if hasattr(type(value), "__float__"):
         raise ParameterError(
-            f"{name}: expected a number of Python or NumPy, which JSON can hold, got {value!r}"
+            f"{name}: expected a number of Python or NumPy, which JSON can hold, got {brief(value)}"
         )
     return value  # the setting's check raises the error
 

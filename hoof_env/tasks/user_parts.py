@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
-from hoof_env.errors import ParameterError, check_number
+from hoof_env.errors import ParameterError, brief, check_number
 from hoof_env.simd.user_functions import check_function
 
 MAX_VALUE = 1e12
@@ -21,7 +21,7 @@ def _check_name(kind: str, name: Any) -> None:
         ParameterError: it is not the name of a variable.
     """
     if not isinstance(name, str) or not name.isidentifier() or keyword.iskeyword(name):
-        raise ParameterError(f"{kind}: expected the name of a variable, got {name!r}")
+        raise ParameterError(f"{kind}: expected the name of a variable, got {brief(name)}")
 
 
 def _is_text_by_name(pair: Any) -> bool:
@@ -108,11 +108,13 @@ class ActionMap:
 
     def __post_init__(self) -> None:
         if not isinstance(self.form, str) or not self.form or _is_reserved(self.form):
-            raise ParameterError(f"action_map: form: expected a text of its own, got {self.form!r}")
+            raise ParameterError(f"action_map: form: expected a text of its own, got {brief(self.form)}")
         # Kernels are looked up by a hash of their parts, and a mapping has none; a copy is made of pairs.
         pairs = tuple(self.actions.items()) if isinstance(self.actions, Mapping) else self.actions
         if not isinstance(pairs, tuple) or not pairs or not all(map(_is_text_by_name, pairs)):
-            raise ParameterError(f"{self.title}: actions: expected meanings by name, got {self.actions!r}")
+            raise ParameterError(
+                f"{self.title}: actions: expected meanings by name, got {brief(self.actions)}"
+            )
         object.__setattr__(self, "actions", pairs)
         check_function(f"{self.title}: compute", self.compute, 2)
 
@@ -137,7 +139,7 @@ def check_parts(title: str, kind: type[Constant] | type[TermState], parts: Any) 
     names = [part.name for part in given if isinstance(part, kind)]
     if len(set(names)) < len(given):
         raise ParameterError(
-            f"{title}: expected a list of hoof_env.{kind.__name__}, names once, got {parts!r}"
+            f"{title}: expected a list of hoof_env.{kind.__name__}, names once, got {brief(parts)}"
         )
     return given
 
@@ -224,7 +226,7 @@ def check_constants(given: Any, known: Mapping[str, Constant]) -> list[float]:
     changes = {} if given is None else given
     if not isinstance(changes, Mapping) or not set(changes) <= set(known):
         names = f"some of {', '.join(known)}" if known else "none, as no term or entry has one"
-        raise ParameterError(f"constants: expected a mapping with {names}, got {given!r}")
+        raise ParameterError(f"constants: expected a mapping with {names}, got {brief(given)}")
     return [
         check_number(
             f"constants[{name!r}]", changes.get(name, constant.value), low=constant.low, high=constant.high

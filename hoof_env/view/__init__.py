@@ -4,3 +4,16 @@
 `figures` draws them, `tab` and `server` are the live page, and `playback` writes pages that stand alone.
 Pages and films share instants and columns (`hoof_env.record`) and outlines (`hoof_env.render`).
 """
+
+from pathlib import Path
+
+from hoof_env.errors import HoofEnvError
+
+try:
+    Path.home()
+except RuntimeError:
+    # Bokeh asks for it when it is imported.
+    raise HoofEnvError(
+        "the page needs a home folder, where Bokeh looks for its settings, and this user has none: set HOME"
+        " to a folder, as in HOME=. hoof-env view"
+    ) from None

@@ -15,6 +15,7 @@ from bokeh.models import CDSView, ColumnDataSource, CustomJS, Span
 from bokeh.resources import INLINE
 from numpy.typing import NDArray
 
+from hoof_env._input import as_path
 from hoof_env._output import staged
 from hoof_env.errors import ParameterError, check_number
 from hoof_env.record.columns import Columns
@@ -211,12 +212,13 @@ class Playback:
         variables = doc.template_variables | {"library": library}
         return file_html(doc, INLINE, self.title, template=doc.template, template_variables=variables)
 
-    def write(self, path: Path, library: str | None = None) -> Path:
+    def write(self, path: Path | str, library: str | None = None) -> Path:
         """Write the page; an older file is replaced when the new one is complete.
 
         Raises:
             OutputError: the folder cannot be written.
         """
+        path = as_path("path", path)
         text = self.html(library)
         with staged(path.parent) as stage:
             (stage / path.name).write_text(text, encoding="utf-8")

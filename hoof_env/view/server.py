@@ -16,8 +16,9 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
+from hoof_env._input import as_path
 from hoof_env._output import check_folder
-from hoof_env.errors import MissingExtraError, ParameterError, count, parse_pairs
+from hoof_env.errors import MissingExtraError, ParameterError, brief, count, parse_pairs
 from hoof_env.view.messages import error_text
 
 MAX_TABS = 8
@@ -155,7 +156,7 @@ def start(
     setup: dict[str, Any],
     address: str = HERE[0],
     port: int = 5006,
-    out: Path = Path(),
+    out: Path | str = Path(),
     hosts: Collection[str] = (),
 ) -> tuple[Any, str]:
     """Start the server of a set-up.
@@ -174,6 +175,7 @@ def start(
         MissingExtraError: Bokeh is not installed.
         HoofEnvError: the set-up is refused, the port is taken, or the address is not one of this machine.
     """
+    out = as_path("out", out)
     check_bokeh()
     from bokeh.application import Application
     from bokeh.application.handlers.function import FunctionHandler
@@ -186,10 +188,10 @@ def start(
 
     count("port", port, low=0, most=65535)
     if ":" in address:
-        raise ParameterError(f"address: expected an IPv4 address or a name, got {address!r}")
+        raise ParameterError(f"address: expected an IPv4 address or a name, got {brief(address)}")
     for name in hosts:
-        if not name or any(mark in name for mark in ":/ "):
-            raise ParameterError(f"host: expected a name without scheme and port, got {name!r}")
+        if not (name and name.isprintable()) or any(mark in name for mark in ":/ "):
+            raise ParameterError(f"host: expected a name without scheme and port, got {brief(name)}")
     check_folder(out)
     try_out(setup)
     pages = Pages(setup, out)
@@ -198,7 +200,9 @@ def start(
     except OSError as error:
         if error.errno == errno.EADDRINUSE:
             raise ParameterError(f"port: expected a free one, {port} is taken; 0 takes any") from None
-        raise ParameterError(f"address: expected one of this machine, got {address!r} ({error})") from None
+        raise ParameterError(
+            f"address: expected one of this machine, got {brief(address)} ({error})"
+        ) from None
     url = f"http://{address}:{sockets[0].getsockname()[1]}/"
     application = guarded(address, hosts)(
         {"/": Application(FunctionHandler(pages.open))},
@@ -223,7 +227,7 @@ def view(
     address: str,
     port: int,
     open_browser: bool,
-    out: Path,
+    out: Path | str,
     hosts: Sequence[str] = (),
 ) -> None:
     """Serve the page until Ctrl-C, as `hoof-env view` does with the same options.
@@ -231,6 +235,7 @@ def view(
     Raises:
         HoofEnvError: as in `start`.
     """
+    out = as_path("out", out)
     setup = {
         "env_id": env_id,
         "arguments": parse_pairs("--env-kwargs", arguments),

@@ -8,10 +8,11 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from hoof_env import records
-from hoof_env.envs.policies import constant_gait, start_of
-from hoof_env.errors import HoofEnvError, ParameterError, check_choice, check_number, count
+from hoof_env.envs.policies import constant_gait
+from hoof_env.errors import HoofEnvError, ParameterError, brief, check_choice, check_number, count
 from hoof_env.gait import PARAMETERS, GaitParameters, limits_of
 from hoof_env.lab.forces import THRESHOLD, above_threshold, onto_surface
+from hoof_env.policies.actor import Actor
 from hoof_env.record.columns import Columns
 from hoof_env.tasks.settings import ABOUT, PER_EPISODE
 from hoof_env.view.other_ground import OtherGround
@@ -46,7 +47,7 @@ class Simulation:
     Args:
         env_id: id of an environment of this package.
         arguments: arguments of `gymnasium.make`.
-        policy: policy as `records.find_policy` takes it, or an object with Stable-Baselines3's `predict`.
+        policy: what `load_policy` takes; None is the default of `records.find_policy`.
         seed: seed of the first episode; the next ones follow it.
 
     Attributes:
@@ -81,14 +82,13 @@ class Simulation:
         self.setting = records.surroundings(self.env)
         self.legs = tuple(self.setting.hips)
         self.dt: float = self.env.get_wrapper_attr("dt")
-        self._player = self._find(policy, self.seed)
+        self._actor = self._find(policy, self.seed)
         self.parameters: dict[str, float] = {}
         self.hand: dict[str, float] | None = None
         self.other_ground = OtherGround(self._leg)
         self.ended = ""
         self.is_asking = False
         self._observation: Any = None
-        self._starts = True
 
     @property
     def terms(self) -> tuple[str, ...]:
@@ -109,11 +109,11 @@ class Simulation:
         """Return the present value of a setting."""
         return self.parameters.get(name, getattr(self._leg.resolved_settings, name))
 
-    def _find(self, policy: Any, seed: int) -> Any:
-        """Return a policy by its name, or the policy that is given."""
+    def _find(self, policy: Any, seed: int) -> Actor:
+        """Return the actor of a policy, which may be a name."""
         if policy is None or isinstance(policy, str):
-            return records.find_policy(policy, self.env, self.env_id, seed)
-        return policy
+            policy = records.find_policy(policy, self.env, self.env_id, seed)
+        return Actor(policy, self.env, seed)
 
     # Episodes
 
@@ -125,20 +125,20 @@ class Simulation:
             policy: another policy, by name; None keeps the present one.
         """
         chosen = self.seed if seed is None else count("seed", seed, low=0)
-        player = self._player
+        actor = self._actor
         if policy is not None:
-            player = self._find(policy, chosen)
-        options = start_of(player)
+            actor = self._find(policy, chosen)
+        options = actor.start
         if self.parameters:
             options = options | {"parameters": dict(self.parameters)}
         self._observation, _ = self.env.reset(seed=chosen, options=options)
         self.seed = chosen
-        self._player = player
+        self._actor = actor
         if policy is not None:
             self.policy = policy
             self.hand = None
         self.ended = ""
-        self._starts = True
+        actor.begin()
         self.other_ground.begin(self._leg.record())
         return self._chunk({})
 
@@ -149,7 +149,6 @@ class Simulation:
         action = self._action()
         before = self._leg.engine.state["time"][0]
         self._observation, _, failed, truncated, info = self.env.step(action)
-        self._starts = False
         if failed or truncated:
             (reason,) = info["end"]
             self.ended = reason if failed else "time is up"
@@ -166,10 +165,9 @@ class Simulation:
         """
         if self.hand is not None:
             return self._leg.action_for(np.array([*self.hand.values()]))
-        start = np.full(1, self._starts)
         self.is_asking = True
         try:
-            action, _ = self._player.predict(self._observation, episode_start=start, deterministic=True)
+            action = self._actor.act(self._observation)
             is_finite = np.isfinite(np.asarray(action, float)).all()
         except HoofEnvError:
             raise
@@ -238,7 +236,9 @@ class Simulation:
         """
         limits = self.gait_limits
         if name not in limits:
-            raise ParameterError(f"gait: expected one of {', '.join(limits) or 'no parameter'}, got {name!r}")
+            raise ParameterError(
+                f"gait: expected one of {', '.join(limits) or 'no parameter'}, got {brief(name)}"
+            )
         low, high = limits[name]
         wanted = (self.hand or self.gait_now()) | {name: check_number(name, value, low=low, high=high)}
         constant_gait(GaitParameters(*wanted.values()), self.env)  # raises for a gait beyond the limits
@@ -278,7 +278,7 @@ class Simulation:
     @property
     def policy_name(self) -> str | None:
         """Name of the policy, None for the default, and the text of an object."""
-        return self.policy if isinstance(self.policy, str | None) else repr(self.policy)
+        return self.policy if isinstance(self.policy, str | None) else brief(self.policy)
 
 
 def unit_of(name: str) -> str:

@@ -14,7 +14,7 @@ from hoof_env.envs.open_loop import GAITS
 from hoof_env.envs.policies import start_of
 from hoof_env.errors import DataFileError
 from hoof_env.evaluation.episodes import play
-from hoof_env.evaluation.scores import METRICS, Score, evaluate, text_table, to_json
+from hoof_env.evaluation.scores import METRICS, Score, cell, evaluate, text_table, to_json
 from hoof_env.evaluation.statistics import estimate, iqm
 from hoof_env.policies.find import find_policy
 from tests.agents.conftest import ENV_ID, KWARGS, train_tiny
@@ -112,6 +112,25 @@ def test_table_and_files(trained, tmp_path, capsys):
     assert [float(row["return"]) for row in rows] == [episode["return"] for episode in episodes]
     assert cli.main(command) == 2
     assert "exists already" in capsys.readouterr().err
+
+
+def test_terminal_report_and_file_have_one_cost_of_transport():
+    """The cost of an episode that went backward is infinite; that of several is work over distance."""
+    forward = {"return": 1.0, "distance_m": 10.0, "positive_work_j": 800.0, "mean_normal_n": 400.0,
+               "weight_share": 0.5, "cost_of_transport": 0.1}  # fmt: skip
+    back = forward | {"distance_m": -5.0, "cost_of_transport": math.inf}
+    score = Score("run", [forward, forward | {"distance_m": 20.0, "cost_of_transport": 0.05}, back])
+    mean = 2400 / 800 / 25
+    assert score.estimates["cost_of_transport"].mean == pytest.approx(mean)
+    assert to_json([score])["policies"]["run"]["mean"]["cost_of_transport"] == pytest.approx(mean)
+    shown = cell("cost_of_transport", score.estimates["cost_of_transport"])
+    assert shown[0] == f"{mean:.2f}"
+    _, line, below = text_table([score]).splitlines()
+    assert shown[0] in line.split()
+    assert shown[1] in below
+    still = Score("idle", [back])
+    assert cell("cost_of_transport", still.estimates["cost_of_transport"]) == ("", "")
+    assert "∞" not in text_table([still])
 
 
 def test_json_has_no_infinity():

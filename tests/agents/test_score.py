@@ -114,6 +114,7 @@ def test_each_policy_gets_the_line_of_the_table(capsys, tmp_path, monkeypatch, t
 def test_a_model_without_a_record_is_told(trained, tmp_path, monkeypatch):
     monkeypatch.setattr(scores, "score_vector", lambda *_, **__: [])
     bare = shutil.copy(trained.folder / "model.zip", tmp_path / "bare.zip")
+    shutil.copy(trained.folder / "vecnormalize.pkl", tmp_path)
     with pytest.warns(UserWarning, match=r"bare.zip: nothing says what it was trained for"):
         scores.evaluate([str(bare)], env_kwargs=KWARGS, published=True)
 

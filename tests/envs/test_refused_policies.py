@@ -87,9 +87,12 @@ FILES = [
             ({"constant": [True, False, False, False]}, "constant .*True"),
             ({"constant": [10**400, 0, 0, 0]}, "constant .*000"),
             ({**CLOCKED, "frequency_hz": 1e308}, r"frequency_hz 1e\+308"),
+            ({"constant": [True, 0.5, 0.0, 0.0]}, "constant .*True"),
+            ({"coefficients": [[[1e300] * 4]]}, r"coefficients \[\[\[1e\+300"),
         )
     ),
     ({**GAIT, "env_kwargs": [1]}, rf"{NO_GAIT}.*env_kwargs \[1\]"),
+    ({**GAIT, "env_id": 5}, f"{NO_GAIT}.*env_id 5"),
     ({**GAIT, "versions": None}, f"{NO_GAIT}.*versions None"),
     ("", NO_GAIT),
     ("[]", NO_GAIT),

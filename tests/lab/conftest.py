@@ -27,6 +27,11 @@ def of_horse():
 
 
 @pytest.fixture(scope="session")
+def of_fast_horse():
+    return played("hoof_env/Horse-v0", "reference", 3.0, target_speed=3.3)
+
+
+@pytest.fixture(scope="session")
 def of_slope():
     slope = {"height": [-50.0, 50.0], "start": -1000.0, "spacing": 2000.0}
     return played("hoof_env/HorseLegTerrain-v0", "run", 1.5, terrain=slope, trunk="fixed")

@@ -5,7 +5,7 @@ import struct
 import pytest
 
 from hoof_env.errors import DataFileError
-from hoof_env.lab.c3d_header import frames_of
+from hoof_env.lab.c3d_header import head_of
 
 BLOCK = 512
 PARAMETERS_IN = 3  # number of the block, from 1
@@ -50,7 +50,7 @@ GOOD = [group("POINT"), floats("SCALE", [1.0]), floats("RATE", [200.0], locked=T
 @pytest.mark.parametrize("last", [0, 3], ids=["ends by its link", "ends by an empty name"])
 def test_a_whole_chain_passes(tmp_path, order, last):
     """The last entry has no distance, or leads to a name of no letters; an entry may be locked."""
-    assert frames_of(write(tmp_path / "a.c3d", GOOD, order, last=last)) == (7, 1234)
+    assert head_of(write(tmp_path / "a.c3d", GOOD, order, last=last)).frames == (7, 1234)
 
 
 DAMAGES = {
@@ -81,4 +81,4 @@ DAMAGES = {
 @pytest.mark.parametrize(("entries", "words"), DAMAGES.values(), ids=DAMAGES)
 def test_a_damaged_chain_is_told(tmp_path, entries, words):
     with pytest.raises(DataFileError, match=words):
-        frames_of(write(tmp_path / "a.c3d", entries))
+        head_of(write(tmp_path / "a.c3d", entries))

@@ -43,16 +43,57 @@ LAYOUTS = {
     "ms.csv": (("time (msec),left_force_x (N),left_force_y (N)\n", ROWS * [1000, 1, 1]), {}, {}),
     "blank.mot": (("x\nnRows=300\nnColumns=3\nendheader\n\ntime ground_force_vx ground_force_vy\n",),
                   {"between": "\t"}, {}),
+    "rows.mot": (("x\nnRows=299\nnColumns=9\nendheader\ntime\tground_force_vx\tground_force_vy\n",),
+                 {"between": "\t"}, {}),
+    "more.mot": (("x\nnRows=1000\nendheader\ntime ground_force_vx ground_force_vy\n",), {"between": " "}, {}),
+    "simm.sto": (("x\ndatacolumns 4\ndatarows 7\nendheader\ntime ground_force_vx ground_force_vy\n",),
+                 {"between": " "}, {}),
+    "names.mot": (("x\nendheader\ntime\tleft fore ground_force_vx\tleft fore ground_force_vy\tknee angle\n",
+                   np.column_stack([ROWS, UP])), {"between": "\t"}, {}),
+    "names.csv": (("time [s],left fore force_x [N],left fore force y [N]\n",), {},
+                  {"left_fore_force_x": "left fore force_x", "left_fore_force_y": "left fore force y"}),
+    "nameless.csv": (("lab X\ntrial 3\n",), {}, {"time": "#1", "force_x": "#2", "force_y": "#3"}),
+    "nameless.mot": (("x\nendheader\n",), {"between": "\t"},
+                     {"time": "#1", "force_x": "#2", "force_y": "#3"}),
     "old.mot": (("name x\ndatarows 300\nendheader\n\n\ntime ground_force1_vx ground_force1_vy\n",),
                 {"between": " "}, {}),
 }  # fmt: skip
 
 
+STALE = {
+    "rows.mot": [
+        "its header says nRows=299, the file has 300 rows, which are read",
+        "its header says nColumns=9, the file has 3 columns, which are read; if it is cut off, copy it again",
+    ],
+    "more.mot": [
+        "its header says nRows=1000, the file has 300 rows, which are read; if it is cut off, copy it again"
+    ],
+    "simm.sto": [
+        "its header says datarows=7, the file has 300 rows, which are read",
+        "its header says datacolumns=4, the file has 3 columns, which are read; if it is cut off, "
+        "copy it again",
+    ],
+}
+"""Notes on counts in headers."""
+
+
+@pytest.mark.parametrize("weight", ["0", "-5", "nan", "heavy", "inf"])
+def test_a_weight_that_is_none_is_said_and_not_used(weight, tmp_path):
+    head = f"x\nweight_n={weight}\nendheader\ntime ground_force_vx ground_force_vy\n"
+    found = read_record(written(tmp_path / "x.mot", head, between=" "))
+    assert found.weight is None
+    assert found.notes == (
+        f"weight_n: expected a weight in N, got {weight}; --mass-a or --mass-b gives the mass",
+    )
+
+
 @pytest.mark.parametrize("name", LAYOUTS)
 def test_names_and_numbers_are_found_in_every_layout(name, tmp_path):
     arguments, options, mapping = LAYOUTS[name]
-    found = read_record(written(tmp_path / name, *arguments, **options), mapping)
-    assert (found.unit, found.rate, found.notes) == ("N", pytest.approx(100.0), ())
+    unit = "N" if name.startswith("nameless") else "auto"
+    found = read_record(written(tmp_path / name, *arguments, **options), mapping, unit)
+    assert (found.unit, found.rate) == ("N", pytest.approx(100.0))
+    assert [*found.notes] == STALE.get(name, [])
     (force,) = found.limbs.values()
     np.testing.assert_allclose(force, BOTH, atol=1e-5)
 

@@ -93,3 +93,23 @@ def test_the_file_is_the_text(tmp_path):
     leg = load_geometry()
     text = leg.to_mjcf(tmp_path / "leg.xml")
     assert (tmp_path / "leg.xml").read_text(encoding="utf-8") == text
+
+
+@pytest.mark.parametrize("scale", [1.0, 0.2, 2.0])
+@pytest.mark.parametrize("preset", PRESETS.values(), ids=PRESETS)
+def test_the_servo_of_the_swing_has_one_frequency_at_any_size(preset, scale):
+    """Inertias of rods of one mass per length go with the cube of the size."""
+    gains = []
+    for leg in (load_geometry(preset), load_geometry(preset).scaled(scale)):
+        servo = ET.fromstring(leg.to_mjcf()).find("actuator/position")
+        gains.append([float(servo.get(name)) for name in ("kp", "kv")])
+    np.testing.assert_allclose(np.divide(*gains[::-1]), scale**3, rtol=1e-9)
+
+
+@pytest.mark.parametrize(("motor", "commands"), [(None, [SWING]), (Motor(), [SWING, 0.0])])
+def test_a_keyframe_has_the_commands_that_hold_the_pose(motor, commands):
+    root = ET.fromstring(load_geometry("identified").to_mjcf(theta=THETA, swing=SWING, motor=motor))
+    key = root.find("keyframe/key")
+    assert key.get("name") == "pose"
+    assert numbers(key.get("ctrl")).tolist() == commands
+    assert len(root.find("actuator")) == len(commands)

@@ -10,7 +10,7 @@ import pytest
 
 from hoof_env.dynamics.engine import TrunkEngine
 from hoof_env.dynamics.parts import Limb, Motor, Trunk
-from hoof_env.errors import GeometryError, OutputError, ParameterError
+from hoof_env.errors import GeometryError, OutputError, ParameterError, brief
 from hoof_env.ground.contact import Ground
 from hoof_env.leg.geometry import Geometry, load_geometry
 from hoof_env.leg.kinematics import FrameMotion, pose
@@ -94,11 +94,11 @@ VALUES = [
             ),
             ({"assembly": {**LEG.assembly, "B": True}}, r"assembly\['B'\]: expected \+1 or -1, got True"),
             *(
-                ({"hip_height": value}, f"^hip_height: {NUMBER} {re.escape(repr(value))}")
+                ({"hip_height": value}, f"^hip_height: {NUMBER} {re.escape(brief(value))}")
                 for value in (np.array(True), np.array("1"), bytearray(b"1"), np.complex128(1), 10**400)
             ),
             *(
-                ({"pivot": value}, f"pivot: expected .*got {re.escape(repr(value))}")
+                ({"pivot": value}, f"pivot: expected .*got {re.escape(brief(value))}")
                 for value in (np.array(1.0), np.ones((2, 2)), b"12", "12", {1.0, 2.0}, None)
             ),
             *(
@@ -392,3 +392,12 @@ def test_calls(call, error, words, tmp_path, monkeypatch):
     with pytest.raises(error, match=words):
         call(tmp_path)
     assert [path.name for path in tmp_path.iterdir()] == ["file"]
+
+
+def test_a_point_on_the_other_side_has_its_sign_in_the_list_of_points():
+    leg = leg_with_everything()
+    step = next(step for step in leg.mechanism.steps if getattr(step, "across", ""))
+    name = step.across.lstrip("-")
+    other = name if step.across.startswith("-") else f"-{name}"
+    with pytest.raises(ParameterError, match=rf"lengths.*{name}.*got -0\.1; .*'across': '{other}'"):
+        leg.replace(lengths={name: -0.1})

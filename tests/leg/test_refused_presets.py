@@ -74,6 +74,10 @@ PRESETS = [
         for given in (3, None, True, ["klann"], np.zeros(2), b"klann", "")
     ),
     (
+        lambda: load_geometry(load_geometry("klann")),
+        r"a file that ends in \.json, as Geometry\.save writes it .* got Geometry\(\.\.\.\)$",
+    ),
+    (
         lambda: load_geometry("first_fit"),
         "preset: expected .*fourbar, identified, jansen, klann, got 'first_fit'",
     ),

@@ -102,3 +102,17 @@ def test_a_leg_on_a_suspended_trunk_drops_and_bounces_as_here(preset):
         assert model.at("swing") == pytest.approx(SWING, abs=0.02)
         lowest = min(lowest, model.at("z"))
     assert lowest < trunk.height - 0.05
+
+
+@pytest.mark.parametrize("scale", [1.0, 0.3, 0.2, 0.1])
+@pytest.mark.parametrize("preset", LEGS.values(), ids=LEGS)
+def test_a_leg_of_any_size_keeps_together_and_holds_its_pose(preset, scale):
+    leg = load_geometry(preset).scaled(scale)
+    model = Model(leg.to_mjcf(theta=THETA, swing=SWING, motor=Motor()))
+    mujoco.mj_resetDataKeyframe(model.model, model.data, model.model.key("pose").id)
+    for _ in range(20):
+        model.step(0.05)
+        loops = np.abs(model.data.efc_pos[: model.data.ne]).max()
+        assert loops < 1e-3 * leg.hip_height
+        assert abs(model.at("swing") - SWING) < 0.1
+    assert not model.data.warning[int(mujoco.mjtWarning.mjWARN_BADQACC)].number

@@ -10,7 +10,7 @@ import pytest
 
 import hoof_env
 from hoof_env.envs.policies import STANDS_FOR, make_policy
-from hoof_env.errors import DataFileError, ParameterError
+from hoof_env.errors import DataFileError, HoofEnvError, ParameterError
 from hoof_env.policies.find import find_policy, shipped_ids
 from hoof_env.policies.plain import read_tensors
 
@@ -250,3 +250,12 @@ def test_an_environment_of_another_package_has_no_scripted_policies():
         pytest.raises(ParameterError, match="none is scripted for Pendulum-v1"),
     ):
         find_policy("run", env, "Pendulum-v1")
+
+
+@pytest.mark.parametrize(
+    "name", ["x" * 100_000, "x" * 300 + ".zip", "x" * 5000 + ".json", "x" * 5000 + ".onnx", "a\0b", "a\0.zip"]
+)
+def test_a_name_that_no_file_can_have_is_refused(env, name):
+    for call in (lambda: hoof_env.load_policy(name, env), lambda: hoof_env.load_policy(name)):
+        with pytest.raises(HoofEnvError):
+            call()

@@ -221,13 +221,13 @@ def test_a_policy_that_returns_nan_is_refused_and_the_episode_goes_on():
     player = Player(simulation)
     player.reset(simulation.reset())
     player.go(0.1)
-    good = simulation._player
-    simulation._player = type("Broken", (), {"predict": lambda *_, **__: (np.full(4, np.nan), None)})()
+    good = simulation._actor.policy
+    simulation._actor.policy = type("Broken", (), {"predict": lambda *_, **__: (np.full(4, np.nan), None)})()
     shown = player.clock
     with pytest.raises(ParameterError, match="finite actions"):
         player.go(0.1)
     assert player.clock == shown
-    simulation._player = good
+    simulation._actor.policy = good
     player.go(0.1)
     assert player.shown == pytest.approx(0.2)
 

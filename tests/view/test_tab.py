@@ -234,7 +234,7 @@ def raising(*given, **more):
     [
         (lambda *_, **__: (np.full(4, np.nan), None), "expected finite actions"),
         (lambda *_, **__: (["fast"], None), "could not convert"),
-        (lambda *_, **__: 3.0, "TypeError"),
+        (lambda *_, **__: 3.0, "expected predict to return actions and a state"),
         (lambda *_, **__: sys.exit(3), "it raised SystemExit: 3"),
         (raising, "policy walk: expected actions, it raised RuntimeError: out of order"),
     ],
@@ -242,7 +242,7 @@ def raising(*given, **more):
 def test_a_policy_that_fails_pauses_the_page_until_another_drives(tmp_path, predict, words):
     page = Page(tmp_path, policy="walk")
     page.tick(0.1)
-    page.player.simulation._player = SimpleNamespace(predict=predict)
+    page.player.simulation._actor.policy = SimpleNamespace(predict=predict)
     told = []
     page.tab.wire.on_change("told", lambda attr, old, new: told.append(new))
     page.tick(0.1)

@@ -1,0 +1,175 @@
+"""Every door plays a policy in one way: with its memory, its statistics and the mode of its distribution."""
+
+import sys
+from types import ModuleType
+
+import gymnasium as gym
+import numpy as np
+import pytest
+
+import hoof_env
+from hoof_env import records
+from hoof_env.errors import DataFileError, ParameterError
+from hoof_env.evaluation.episodes import make_rows, play, play_rows, score_vector
+from hoof_env.evaluation.scores import evaluate
+from hoof_env.film import render_episode
+from hoof_env.policies.actor import Actor
+
+ID = "hoof_env/HorseLeg-v0"
+SHORT = {"episode_seconds": 0.2}
+STEPS = 10
+
+
+class Counting:
+    """Policy with a memory, the number of its actions in an episode, which acts at random unless its mode is
+    asked for."""
+
+    def __init__(self):
+        self.calls = []
+
+    def predict(self, observation, state=None, episode_start=None, deterministic=False):
+        rows = np.shape(observation)[:-1]
+        count = np.zeros(rows or (1,), int) if state is None else state
+        count = np.where(episode_start, 0, count)
+        self.calls.append((count.copy(), np.array(episode_start), deterministic))
+        actions = np.tile(0.05 * (count.reshape(rows)[..., None] % 7), 4).astype(np.float32)
+        if not deterministic:
+            actions = np.full_like(actions, np.nan)
+        return actions, count + 1
+
+
+def counts(policy):
+    """What a policy remembered at each action."""
+    assert all(deterministic for *_, deterministic in policy.calls)
+    return [count.tolist() for count, *_ in policy.calls]
+
+
+@pytest.fixture
+def env():
+    with gym.make(ID, **SHORT) as env:
+        yield env
+
+
+@pytest.fixture
+def named(monkeypatch):
+    """A policy and the name by which commands find it."""
+    policy = Counting()
+    module = ModuleType("policy_with_memory")
+    module.mine = policy
+    monkeypatch.setitem(sys.modules, "policy_with_memory", module)
+    return policy, "policy_with_memory:mine"
+
+
+EPISODE = [[step] for step in range(STEPS)]
+
+
+def test_episodes_one_by_one(env):
+    policy = Counting()
+    play(env, policy, [0, 1])
+    assert counts(policy) == 2 * EPISODE
+    assert [bool(start) for _, start, _ in policy.calls] == 2 * [True, *[False] * (STEPS - 1)]
+
+
+def test_rows_of_a_batch():
+    policy = Counting()
+    play_rows(make_rows(ID, 3, **SHORT), policy, [0, 1, 2])
+    assert counts(policy) == [[step] * 3 for step in range(STEPS)]
+
+
+def test_batches(env):
+    batch, alone = Counting(), Counting()
+    assert score_vector(batch, ID, [4, 5], **SHORT) == play(env, alone, [4, 5])
+
+
+@pytest.mark.parametrize("published", [False, True])
+def test_the_command_that_evaluates(named, published, monkeypatch):
+    policy, name = named
+    monkeypatch.setattr("hoof_env.evaluation.scores.FINAL_SEEDS", range(2))
+    evaluate([name], ID, SHORT, episodes=None if published else 2, published=published)
+    assert counts(policy) == ([[step] * 2 for step in range(STEPS)] if published else 2 * EPISODE)
+
+
+def test_records(env, named, tmp_path):
+    policy = Counting()
+    records.record_episode(env, policy)
+    assert counts(policy) == EPISODE
+    policy, name = named
+    records.export_episode(tmp_path / "run.csv", name, ID, ["episode_seconds=0.2"])
+    assert counts(policy) == EPISODE
+
+
+def test_films(named, tmp_path):
+    pytest.importorskip("imageio_ffmpeg")
+    policy, name = named
+    render_episode(tmp_path / "run.gif", name, ID, ["episode_seconds=0.2"], fps=10, size=(480, 270))
+    assert counts(policy) == EPISODE
+
+
+def test_the_live_page():
+    pytest.importorskip("bokeh")
+    from hoof_env.view.simulation import Simulation
+
+    policy = Counting()
+    simulation = Simulation(ID, SHORT, policy)
+    for _ in range(2):
+        simulation.reset()
+        while simulation.step() is not None:
+            pass
+    assert counts(policy) == 2 * EPISODE
+
+
+def act(observations):
+    return np.full((len(observations), 4), 0.25)
+
+
+@pytest.mark.parametrize(
+    "policy", [act, "run", hoof_env.GaitParameters(6.28, 0.7, -0.2, -0.3), (6.28, 0.7, -0.2, -0.3)]
+)
+def test_every_door_takes_what_load_policy_takes(policy, env):
+    pytest.importorskip("bokeh")
+    from hoof_env.view.simulation import Simulation
+
+    record = records.record_episode(env, policy, 3)
+    simulation = Simulation(ID, SHORT, policy, seed=3)
+    simulation.reset()
+    while (chunk := simulation.step()) is not None:
+        last = chunk
+    assert last.columns["time"][-1] == record["time"][-1]
+    assert last.columns["force_y"][-1] == record["force_y"][-1]
+    (one,) = play(env, policy, [3])
+    (row,) = score_vector(policy, ID, [3], **SHORT)
+    assert one == row
+
+
+def test_a_model_plays_its_mode_under_its_own_normalisation():
+    pytest.importorskip("stable_baselines3")
+    from stable_baselines3 import PPO
+    from stable_baselines3.common.vec_env import DummyVecEnv, VecNormalize
+
+    many = VecNormalize(DummyVecEnv([lambda: gym.make(ID, **SHORT)]))
+    model = PPO("MlpPolicy", many, n_steps=64, device="cpu", seed=0)
+    model.learn(64)
+    with gym.make(ID, **SHORT) as env:
+        observation, _ = env.reset(seed=0)
+        wanted, _ = model.predict(many.normalize_obs(observation), deterministic=True)
+        np.testing.assert_array_equal(Actor(model, env).act(observation), wanted)
+        # The network itself is callable, and would return drawn actions, values and likelihoods.
+        wanted, _ = model.policy.predict(observation, deterministic=True)
+        np.testing.assert_array_equal(Actor(model.policy, env).act(observation), wanted)
+    with gym.make("Pendulum-v1") as other, pytest.raises(DataFileError, match="PPO: trained for observ"):
+        hoof_env.load_policy(model, other)
+
+
+def test_a_policy_that_returns_actions_alone_is_told(env):
+    policy = type("Alone", (), {"predict": lambda *_, **__: np.zeros(4)})()
+    with pytest.raises(ParameterError, match=r"Alone: expected .* actions and a state.* got array"):
+        play(env, policy, [0])
+
+
+@pytest.mark.parametrize("policy", [3, object(), Counting])
+def test_what_is_no_policy_is_refused_by_all(policy, env):
+    for door in (play, lambda env, policy, _: records.record_episode(env, policy)):
+        with pytest.raises(ParameterError, match=r"^policy"):
+            door(env, policy, [0])
+    with pytest.raises(ParameterError, match=r"^policy"):
+        score_vector(policy, ID, [0], **SHORT)
