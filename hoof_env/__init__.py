@@ -111,7 +111,7 @@ if not TYPE_CHECKING:
 
 
 def _stand_in(name: str, extra: str, error: ModuleNotFoundError) -> type:
-    """Return a class in the place of one that needs a missing library: it can be listed and looked up, and
+    """Return a class in place of one that needs a missing library: it can be listed and looked up, and
     its use raises an error that says what to install."""
     from hoof_env.errors import MissingExtraError
 

@@ -1,4 +1,4 @@
-"""Python's garbage collector, which looks again and again through objects that stay."""
+"""Python's garbage collector, which scans long-lived objects again and again."""
 
 from __future__ import annotations
 

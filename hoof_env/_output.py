@@ -68,11 +68,11 @@ def staged(folder: Path, new: Collection[str] = ()) -> Iterator[Path]:
 
 @contextmanager
 def new_file(path: Path, overwrite: bool, others: Collection[Path] = ()) -> Iterator[Path]:
-    """Yield a path, in a temporary folder, for a file that comes to `path` when it is complete.
+    """Yield a path, in a temporary folder, for a file that is moved to `path` when it is complete.
 
     Args:
         path: place of the file.
-        overwrite: replace a file that is there; otherwise it stays, also one that came during the block.
+        overwrite: replace a file that is there; otherwise it stays, even one that appeared during the block.
         others: files that are written with it into the same folder.
 
     Raises:

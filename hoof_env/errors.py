@@ -1,4 +1,4 @@
-"""Errors raised at the border of the package, and checks that raise them.
+"""Errors raised at the boundary of the package, and checks that raise them.
 
 Each message names the value that was given and what was expected.
 """
@@ -105,11 +105,11 @@ class ParameterError(HoofEnvError, ValueError):
 
 
 class UnknownArgumentError(ParameterError, TypeError):
-    """Keyword that an environment does not take: a TypeError too, as of any Python function."""
+    """Keyword that an environment does not take: a TypeError too, as for any Python function."""
 
 
 class FixedSettingError(ParameterError, AttributeError):
-    """Attribute that cannot be assigned: an AttributeError too, as of any read-only property."""
+    """Attribute that cannot be assigned: an AttributeError too, as for any read-only property."""
 
 
 class MissingExtraError(HoofEnvError, ImportError):
@@ -117,7 +117,7 @@ class MissingExtraError(HoofEnvError, ImportError):
 
 
 class NotStartedError(HoofEnvError, RuntimeError):
-    """Request to move an engine in which nothing was started."""
+    """Request to move an engine in which nothing has been started."""
 
 
 class GeometryError(ParameterError):
@@ -137,12 +137,12 @@ MIN_POSITIVE = 1e-12
 
 
 TEXTS = (str, bytes, bytearray, memoryview)
-"""Types of texts, which are sequences, too."""
+"""Types of strings, which are sequences, too."""
 
 
 def is_number(value: Any) -> bool:
-    """Return False for what `float` takes though it is no number: truths, texts of digits, arrays of one of
-    these or of a complex number."""
+    """Return False for what `float` accepts although it is not a number: booleans, strings of digits, and
+    arrays of one boolean, string or complex number."""
     if isinstance(value, (np.ndarray, np.generic)):
         return value.ndim == 0 and value.dtype.kind in "iuf"
     return not isinstance(value, (bool, *TEXTS))
@@ -267,7 +267,7 @@ def finite(name: str, value: Any, most: float = np.inf) -> Floats:
 
 
 def _doubles(values: NDArray[Any]) -> Floats:
-    """Return numbers as doubles, and NaN for truths, texts and complex numbers."""
+    """Return numbers as doubles, and NaN for booleans, strings and complex numbers."""
     kind = values.dtype.kind
     # an object is what NumPy has no type for, such as a fraction or a large integer
     if kind in "iuf" or (kind == "O" and all(is_number(value) for value in values.flat)):

@@ -91,7 +91,7 @@ def check_film(path: Path | str, fps: float) -> None:
     # A GIF counts its frames' durations in hundredths of a second, and browsers slow down less than two.
     hundredths = 100 / fps
     if path.suffix.lower() == ".gif" and (hundredths < 2 or abs(hundredths - round(hundredths)) > 1e-6):
-        raise ParameterError(f"fps: expected 50, 25, 20, 10 ... of a GIF, got {fps:g}")
+        raise ParameterError(f"fps: expected 50, 25, 20, 10 ... for a GIF, got {fps:g}")
 
 
 def no_ffmpeg() -> HoofEnvError:

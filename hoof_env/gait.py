@@ -1,5 +1,5 @@
 """Gaits: parameters that a policy commands, with units, limits and the paper's presets; the filters that they
-pass; and the motion of crank and swing that follows."""
+pass through; and the motion of crank and swing that results."""
 
 from __future__ import annotations
 
@@ -41,8 +41,8 @@ def _published_hip_height() -> float:
 
 
 def speed_scale_of(geometry: Geometry) -> float:
-    """Return the speed of a leg over that of the published leg at the same Froude number [-]: the root of the
-    ratio of their hip heights. A similar motion takes this many times as long."""
+    """Return the speed of a leg relative to that of the published leg at the same Froude number [-]: the root
+    of the ratio of their hip heights. A similar motion takes this many times as long."""
     return math.sqrt(geometry.hip_height / _published_hip_height())
 
 
@@ -241,8 +241,8 @@ def load_gait(name: str, preset: Preset = DEFAULT_PRESET) -> GaitParameters:
 
 
 def paper_gaits(gaits: Mapping[str, Gait]) -> dict[str, Gait]:
-    """Return the paper's own gaits among those of a preset, by name and in alphabetic order; all, if it has
-    neither.
+    """Return the paper's own gaits among those of a preset, by name and in alphabetical order; all of
+    them if it has neither.
 
     Environments draw or derive from these: their behaviour must not change when a gait is added to a preset.
     """

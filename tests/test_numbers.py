@@ -437,7 +437,7 @@ def test_the_suspension_on_the_page_is_that_of_the_figures():
         "lowest": ("force_lowest", 1),
         "highest": ("force_highest", 1),
         "pulls down": ("pulling_time", 100),
-        "mean while it does": ("pulling_force", 1),
+        "mean while pulling down": ("pulling_force", 1),
         "heat of the damper [kJ]": ("damper_heat_j", 1e-3),
         "work of the drives [kJ]": ("drive_work_j", 1e-3),
         "greatest depth of the hoof [m]": ("depth_m", 1),

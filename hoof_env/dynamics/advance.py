@@ -2,7 +2,7 @@
 
 `Advance` is the engine inside a kernel. It advances one leg alone, four lanes that are the legs of one trunk,
 or `LANES` environments side by side with any number of legs: the `Arrangement`s. It works on copies on the
-stack, which LLVM keeps in registers as far as they fit.
+stack, which LLVM keeps in registers where they fit.
 
 An engine's memory is one matrix `data`, a column for each environment: the rows of the trunk, then the rows
 of each leg, fields as in `layout.TrunkMemory` and `LegMemory`. Each kind of engine (`EngineKind`) has its own
@@ -68,7 +68,7 @@ FALLEN = float(Result.FALLEN)
 FIRST_LIMIT = float(Result.PITCH)
 
 RESET_REQUESTED = -1.0
-"""Mark in the place of a result: the environment is to be started."""
+"""Mark in place of a result: the environment is to be started."""
 
 
 def read_trunk(trunk: TrunkRows, memory: TrunkMemory) -> None:

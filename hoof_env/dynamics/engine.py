@@ -104,9 +104,9 @@ class TrunkEngine:
         filters: bounds of the command filters; `gait.QUICK` where the crank's speed changes within a stride.
         reactions: true to compute the joint reactions of every step; `reactions()` returns the last.
         strides: true to count stances, peak forces and work; `strides` has them.
-        limits: where the motion should end, see `parts.Result`. An engine with limits, even `Limits()`,
+        limits: where the motion should end; see `parts.Result`. An engine with limits, even `Limits()`,
             accepts legs of other sizes in `vary`, and its `strides` have horizontal impulses.
-        contact_law: law of the normal force instead of the ground's, see `hoof.contact_force`.
+        contact_law: law of the normal force instead of the ground's; see `hoof.contact_force`.
 
     Attributes:
         runs_scalar: true if environments are run one by one in one thread, not side by side.
@@ -270,7 +270,7 @@ class TrunkEngine:
 
     @property
     def step_limits(self) -> dict[str, float]:
-        """Longest step [s] for each cause, see `step_length`. The limit of friction is reported and not used,
+        """Longest step [s] for each cause; see `step_length`. The limit of friction is reported and not used,
         because nothing diverges beyond it: on the ground of `HorseLeg-v0` it is 0.14 ms for a horse of 349
         kg. There forces at 1 ms agree with those at 16 us to 1 % under hooves that slide; under hooves that
         stand friction is off by 2.7 times its size and the normal force by half, at 0.5 ms by 0.4 % and 0.1
@@ -603,7 +603,7 @@ class TrunkEngine:
             raise user_error("contact_law", error) from None
 
     def _present_calls(self) -> EngineCalls:
-        """Return kernels and arguments for the present model, which another plan may have replaced."""
+        """Return the kernels and arguments for the present model, which another plan may have replaced."""
         if self._calls is None or self._calls.model is not self.mechanics.model:
             kind = EngineKind(
                 self.features, self.contact_law, static_of(self.mechanics.model[0]), self.reacts

@@ -303,7 +303,7 @@ def remember_contacts(leg: LegRows) -> None:
 
 
 def remember_point(point: Contact, memory: ContactMemory) -> None:
-    """Store them for one point, see `remember_contacts`."""
+    """Store them for one point; see `remember_contacts`."""
     memory.penetration = point.penetration
     memory.penetration_rate = point.penetration_rate
     kept = where(point.penetration > 0.0, point.inverse_approach_speed, 0.0)

@@ -38,7 +38,7 @@ class Features(NamedTuple):
 
     Attributes:
         harmonics: order of the swing law, 1 to `gait.MAX_HARMONICS`.
-        has_springs: true for springs in series with the ground at each hoof point, see `parts.HoofSpring`.
+        has_springs: true for springs in series with the ground at each hoof point; see `parts.HoofSpring`.
         has_limits: true for limits of the motion, legs of other sizes in some environments, and horizontal
             impulses.
         structure: structure of the legs, from which kernels find joints for limits and joint reactions;
@@ -114,7 +114,7 @@ class TrunkSettings(Layout):
     height: Row  # height at which the spring is at rest [m]
     drag: Row  # [N s/m]
     gravity: Row  # [m/s^2]
-    stiffness: Row  # K of Eq. 14 [N/m^n]; this and what follows is the ground's, see `ground.contact.Ground`
+    stiffness: Row  # K of Eq. 14 [N/m^n]; this and what follows is the ground's; see `ground.contact.Ground`
     chi: Row  # [-]
     dashpot: Row  # [N s/m]
     approach_floor: Row  # [m/s]
@@ -180,13 +180,13 @@ class TrunkReport(Layout):
 
 
 class TrunkMemory(Layout):
-    """A trunk in the engine's array. The quantities in infos are contiguous, see `episodes.infos`."""
+    """A trunk in the engine's array. The quantities in infos are contiguous; see `episodes.infos`."""
 
     settings: TrunkSettings
     account: Account
     state: TrunkState
     report: TrunkReport
-    result: Row  # of the last call, see `parts.Result`
+    result: Row  # of the last call; see `parts.Result`
 
 
 # A leg
@@ -213,7 +213,7 @@ class LegState(Layout):
 
 
 class Strides(Layout):
-    """Open stance of a leg, see `observables`."""
+    """Open stance of a leg; see `observables`."""
 
     stance_open: Row  # 1 in a stance, else 0
     stance_began: Row  # crank angle there [rad]

@@ -105,7 +105,7 @@ def memory_of(
 
 
 def named_rows(memory: Memory) -> dict[str, Floats]:
-    """Return state and report by name, as views."""
+    """Return the state and report by name, as views."""
     views = {}
     parts: list[tuple[tuple[str, ...], Floats]]
     parts = [(layout.TRUNK_STATE, memory.trunk), (layout.TRUNK_REPORT, memory.trunk_report)]
@@ -160,7 +160,7 @@ def new_model(
     cells = max(profile.cells for profile in scene.profiles)
     # legs of the same shape share a table
     tables = [profile.with_cells(cells).table for profile in dict.fromkeys(scene.profiles)]
-    # cell 0 begins before the turn does: its row again at the end, see `profile.locate`
+    # cell 0 begins before the turn does: its row again at the end; see `profile.locate`
     tables = [np.concatenate([table, table[:1]]) for table in tables]
     scheme = SCHEMES[scene.integrator]
     grid = terrain.to_grid()
@@ -206,8 +206,8 @@ def check_shared(scene: Mechanics, trunk: Trunk, ground: Ground, limbs: Sequence
             raise ParameterError(f"drive: expected a {type(own_limb.drive).__name__}, got {limb.drive!r}")
         if scales_of(f"limbs[{k}]", limb, own_limb) != (1.0, 1.0) and not scene.features.has_limits:
             raise ParameterError(
-                f"limbs[{k}].geometry: expected that of the engine, which was made without limits; with "
-                f"limits, if only Limits(), legs may have sizes of their own"
+                f"limbs[{k}].geometry: expected the geometry of the engine, which was made without limits; "
+                f"with limits, if only Limits(), legs may have sizes of their own"
             )
 
 
@@ -247,7 +247,7 @@ def check_limbs(trunk: Trunk, limbs: Sequence[Limb], springs: bool) -> None:
 
 
 def scales_of(name: str, limb: Limb, own: Limb) -> tuple[float, float]:
-    """Return length and mass of a leg relative to the engine's leg, to which it must be similar."""
+    """Return the length and mass of a leg relative to the engine's leg, to which it must be similar."""
     if limb.geometry == own.geometry:
         return 1.0, 1.0
     shape = limb.geometry.to_dict()
@@ -255,7 +255,7 @@ def scales_of(name: str, limb: Limb, own: Limb) -> tuple[float, float]:
     length = shape["hip_height"] / own_shape["hip_height"]
     mass = limb.geometry.mass / own.geometry.mass
     if structure_of(limb.geometry) != structure_of(own.geometry):
-        raise ParameterError(f"{name}.geometry: expected the mechanism of the engine's, got another")
+        raise ParameterError(f"{name}.geometry: expected the mechanism of the engine's geometry, got another")
     scaled = own.geometry.scaled(length)
     pairs: dict[str, tuple[Any, Any]] = {
         "lengths": (limb.geometry.body_lengths, length * own.geometry.body_lengths),
@@ -453,7 +453,9 @@ def start(
         # a crank that turns fully has a place for its links everywhere: no look-up needed
         turns = limb.geometry.full_turn
         if not turns and not np.isfinite(scene.profiles[i](angle[i])[0]).all():
-            raise ParameterError(f"crank_angle: the links of leg {i} have no place at some of {angle[i]} rad")
+            raise ParameterError(
+                f"crank_angle: the links of leg {i} cannot be assembled at some of {angle[i]} rad"
+            )
     at = {name: spread(name, value, (n,), MAX_STATE) for name, value in trunk.items()}
     kind = TRUNKS.index(scene.trunk.kind)
     movable = {
@@ -464,7 +466,7 @@ def start(
     }
     for name, kinds in movable.items():
         if kind not in kinds and at[name].any():
-            raise ParameterError(f"{name}: expected 0 of a {scene.trunk.kind} trunk, got {at[name]}")
+            raise ParameterError(f"{name}: expected 0 for a {scene.trunk.kind} trunk, got {at[name]}")
     if kind <= RAIL and (off := at["y"] != heights).any():
         raise ParameterError(f"y: a {scene.trunk.kind} trunk is at {heights[off][0]:g} m, got {at['y']}")
     state = np.zeros((TrunkState.size, n))

@@ -18,7 +18,7 @@ MODEL = np.dtype(
         ("kind", "i8"),  # of the trunk, position in `parts.TRUNKS`
         ("eighths", "i8"),  # contact exponent times 8
         ("friction_law", "i8"),  # position in `laws.FRICTION_LAWS`
-        ("is_interpolated", "?"),  # the approach speed, see `Ground`
+        ("is_interpolated", "?"),  # the approach speed; see `Ground`
         ("is_terrain", "?"),  # false if level and the same everywhere
         ("uses_new_rates", "?"),  # as are averages, stages, fractions and weights: of the `Scheme`
         ("counts_strides", "?"),  # true if stances are counted
@@ -76,7 +76,7 @@ class Model(NamedTuple):
     ground_cells: Matrix  # of the terrain's grid
     ground_origin: Lanes | float
     ground_per_metre: Lanes | float
-    contact_law: Callable[..., Any] | None  # user's law of the normal force, see `hoof.contact_force`
+    contact_law: Callable[..., Any] | None  # user's law of the normal force; see `hoof.contact_force`
 
 
 def unpack_model(

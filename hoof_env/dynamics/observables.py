@@ -207,7 +207,7 @@ def count_stride(trunk: TrunkRows, leg: LegRows, form: EngineLayout, h: Lanes | 
     leg.sums.travel = leg.sums.travel - where(down, slid * per_load, 0.0)
     rubbed = leg.toe.normal * absolute(leg.toe.slide)
     rubbed = rubbed + leg.heel.normal * absolute(leg.heel.slide)
-    # in stance alone: a sole without mass flies back as it is unloaded, which is no slip of the hoof
+    # in stance alone: a sole without mass flies back as it is unloaded, which is not slip of the hoof
     leg.sums.slip = leg.sums.slip + where(loaded, rubbed * per_load, 0.0)
     if form.has_limits:
         leg.sums.braking = leg.sums.braking + h * maximum(-push.real, 0.0)

@@ -169,7 +169,7 @@ class HoofSpring:
 
 @dataclass(frozen=True)
 class Limits:
-    """Limits of a motion, see `Result`; an infinite bound is no limit.
+    """Limits of a motion; see `Result`; an infinite bound is no limit.
 
     Attributes:
         pitch: lowest and highest pitch [rad].
@@ -197,7 +197,7 @@ class Limits:
                     f"limits.{name}: expected a lower and a higher bound, got {brief(bounds)}"
                 )
             object.__setattr__(self, name, (low, high))
-        # bool is a kind of int to Python, but True is no height
+        # bool is a kind of int to Python, but True is not a height
         least: Any = self.clearance
         if isinstance(least, bool) or not isinstance(least, (int, float, np.number)) or math.isnan(least):
             raise ParameterError(f"limits.clearance: expected a number, got {brief(least)}")
@@ -218,7 +218,7 @@ class Limb:
         spring: spring of the hoof; None for a rigid hoof.
 
     Raises:
-        ParameterError: a part is of the wrong type, not finite, or the hip beyond `MAX_HIP_OFFSET`.
+        ParameterError: a part has the wrong type or is not finite, or the hip lies beyond `MAX_HIP_OFFSET`.
     """
 
     geometry: Geometry
@@ -261,7 +261,7 @@ class Mechanics:
     step_error: float = 0.01  # of the state after a contact, with which steps are chosen [-]
     substeps: int = 1
     step_limits: dict[str, float] = field(default_factory=dict)  # longest step [s] for each cause
-    model: tuple[NDArray[Any], ...] = ()  # constant arrays of the kernels, see `memory.new_model`
+    model: tuple[NDArray[Any], ...] = ()  # constant arrays of the kernels; see `memory.new_model`
 
 
 class Reactions(NamedTuple):

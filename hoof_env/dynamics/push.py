@@ -49,7 +49,7 @@ def push_cranks(trunk: TrunkRows, legs: LegRows, leg_count: Whole, model: Model,
 
 @lru_cache(maxsize=64)
 def push_kernel(kind: EngineKind) -> Kernel:
-    """Return the kernel that changes the crank speeds of some environments by impulses on their trunks.
+    """Return the kernel that applies impulses to the trunks of some environments by changing crank speeds.
 
     Its arguments are the arrays of the engine and, for the n environments that are pushed, `impulses` [N s],
     forward and upward, shape (2, n), and `which`, their columns, shape (n,).

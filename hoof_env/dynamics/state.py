@@ -44,10 +44,10 @@ def read_state(
     parts = (*STATE, "layout")
     missing = sorted(set(parts) - set(state)) if isinstance(state, Mapping) else parts
     if missing or not isinstance(state["layout"], Mapping):
-        lack = ", ".join(missing) or "a layout by name"
-        raise ParameterError(f"state: expected what get_state gives, but {lack} is missing")
+        lack = ", ".join(missing) or "a mapping as layout"
+        raise ParameterError(f"state: expected what get_state returns, but {lack} is missing")
     if unlike := _differences(expected, dict(state["layout"])):
-        raise ParameterError(f"state: of another engine; {unlike}")
+        raise ParameterError(f"state: made by another engine; {unlike}")
     arrays = {}
     for name in STATE:
         shape = getattr(memory, name).shape

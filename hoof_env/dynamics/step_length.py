@@ -42,7 +42,7 @@ Functions = dict[str, Floats]
 CAUSES = {
     "elastic": "the stiffness of this ground under these masses",
     "damping": "the damping of this ground under these masses",
-    "hoof": "the damping of the hoofs' springs against the stiffness of this ground",
+    "hoof": "the damping of the hooves' springs against the stiffness of this ground",
     "servo": "the speed gain of a motor and the inertia of its crank",
     "support": "spring, damper or drag of the trunk",
 }
@@ -215,8 +215,8 @@ class StepLength:
         return mobility.max(0)
 
     def _servo_rate(self) -> float:
-        """Return the largest rate [1/s] of a motor's servo: its gain over the crank's inertia where trunk and
-        frame of the leg yield, with any gait."""
+        """Return the largest rate [1/s] of a motor's servo: its gain divided by the crank's inertia where
+        trunk and frame of the leg yield, with any gait."""
         rates = [0.0]
         for limb, profile in zip(self.mechanics.limbs, self.mechanics.profiles, strict=True):
             if isinstance(limb.drive, Motor):
@@ -243,8 +243,8 @@ def _over(a: float, b: float) -> float:
 
 
 def _samples(profile: LegProfile) -> tuple[Floats, Floats]:
-    """Return functions and derivatives at `ANGLES` crank angles, except angles at which the linkage does not
-    close."""
+    """Return the functions and derivatives at `ANGLES` crank angles, except angles at which the linkage does
+    not close."""
     value, slope = profile(np.arange(ANGLES) * 2 * np.pi / ANGLES)
     known = np.isfinite(value[:, 0])
     return value[known], slope[known]

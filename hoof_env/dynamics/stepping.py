@@ -82,7 +82,7 @@ def weigh_stage(trunk: TrunkRows, legs: LegRows, leg_count: Whole, model: Model,
 
 
 def prescribed(leg: LegRows, elapsed: Number) -> tuple[Lanes, Lanes]:
-    """Return angle and rate of a prescribed crank `elapsed` [s] into the step, exactly as its filter
+    """Return the angle and rate of a prescribed crank `elapsed` [s] into the step, exactly as its filter
     moves."""
     value = leg.state.gait[SPEED]
     rate = leg.state.gait_rate[SPEED]
@@ -94,7 +94,7 @@ def prescribed(leg: LegRows, elapsed: Number) -> tuple[Lanes, Lanes]:
 
 
 def next_stage(trunk: TrunkRows, legs: LegRows, leg_count: Whole, model: Model, elapsed: Number) -> None:
-    """Move `elapsed` [s] from the step's start with the derivatives of the present stage."""
+    """Set the next stage: the state `elapsed` [s] after the step's start, by the present derivatives."""
     if model.kind != FIXED:
         advance_rows(model.kind, trunk.stage, trunk.state.moving, elapsed, trunk.rates)
     for i in loop(leg_count):

@@ -67,7 +67,7 @@ def takes(
     """
 
     def describe(constructor: Callable[Concatenate[Made, Parameters], None]) -> Any:
-        # The bare types: the texts of the settings would hide their names.
+        # The bare types: the descriptions of the settings would hide their names.
         types = get_type_hints(arguments)
         taken = inspect.signature(arguments).parameters.values()
         itself = inspect.Parameter("self", inspect.Parameter.POSITIONAL_OR_KEYWORD)

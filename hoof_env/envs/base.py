@@ -182,7 +182,7 @@ class LegBase:
         """Set an attribute.
 
         Raises:
-            FixedSettingError: a setting, or an attribute that follows from the settings.
+            FixedSettingError: it is a setting, or an attribute that follows from the settings.
         """
         fixed = getattr(type(self), name, None)
         if name in SETTINGS or (isinstance(fixed, property) and fixed.fset is None):
@@ -344,7 +344,7 @@ class LegBase:
         substeps in which it acts.
 
         Args:
-            before, after: memory of the engine before and after the step, see `TrunkEngine.column`.
+            before, after: memory of the engine before and after the step; see `TrunkEngine.column`.
         """
         return commands_of_step(self.batch, before, after)
 
@@ -381,11 +381,15 @@ class LegBase:
         names = ("id", "settings", "engine", "episode", "generator", *parts)
         missing = [name for name in names if not isinstance(state, Mapping) or name not in state]
         if missing:
-            raise ParameterError(f"state: expected what get_state gives, but {', '.join(missing)} is missing")
+            raise ParameterError(
+                f"state: expected what get_state returns, but {', '.join(missing)} is missing"
+            )
         if state["id"] != self.task.id:
-            raise ParameterError(f"state: expected one of {self.task.id}, got one of {state['id']}")
+            raise ParameterError(f"state: expected a state of {self.task.id}, got one of {state['id']}")
         if (form := state.get("actions")) != self.action_form:
-            raise ParameterError(f"state: expected one whose actions are {self.action_form}, got {form!r}")
+            raise ParameterError(
+                f"state: expected a state whose actions are {self.action_form}, got {form!r}"
+            )
         there = state["settings"] if isinstance(state["settings"], Mapping) else {}
         here = self._settings_as_json()
         if here == there:
@@ -399,7 +403,7 @@ class LegBase:
             if there.get(k) != v and k not in free
         ]
         if unlike:
-            raise ParameterError(f"state: of other settings; {'; '.join(unlike)}")
+            raise ParameterError(f"state: made with other settings; {'; '.join(unlike)}")
 
     def _state_of_batch(self) -> dict[str, Any]:
         """Return the state without the generators."""
@@ -470,7 +474,7 @@ class LegBase:
 
     @property
     def steps_per_episode(self) -> int:
-        """Largest number of control steps of an episode."""
+        """Largest number of control steps in an episode."""
         return self.batch.plan.steps_per_episode
 
     @property
@@ -523,7 +527,7 @@ class LegBase:
     @property
     def action_form(self) -> str:
         """Meaning of actions: "rates" of the gait parameters of one leg, offsets from a horse's
-        gait and their spans, as in "offsets of 0.4 and 0.04 rad", or the form of a map of one's own.
+        gait and their spans, as in "offsets of 0.4 and 0.04 rad", or the form of a user's map.
         States and files of policies contain it, so that a file of another form is refused."""
         return self.batch.plan.action_form
 

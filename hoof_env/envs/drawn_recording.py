@@ -26,7 +26,7 @@ class DrawnRecording(Recording):
         self._undrawn = 0  # number of ends since the last picture
 
     def begin(self) -> None:
-        """Begin anew, see `Recording.begin`."""
+        """Begin anew; see `Recording.begin`."""
         self._undrawn = 0
         super().begin()
 

@@ -66,7 +66,7 @@ class Generators:
     """Generators of `num_envs` rows. There are none before the first seed, or the first use of `all`.
 
     Attributes:
-        seeds: seed of each generator, `UNKNOWN_SEED` if it was assigned or is from a state.
+        seeds: seed of each generator, `UNKNOWN_SEED` if the generator was assigned or restored from a state.
     """
 
     def __init__(self, num_envs: int) -> None:

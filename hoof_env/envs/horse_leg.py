@@ -93,8 +93,8 @@ class HorseLegEnv(LegBase, gym.Env[NDArray[np.float32], NDArray[np.float32]]):
         return values[0] if np.ndim(values) > 1 else float(values[0])
 
     def record(self) -> dict[str, NDArray[np.float64]]:
-        """Return state and report of the engine at every substep of the last control step, or at the start,
-        by name, with time on the first axis. The first call switches recording on.
+        """Return the state and report of the engine at every substep of the last control step, or at the
+        start, by name, with time on the first axis. The first call switches recording on.
 
         Raises:
             ResetNeeded: there is no episode yet.
@@ -312,7 +312,7 @@ class RandomizeParameters(gym.Wrapper[Any, Any, Any, Any], RecordConstructorArgs
         self.enabled = flag("enabled", enabled)
 
     def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[Any, Any]:
-        """Start an episode with drawn parameters, see `HorseLegEnv.reset`."""
+        """Start an episode with drawn parameters; see `HorseLegEnv.reset`."""
         asked = {} if options is None else options
         parameters = asked.get("parameters", {}) if isinstance(asked, Mapping) else None
         # Options of another type are passed on: the environment refuses them with its own message.
@@ -328,7 +328,7 @@ def vector_reward(info: Mapping[str, Any], terms: tuple[Term, ...] = TERMS) -> N
     rate, and progress the reward for bearing weight and the charge for speed beyond the commanded one. A term
     without an objective, such as the charge for a failure, is divided equally among all three: a fall costs
     the same under all preference weights that sum to 1, so that falling early to save force or energy is
-    never worth while.
+    never worthwhile.
 
     Args:
         info: info of a step of `HorseLegEnv`.
@@ -347,7 +347,7 @@ def refuse_many(**kwargs: Any) -> NoReturn:
         gymnasium.error.Error: always.
     """
     raise gym.error.Error(
-        "hoof_env/HorseLegMO-v0: Gymnasium's vector environments keep one number for a reward, this one gives"
+        "hoof_env/HorseLegMO-v0: Gymnasium's vector environments keep one number for a reward; this one gives"
         " three: use mo_gymnasium.wrappers.vector.MOSyncVectorEnv([lambda: mo_gymnasium.make(id)] * n)"
     )
 
@@ -374,6 +374,6 @@ class HorseLegMOEnv(HorseLegEnv):
     def step(  # type: ignore[override]  # Gymnasium's type of a reward is a number
         self, action: NDArray[np.float32]
     ) -> tuple[NDArray[np.float32], NDArray[np.float32], bool, bool, dict[str, Any]]:
-        """Take a control step, see `HorseLegEnv.step`; the reward is a vector, shape (3,)."""
+        """Take a control step; see `HorseLegEnv.step`; the reward is a vector, shape (3,)."""
         observation, _, terminated, truncated, info = super().step(action)
         return observation, vector_reward(info, self.task.terms), terminated, truncated, info

@@ -40,7 +40,7 @@ PICTURES = (
     ("width", str(USUAL_SIZE[0]), "pixels", "of a picture, from 480"),
     ("height", str(USUAL_SIZE[1]), "pixels", "of a picture, from 270"),
 )
-"""Rows of the arguments that are no settings."""
+"""Rows of the arguments that are not settings."""
 
 
 class Table(NamedTuple):

@@ -31,11 +31,11 @@ class BodyTables(ABC):
 
     @abstractmethod
     def actions(self, body: Any) -> tuple[tuple[str, ...], list[tuple[str, ...]]]:
-        """Return head and rows of the table of actions."""
+        """Return the head and rows of the table of actions."""
 
     @abstractmethod
     def settings(self, s: Settings, words: Words) -> dict[str, tuple[str, str]]:
-        """Return unit and meaning of the settings that the body takes, by name."""
+        """Return the unit and meaning of the settings that the body takes, by name."""
 
     def scaling(self, scale: observation.Scale, body: Any) -> str:
         """Return the formula of a scale."""
@@ -57,7 +57,7 @@ class LegTables(BodyTables):
     """Parts of the tables of one leg."""
 
     def actions(self, body: OneLeg) -> tuple[tuple[str, ...], list[tuple[str, ...]]]:
-        """Return head and rows of the table of actions."""
+        """Return the head and rows of the table of actions."""
         rows: list[tuple[str, ...]] = []
         for k, (low, high) in enumerate(zip(body.low, body.high, strict=True)):
             value = GAIT[k]
@@ -68,7 +68,7 @@ class LegTables(BodyTables):
         return ("Num", "Rate of", "At -1", "At +1", "Unit", "Limits of the value"), rows
 
     def settings(self, s: Settings, words: Words) -> dict[str, tuple[str, str]]:
-        """Return unit and meaning of all settings, by name."""
+        """Return the unit and meaning of all settings, by name."""
         return {name: (unit, text) for name, (unit, text, _) in words.items()}
 
     def scaling(self, scale: observation.Scale, body: OneLeg) -> str:
@@ -85,11 +85,11 @@ class HorseTables(BodyTables):
     """Parts of the tables of a horse."""
 
     def actions(self, body: Horse) -> tuple[tuple[str, ...], list[tuple[str, ...]]]:
-        """Return head and rows of the table of actions."""
+        """Return the head and rows of the table of actions."""
         bounds = QUICK.to_array()[:, 1]
         rows: list[tuple[str, ...]] = []
         for k, span in enumerate(horse.SPANS):
-            # The first action of a leg scales the crank's speed, see `horse_gaits.command_gait`.
+            # The first action of a leg scales the crank's speed; see `horse_gaits.command_gait`.
             operation, unit = ("times 1 + action", "-") if k == 0 else ("plus", "rad")
             fastest = f"{bounds[k]:g} {GAIT[len(LIMITS) + k].unit}"
             numbers = self.places([ACTED * leg + k for leg in range(COUNT)])
@@ -101,7 +101,7 @@ class HorseTables(BodyTables):
         return re.sub(rf"({'|'.join(LEGS).replace('_', ' ')})[:,] ", "", name)
 
     def settings(self, s: Settings, words: Words) -> dict[str, tuple[str, str]]:
-        """Return unit and meaning of the settings that a horse takes, by name."""
+        """Return the unit and meaning of the settings that a horse takes, by name."""
         # Some settings need a rigid hoof, or pushes.
         contexts = (s, replace(s, hoof_stiffness=None), replace(s, push_impulse=1.0))
         return {
@@ -119,7 +119,7 @@ def tables_of_body(body: Body) -> BodyTables:
     """Return the parts of tables for a body: those of its class, or of the class that it inherits.
 
     Raises:
-        ParameterError: a body of a class of one's own that inherits none of this package.
+        ParameterError: a body of a user's class that inherits none of this package.
     """
     found = next((TABLES[kind] for kind in type(body).__mro__ if kind in TABLES), None)
     if found is None:

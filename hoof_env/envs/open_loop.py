@@ -58,8 +58,8 @@ def check_blind(settings: Any) -> None:
     if seeing := [group for group in settings.observation if group not in allowed]:
         why = "" if is_prescribed else "; the ground changes the crank of a motor: a clock takes its place"
         raise ParameterError(
-            f"observation: expected groups that depend on no force, of {', '.join(allowed)}, for a policy"
-            f" without feedback; got {', '.join(seeing)}{why}"
+            f"observation: expected groups that depend on no force, some of {', '.join(allowed)}, for a"
+            f" policy without feedback; got {', '.join(seeing)}{why}"
         )
 
 
@@ -124,8 +124,8 @@ def _phase_gait(parameters: Mapping[str, Any], env: Any, blind: bool) -> Any:
     has_clock = "frequency_hz" in parameters
     if blind and not has_clock and env.settings.drive != "prescribed":
         raise ParameterError(
-            'coefficients: expected "frequency_hz", a clock, as the drive is a motor, whose crank the ground'
-            " slows down; got a gait that is locked to the crank"
+            'coefficients: expected a clock, "frequency_hz", because the drive is a motor, whose crank the'
+            " ground slows down; got a gait that is locked to the crank"
         )
     if has_clock and not is_leg:
         raise ParameterError("frequency_hz: expected an environment of one leg, got a horse")

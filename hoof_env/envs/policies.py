@@ -81,7 +81,7 @@ def start_of(policy: Any) -> dict[str, Any]:
 
 
 def policy_names(env: Any) -> list[str]:
-    """Return the names that `make_policy` accepts for an environment, see `body.Body.policy_names`."""
+    """Return the names that `make_policy` accepts for an environment; see `body.Body.policy_names`."""
     return list(env.unwrapped.body.policy_names)
 
 
@@ -174,7 +174,7 @@ def make_policy(name: str, env: Any, seed: int = 0) -> Scripted:
 
 
 def _scripted(name: str, env: Any, leg: Any, seed: int) -> Scripted:
-    """Make the policy of a known name, see `make_policy`; `leg` is the unwrapped environment."""
+    """Make the policy of a known name; see `make_policy`; `leg` is the unwrapped environment."""
     count = len(leg.action_names)
     if name in ("zero", "reference"):
         return Scripted(lambda observation, time: np.zeros(count, np.float32), leg.dt)
@@ -237,7 +237,7 @@ def _at_a_posture(name: str, env: Any, middle: float) -> Scripted:
     posture, target = extreme_posture(leg_profile(leg.geometry), rests, name == "drag")
 
     def hold(observation: Any, time: Any) -> Any:
-        """Return the gait that turns the crank to its target, and swings in "drag"."""
+        """Return the gait that turns the crank to its target and, in "drag", moves the swing."""
         numbers = np.asarray(observation, float)
         # The crank turns one way only: the target is always ahead.
         ahead = (target - np.arctan2(numbers[..., sine], numbers[..., cosine])) % (2 * np.pi)

@@ -78,7 +78,7 @@ class RowInfo(dict[str, Any]):
         return self.copy().values()
 
     def items(self) -> Any:
-        """Return names and values of all entries."""
+        """Return the names and values of all entries."""
         return self.copy().items()
 
     def copy(self) -> dict[str, Any]:
@@ -140,7 +140,7 @@ class Sb3VecEnv(VecEnv):
     @takes(Sb3Arguments)
     def __init__(self, env_id: str = "hoof_env/HorseLeg-v0", num_envs: int = 64, **settings: Any) -> None:
         if "vectorization_mode" in settings:
-            raise ParameterError("vectorization_mode: expected none, for all are stepped in one call")
+            raise ParameterError("vectorization_mode: expected none, because all are stepped in one call")
         settings.setdefault("autoreset_mode", AutoresetMode.SAME_STEP)
         try:
             many: dict[str, Any] = {"vectorization_mode": "vector_entry_point", **settings}
@@ -241,16 +241,16 @@ class Sb3VecEnv(VecEnv):
         return list(self.envs.render() or ())[: self.envs.drawn]
 
     def get_attr(self, attr_name: str, indices: Any = None) -> list[Any]:
-        """Return an attribute of some environments, or of all, see `HorseLegVectorEnv.get_attr`."""
+        """Return an attribute of some environments, or of all; see `HorseLegVectorEnv.get_attr`."""
         return self.envs.call_on(attr_name, self._get_indices(indices))
 
     def set_attr(self, attr_name: str, value: Any, indices: Any = None) -> None:
-        """Store an attribute of some environments, or of all, see `HorseLegVectorEnv.set_attr`; one value for
+        """Store an attribute of some environments, or of all; see `HorseLegVectorEnv.set_attr`; one value for
         all of these."""
         self.envs.set_attr_of(attr_name, dict.fromkeys(self._get_indices(indices), value))
 
     def env_method(self, method_name: str, *args: Any, indices: Any = None, **kwargs: Any) -> list[Any]:
-        """Call a method of some environments, or of all, see `HorseLegVectorEnv.call`.
+        """Call a method of some environments, or of all; see `HorseLegVectorEnv.call`.
 
         Raises:
             ParameterError: `indices` are some environments only, and the method is one of all together.

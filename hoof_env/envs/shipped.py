@@ -46,11 +46,13 @@ def shipped_returns(name: str) -> dict[str, float]:
         policies = parse_json(path.read_text(encoding="utf-8"))["policies"]
         return {policy: scores["mean"]["return"] for policy, scores in policies.items()}
     except (OSError, ValueError, KeyError, TypeError, AttributeError) as error:
-        raise DataFileError(f"scores {path}: expected those that agents.ship writes: {error!r}") from None
+        raise DataFileError(
+            f"scores {path}: expected the scores that agents.ship writes: {error!r}"
+        ) from None
 
 
 def is_one_episode(name: str) -> bool:
-    """True if all published episodes of an id are the same, so that a return is no mean."""
+    """True if all published episodes of an id are the same, so that a return is not a mean."""
     path = SHIPPED / name / "score.json"
     try:
         return len(set(parse_json(path.read_text(encoding="utf-8"))["returns"])) == 1
@@ -59,6 +61,6 @@ def is_one_episode(name: str) -> bool:
 
 
 def good_returns(name: str) -> str:
-    """Return the mean returns of the policies of an id as text, see `shipped_returns`."""
+    """Return the mean returns of the policies of an id as text; see `shipped_returns`."""
     returns = shipped_returns(name)
     return ", ".join(f"{SHOWN[policy]} {returns[policy]:.3g}" for policy in SHOWN if policy in returns)

@@ -347,7 +347,7 @@ class HorseLegVectorEnv(LegBase, VectorEnv[NDArray[np.float32], NDArray[np.float
         return self.batch.rows.named.weight[: self.num_envs].copy()
 
     def record(self, env: int = 0) -> dict[str, Floats]:
-        """Return state and report of an environment at every substep of the last control step, see
+        """Return the state and report of an environment at every substep of the last control step, see
         `HorseLegEnv.record`. The first call switches its recording on, which takes time in every step.
 
         Raises:
@@ -412,7 +412,7 @@ class HorseLegVectorEnv(LegBase, VectorEnv[NDArray[np.float32], NDArray[np.float
         return tuple(self.call_on(name, range(self.num_envs), *args, **kwargs))
 
     def get_attr(self, name: str) -> tuple[Any, ...]:
-        """Return an attribute of each environment, see `call`."""
+        """Return an attribute of each environment; see `call`."""
         return self.call(name)
 
     def set_attr(self, name: str, values: Any) -> None:
@@ -441,7 +441,7 @@ class HorseLegVectorEnv(LegBase, VectorEnv[NDArray[np.float32], NDArray[np.float
         self._attributes.setdefault(name, {}).update(values)
 
     def call_on(self, name: str, envs: Iterable[int], /, *args: Any, **kwargs: Any) -> list[Any]:
-        """Return the results of a method or attribute of some environments, see `call`."""
+        """Return the results of a method or attribute of some environments; see `call`."""
         chosen = list(envs)
         # Methods of Gymnasium's wrappers, which take the name as their first argument.
         if name == "get_wrapper_attr":
@@ -453,11 +453,13 @@ class HorseLegVectorEnv(LegBase, VectorEnv[NDArray[np.float32], NDArray[np.float
                 raise AttributeError(f"environments {lacks} have no attribute {name!r}")
             return [self._attributes[name][env] for env in chosen]
         if name in ("reset", "step"):
-            raise ParameterError(f"call: {name!r} is of all together; expected envs.{name}(...)")
+            raise ParameterError(f"call: {name!r} is for all together; expected envs.{name}(...)")
         # Of these environments alone, as by `indices` of Stable-Baselines3.
         if name == "change_settings":
             if "envs" in kwargs and len(set(chosen)) < self.num_envs:
-                raise ParameterError(f"envs: expected none beside indices {chosen}, got {kwargs['envs']!r}")
+                raise ParameterError(
+                    f"envs: expected none together with indices {chosen}, got {kwargs['envs']!r}"
+                )
             some = None if len(set(chosen)) == self.num_envs else chosen
             self.change_settings(*args, **{"envs": some, **kwargs})
             return [None] * len(chosen)
@@ -525,7 +527,7 @@ class HorseLegVectorEnv(LegBase, VectorEnv[NDArray[np.float32], NDArray[np.float
                 f"state['ended']: expected a bool array of shape ({n},), got {state['ended']!r}"
             )
         if ended.size != n:
-            raise ParameterError(f"state: expected one of {n} environments, got one of {ended.size}")
+            raise ParameterError(f"state: expected a state of {n} environments, got one of {ended.size}")
         if not isinstance(states, (list, tuple)) or len(states) != n:
             raise ParameterError(f"state['generator']: expected a list of {n}, got {states!r:.60}")
         # The last checks: nothing has changed until here.

@@ -85,7 +85,7 @@ class EpisodeBatch:
 
     Args:
         task: task of all episodes.
-        settings: settings of the task, see `Task.settings`.
+        settings: settings of the task; see `Task.settings`.
         num_envs: number of episodes.
         num_threads: number of threads that share the episodes in a step.
         max_episode_steps: control steps after which episodes are truncated, if they are not shorter already.
@@ -307,7 +307,7 @@ class EpisodeBatch:
         return self._start(which, generators, options)
 
     def _start(self, which: Index, generators: Generators, options: Mapping[str, Any]) -> dict[str, Floats]:
-        """Start episodes under the present plan, see `reset`. The order of the draws from a generator is part
+        """Start episodes under the present plan; see `reset`. The order of the draws from a generator is part
         of what a seed means."""
         plan, rows, engine = self.plan, self.rows, self.engine
         options = {**self.task.start, **options}
@@ -391,7 +391,7 @@ class EpisodeBatch:
         return self.finish_step(happened, generators, idle)
 
     def _step(self) -> int:
-        """Run the kernel on all rows, shared among threads; return its code, see `step.NOT_A_NUMBER`."""
+        """Run the kernel on all rows, shared among threads; return its code; see `step.NOT_A_NUMBER`."""
         # Every thread checks all actions: all return NOT_A_NUMBER, which is -1, or none does.
         calls = self.calls
         return int(np.bitwise_or.reduce(run_together(calls.step, calls.blocks, self.engine.num_threads)))
@@ -441,7 +441,7 @@ class EpisodeBatch:
             plan.pushes.plan_next(self.rows, group, [generators[env] for env in group.tolist()])
 
     def push(self, forward: ArrayLike, upward: ArrayLike, envs: ArrayLike | None) -> None:
-        """Push the trunks of some rows now, see `LegBase.push`.
+        """Push the trunks of some rows now; see `LegBase.push`.
 
         Raises:
             ParameterError: an impulse is not finite or of the wrong shape, or the trunk cannot be pushed.

@@ -45,7 +45,7 @@ class Commands:
         largest_change: float,
         dt: float,
     ) -> Commands:
-        """Return the commands of settings.
+        """Return the commands from settings.
 
         Args:
             s: settings.

@@ -21,10 +21,10 @@ MAX_DELAY = 1000
 
 
 class Delay(NamedTuple):
-    """Delay in control steps: whole steps, between which each episode draws, and substeps.
+    """Delay: whole control steps, which each episode draws between two bounds, plus substeps.
 
     Attributes:
-        least, most: whole control steps.
+        least, most: bounds of the whole control steps.
         substeps: further substeps of `sim_dt`.
     """
 
@@ -43,8 +43,8 @@ def check_delay(name: str, given: Any, substeps: int, steps: int) -> Delay:
         steps: control steps of an episode.
 
     Raises:
-        ParameterError: a delay is negative, no whole number of substeps, or lasts a whole episode; or a range
-            has ends that are not whole.
+        ParameterError: a delay is negative, is not a whole number of substeps, or lasts a whole episode; or a
+            range has bounds that are not whole.
     """
     most = min(steps - 1, MAX_DELAY)
     if isinstance(given, (list, tuple)):
@@ -119,7 +119,7 @@ class Delays:
 
     @classmethod
     def of(cls, s: ResolvedSettings, substeps: int, steps_per_episode: int) -> Delays:
-        """Return the delays of settings.
+        """Return the delays from settings.
 
         Raises:
             ParameterError: a setting is out of range.

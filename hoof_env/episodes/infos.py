@@ -32,7 +32,7 @@ def measured_names(features: Features = PLAIN, prefixes: Iterable[str] = ("",)) 
 
     Args:
         features: features of the engine.
-        prefixes: prefix of the names of each leg, see `body.Body.hips`.
+        prefixes: prefix of the names of each leg; see `body.Body.hips`.
     """
     leg = (*leg_state(features), *STRIDES, *stride_sums(features))
     command = tuple(f"command_{name}" for name in parameter_names(features.harmonics))
@@ -134,7 +134,7 @@ class NamedArray(np.ndarray[Any, np.dtype[np.float64]]):
         return repr(self)
 
     def _repr_html_(self) -> str:
-        """Return names and numbers as a table; of many environments the shape of each row."""
+        """Return the names and numbers as a table; of many environments the shape of each row."""
         if self.ndim == 1:
             return html_table(("name", "value"), [(name, f"{self[name]:.6g}") for name in self.names])
         return html_table(("name", "shape"), [(name, self[name].shape) for name in self.names])

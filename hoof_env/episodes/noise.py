@@ -56,7 +56,7 @@ class Noise:
 
     @classmethod
     def of(cls, s: ResolvedSettings, groups: Sequence[str]) -> Noise:
-        """Return the errors of settings, of groups that are observed.
+        """Return the errors from settings, for groups that are observed.
 
         Raises:
             ParameterError: a setting is out of range, or of a group that is not observed.

@@ -37,7 +37,7 @@ class Observed:
 
     @classmethod
     def of(cls, s: ResolvedSettings, task: Task, groups: Sequence[str]) -> Observed:
-        """Return the entries of settings.
+        """Return the entries from settings.
 
         Args:
             s: settings.
@@ -116,7 +116,7 @@ class Observed:
 
         Args:
             record: record of the task.
-            slots: slot of each of the task's entries, see `scene.Slots`.
+            slots: slot of each of the task's entries; see `scene.Slots`.
             size: number of columns of the observation.
         """
         # One kernel serves all choices of groups: it skips entries without a column.

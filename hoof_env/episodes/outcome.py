@@ -12,7 +12,7 @@ from hoof_env.tasks.reward import BEARING, MAX_STRIDE, Outcome
 
 
 def bear(episode: Episode, impulse: Lanes, seconds: Number) -> Lanes:
-    """Return the part of an impulse over the weight for which bearing is rewarded [s]: all within the
+    """Return the part of an impulse, divided by the weight, for which bearing is rewarded [s]: all within the
     allowance, less the part beyond it. The allowance grows with time, and the impulse uses it up; see
     `reward.BEARING`."""
     allowance = minimum(episode.allowance + BEARING * seconds, BEARING * MAX_STRIDE)

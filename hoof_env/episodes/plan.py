@@ -54,7 +54,7 @@ class Feature(Protocol):
 
 @dataclass(frozen=True, eq=False)
 class Plan:
-    """All that follows from settings. Rows of a batch may be under several plans, see `RowPlans`.
+    """All that follows from settings. Rows of a batch may be under several plans; see `RowPlans`.
 
     Attributes:
         task: task of the episodes.
@@ -69,7 +69,7 @@ class Plan:
         steps_per_episode: control steps of an episode.
         observed, delays, commands, strength, noise, pushes, randomization: features.
         mechanics: engine's parts.
-        record: constants of the task that the kernels read, shape (1,), see `episode.task_type`.
+        record: constants of the task that the kernels read, shape (1,); see `episode.task_type`.
     """
 
     task: Task
@@ -177,7 +177,7 @@ def make_plan(
 
     Args:
         task: task of the episodes.
-        asked: settings of the task, see `Task.settings`.
+        asked: settings of the task; see `Task.settings`.
         num_envs, num_threads: arguments of the engine.
         max_episode_steps: control steps after which episodes are truncated if `episode_seconds` is longer.
 

@@ -92,7 +92,7 @@ class Pushes:
 
     @classmethod
     def of(cls, s: ResolvedSettings, dt: float, steps_per_episode: int) -> Pushes:
-        """Return the pushes of settings.
+        """Return the pushes from settings.
 
         Raises:
             ParameterError: a setting is out of range, or has no effect.

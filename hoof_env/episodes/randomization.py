@@ -75,7 +75,7 @@ class Randomization:
         Args:
             changes: changed settings by name.
             asked: number of substeps; None for as many as are needed. With a number that is too low there is
-                a warning, see `StepLength.choose`.
+                a warning; see `StepLength.choose`.
 
         Raises:
             ParameterError: a changed setting is out of range.

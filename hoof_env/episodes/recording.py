@@ -93,8 +93,8 @@ class Recording:
             self._ends[-1] = self._end()
 
     def last(self) -> Record:
-        """Return state and report by name at each substep of the last control step; after a reset, or a step
-        that could not be simulated, of the present instant only."""
+        """Return the state and report by name at each substep of the last control step; after a reset, or a
+        step that could not be simulated, of the present instant only."""
         return self._record(-1)
 
     def _record(self, k: int) -> Record:

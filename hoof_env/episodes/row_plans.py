@@ -94,7 +94,7 @@ class RowPlans:
         self.differ = len({id(self.marks[k]) for k in present}) > 1
 
     def find(self, settings: Settings) -> Plan | None:
-        """Return the plan of settings, if rows have one; else None."""
+        """Return the plan that rows have for these settings; None without one."""
         return next((plan for plan in self.plans if _are_same(plan.asked, settings)), None)
 
     def add(self, plan: Plan, rows: Index) -> None:
@@ -121,7 +121,7 @@ class RowPlans:
         self.place(present, self.pending)
 
     def place(self, present: Index, pending: Index) -> None:
-        """Put all rows under plans, see `present` and `pending`; remove plans that no row needs any more."""
+        """Put all rows under plans; see `present` and `pending`; remove plans that no row needs any more."""
         used = np.union1d(present, pending)
         self.plans = [self.plans[k] for k in used.tolist()]
         self.marks = [self.marks[k] for k in used.tolist()]

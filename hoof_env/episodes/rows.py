@@ -46,7 +46,7 @@ class Rows:
         actions, observations, rewards: input and output of a step, shapes (columns, actions), (columns,
             numbers) and (columns,).
         acted: actions that act now, shape (columns, actions); None where nothing delays `actions`.
-        mapped: actions of the body, shape (columns, its actions); None without a map of one's own.
+        mapped: actions of the body, shape (columns, its actions); None without a user's map.
         past_actions: last actions, the newest first, shape (columns, number, actions); empty where they are
             not needed, like `frames`.
         frames: observations of one instant each, the newest first, shape (columns, number, entries).
@@ -101,7 +101,7 @@ class Rows:
         return np.array(self._used(name))
 
     def put(self, name: str, values: Any) -> None:
-        """Write all rows of an array, but for idle columns."""
+        """Write all rows of an array, except idle columns."""
         self._used(name)[...] = values
 
     def take(self, other: Rows) -> None:

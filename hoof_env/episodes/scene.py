@@ -32,11 +32,11 @@ array as `actions` where nothing delays them; `mapped` are actions of the body, 
 without a user's map."""
 
 CHANGING = ("episode_steps", "substeps", "part_substeps", "is_noisy")
-"""Whole numbers and truths of a task's record that kernels read when they run: settings may change them."""
+"""Whole numbers and booleans of a task's record that kernels read when they run: settings may change them."""
 
 
 def known_of(record: Any) -> tuple[tuple[str, Any], ...]:
-    """Return the fields of a task's record that are constants of its kernels: truths and whole numbers."""
+    """Return the fields of a task's record that are constants of its kernels: booleans and whole numbers."""
     kinds = record.dtype.fields
     names = [name for name in kinds if kinds[name][0].base.kind in "ib" and name not in CHANGING]
     values = [record[0][name] for name in names]
@@ -56,7 +56,7 @@ class TaskKind:
         body: the body's own parts.
         action_map: map from actions to actions of the body; None without one.
         engine: kind of the engine.
-        known: fields of the task's record that are constants of kernels, with values, see `known_of`.
+        known: fields of the task's record that are constants of kernels, with values; see `known_of`.
     """
 
     terms: tuple[Term, ...]

@@ -47,7 +47,9 @@ def check_single(state: Any) -> None:
     """
     if isinstance(state, Mapping) and "ended" in state:
         many = np.size(state["ended"])
-        raise ParameterError(f"state: expected one of a single environment, got one of {many} environments")
+        raise ParameterError(
+            f"state: expected a state of a single environment, got one of {many} environments"
+        )
 
 
 def spread_state(batch: EpisodeBatch, state: Mapping[str, Any]) -> dict[str, Any]:
@@ -70,7 +72,7 @@ def spread_state(batch: EpisodeBatch, state: Mapping[str, Any]) -> dict[str, Any
             spread["rows"] = {**state["rows"], **each}
     except (KeyError, TypeError, ValueError, IndexError):
         raise ParameterError(
-            "state: expected what get_state gives of one environment, or of this vector environment"
+            "state: expected what get_state returns for one environment, or of this vector environment"
         ) from None
     ended = spread["episode"][batch.ended_row] != 0.0
     return {**spread, "ended": ended, "generator": [state["generator"]] * n}

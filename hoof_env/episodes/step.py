@@ -40,7 +40,7 @@ ONE = Arrangement("one", 1)
 
 @dataclass(frozen=True)
 class StepKernels:
-    """Kernels of a task; the argument of each are the arrays of `TaskKind.arrays`, but for `measure`, whose
+    """Kernels of a task; each takes the arrays of `TaskKind.arrays`, except `measure`, whose
     arrays have `measured`, too.
 
     Attributes:
@@ -145,7 +145,7 @@ def step_rows(
 
 
 def finish_row(scene: Scene, n: Whole) -> Whole:
-    """Do what follows the engine, but for the observation: reward and end; return the code of the step."""
+    """Do what follows the engine, except for the observation: reward and end; return the code of the step."""
     task, layouts = scene.task, scene.layouts
     trunk, leg, episode = scene.trunk(n), scene.leg(n), scene.episode(n)
     outcome = find_outcome(task, trunk, leg, episode, layouts, new_rows(layouts.stride_sums, scene.lanes))

@@ -30,7 +30,7 @@ class Strength:
 
     @classmethod
     def of(cls, s: ResolvedSettings, schedule: Mapping[str, Ramp]) -> Strength:
-        """Return the strength of settings.
+        """Return the strength from settings.
 
         Raises:
             ParameterError: it is out of range.

@@ -17,7 +17,8 @@ from hoof_env.tasks.episode import FAILED, TRUNCATED
 Floats = NDArray[np.float64]
 
 SUCCESS_SPEED = 0.9
-"""Least distance of a successful episode over the commanded distance, where a speed is commanded [-]."""
+"""Least distance of a successful episode relative to the commanded distance, where a speed is commanded
+[-]."""
 
 SUMMARY = {
     "seconds": ("s", "how long it lasted"),
@@ -83,7 +84,7 @@ def infos_of(batch: EpisodeBatch, ended: bool = True) -> dict[str, NDArray[Any]]
 
 
 def summary_of(batch: EpisodeBatch, env: int) -> dict[str, float]:
-    """Return the figures of one episode by name, see `summaries_of`."""
+    """Return the figures of one episode by name; see `summaries_of`."""
     return {name: float(values[0]) for name, values in summaries_of(batch, [env]).items()}
 
 
@@ -126,7 +127,7 @@ def summaries_of(batch: EpisodeBatch, envs: Sequence[int] | NDArray[np.int64]) -
 
 def is_success(batch: EpisodeBatch, envs: Sequence[int] | NDArray[np.int64]) -> NDArray[np.bool_]:
     """Return a mask of the environments whose episodes ended at the time limit, at `SUCCESS_SPEED` of the
-    commanded speed or more, in the mean; where a target is only the speed up to which progress is paid, it
+    commanded speed or more, on average; where a target is only the speed up to which progress is paid, it
     counts as commanded."""
     lasted = batch.rows.named.ended[envs] == TRUNCATED
     commanded = batch.rows.named.commanded[envs]

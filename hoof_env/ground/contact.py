@@ -107,7 +107,7 @@ class Ground:
 
     @property
     def damping(self) -> tuple[float, float]:
-        """Damping factor chi [-] and dashpot coefficient c [N s/m], see `laws.damping`."""
+        """Damping factor chi [-] and dashpot coefficient c [N s/m]; see `laws.damping`."""
         return damping(self.normal_law, self.restitution, self.stiffness, self.reference_mass)
 
     def to_record(self) -> GroundRecord:

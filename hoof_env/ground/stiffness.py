@@ -46,7 +46,7 @@ class SchemeLimits(NamedTuple):
     """Limits of a fixed-step scheme in a contact."""
 
     order: int  # of the scheme on a smooth force
-    error: float  # C of the module's text [-]
+    error: float  # C of the module's docstring [-]
     decay: float  # longest step times the rate of a damped motion [-]
 
 
@@ -78,11 +78,11 @@ class ContactRates:
 
     def longest_steps(self, scheme: str, tolerance: float = 1e-2) -> dict[str, float]:
         """Return the longest step [s] that each of the three rates allows; infinite for a rate of zero.
-        `tolerance` is the error of the state after a contact [-], see the module's text."""
+        `tolerance` is the error of the state after a contact [-]; see the module's docstring."""
         limits = SCHEME_LIMITS[check_choice("scheme", scheme, SCHEME_LIMITS)]
         tolerance = check_number("tolerance", tolerance, low=0, high=1, exclusive_low=True)
         order = min(limits.order, self.exponent + 1)
-        # e < C (h w)^p of the module's text, solved for h w
+        # e < C (h w)^p of the module's docstring, solved for h w
         angle = min((tolerance / limits.error) ** (1 / order), MAX_ANGLE)
         allowed = {"elastic": angle, "damping": limits.decay, "friction": limits.decay}
         rates = {name: getattr(self, name) for name in allowed}

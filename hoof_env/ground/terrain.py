@@ -217,7 +217,7 @@ class Terrain:
 def _knots(start: float, end: float, spacing: float) -> NDArray[np.float64]:
     """Return the knots from `start` to `end` or just beyond it [m]."""
     check_number("terrain.spacing", spacing, low=1e-4, high=1e6)
-    # 1e-6: a length that is a whole number of spacings but for rounding gets no knot more
+    # 1e-6: a length that is a whole number of spacings except for rounding gets no extra knot
     count = math.ceil((end - start) / spacing - 1e-6) + 1
     if count > MAX_KNOTS:
         wanted = f"at most {MAX_KNOTS} knots from {start:g} to {end:g} m"

@@ -1,4 +1,4 @@
-"""Checks of the parts of a `Geometry`, and bodies that are no uniform rods."""
+"""Checks of the parts of a `Geometry`, and bodies that are not uniform rods."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from hoof_env.leg.mechanism import BodyPoint, Mechanism
 from hoof_env.leg.mechanism_list import read_mechanism, split_solids
 
 Solids = Mapping[str, Mapping[str, Any]]
-"""Bodies that are no uniform rods, see `Geometry`."""
+"""Bodies that are not uniform rods; see `Geometry`."""
 
 
 def numbers_of(what: str, given: Any) -> dict[str, Any]:
@@ -34,7 +34,7 @@ def numbers_of(what: str, given: Any) -> dict[str, Any]:
 
 
 def check_names(what: str, given: Mapping[Any, Any]) -> None:
-    """Raise `ParameterError` unless all names are texts; a file would store any other name as text."""
+    """Raise `ParameterError` unless all names are strings; a file would store any other name as a string."""
     for name in given:
         if not isinstance(name, str):
             raise ParameterError(f"{what}: expected names that are texts, got {brief(name)}")
@@ -94,7 +94,7 @@ def check_keys(what: str, given: Any, expected: Sequence[str], optional: Sequenc
 
 
 def count_of(values: Any) -> int:
-    """Return the number of values in a sequence or row, 0 for a text or any other value."""
+    """Return the number of values in a sequence or row, 0 for a string or any other value."""
     if isinstance(values, np.ndarray):
         return values.size if values.ndim == 1 else 0
     return len(values) if isinstance(values, Sequence) and not isinstance(values, TEXTS) else 0
@@ -108,7 +108,7 @@ def check_signs(signs: Mapping[str, Any]) -> None:
 
 
 def check_texts(texts: Mapping[str, Any]) -> None:
-    """Raise `ParameterError` unless all values are texts."""
+    """Raise `ParameterError` unless all values are strings."""
     for name, text in texts.items():
         if not isinstance(text, str):
             raise ParameterError(f"{name}: expected a text, got {brief(text)}")
@@ -158,7 +158,7 @@ def checked_pivot(given: Any, pivots: Sequence[str]) -> Any:
 
 
 def read_structure(given: Any, solids: Any) -> tuple[Mechanism, dict[str, Mapping[str, Any]]]:
-    """Return the mechanism and the bodies that are no uniform rods, which the list may describe."""
+    """Return the mechanism and the bodies that are not uniform rods, which the list may describe."""
     labels: dict[str, str] = {}
     if not isinstance(given, Mechanism):
         given, listed, labels = split_solids(given)
@@ -168,7 +168,7 @@ def read_structure(given: Any, solids: Any) -> tuple[Mechanism, dict[str, Mappin
 
 
 def merged_solids(given: Any, listed: Solids, labels: Mapping[str, str]) -> Any:
-    """Return the bodies that are no uniform rods, from `solids` and from the mechanism's list.
+    """Return the bodies that are not uniform rods, from `solids` and from the mechanism's list.
 
     Raises:
         ParameterError: both describe a body.
@@ -186,7 +186,7 @@ def merged_solids(given: Any, listed: Solids, labels: Mapping[str, str]) -> Any:
 def checked_solids(
     given: Any, mechanism: Mechanism, labels: Mapping[str, str] = MappingProxyType({})
 ) -> dict[str, Mapping[str, Any]]:
-    """Return the bodies that are no uniform rods; `labels` are names of entries in errors.
+    """Return the bodies that are not uniform rods; `labels` are names of entries in errors.
 
     Raises:
         ParameterError: no such body, an unknown entry, or a number that is not finite or, of mass and

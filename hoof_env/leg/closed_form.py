@@ -145,7 +145,7 @@ def solve_points(
 
 
 def cos_sin(angle: Floats) -> tuple[Floats, Floats]:
-    """Return cosine and sine of angles [rad] by the C library; NaN where an angle is not finite.
+    """Return the cosine and sine of angles [rad] by the C library; NaN where an angle is not finite.
 
     NumPy's vectorised functions have other last bits on some processors.
     """

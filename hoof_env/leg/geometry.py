@@ -65,8 +65,8 @@ class Geometry:
         full_turn: whether the crank must be able to turn fully. If not, it may rock between dead points, and
             `TrunkEngine` alone takes such a leg.
         mechanism: the structure or its list; the paper's by default.
-        solids: bodies that are no uniform rods, by name: "mass" [kg], "centre" along and across from the tail
-            [m], "inertia" about it [kg m^2], by default a rod's; or as entries of the list's `bodies`.
+        solids: bodies that are not uniform rods, by name: "mass" [kg], "centre" along and across from the
+            tail [m], "inertia" about it [kg m^2], by default a rod's; or as entries of the list's `bodies`.
         name, provenance: where the numbers come from.
 
     Raises:
@@ -130,7 +130,7 @@ class Geometry:
 
     @property
     def corners(self) -> tuple[str, str]:
-        """Names of toe and heel, of the toe twice if that is the only foot."""
+        """Names of toe and heel; the toe's twice if it is the only foot."""
         return self.toe, self.heel or self.toe
 
     @property
@@ -265,7 +265,7 @@ class Geometry:
             ground: K "stiffness" [N/m^n] and n "exponent" [-] of the contact law, or one of them.
 
         Raises:
-            ParameterError: another suffix, or gaits or a ground that are not numbers by name.
+            ParameterError: another suffix, or gaits or a ground that are not mappings of names to numbers.
             OutputError: the file cannot be written.
         """
         _write_preset(self, path, gaits, ground)
@@ -369,12 +369,12 @@ def load_geometry(source: Preset = DEFAULT_PRESET) -> Geometry:
         DataFileError: the file is unreadable, lacks a part or has unknown entries.
         GeometryError: the leg cannot turn.
     """
-    data, from_where = read_preset(source), "a text that says where the numbers come from"
+    data, from_where = read_preset(source), "a string that says where the numbers come from"
     for part, kind, what in (("provenance", str, from_where), ("geometry", Mapping, "an object")):
         if not isinstance(data.get(part), kind):
             got = f"got {data[part]!r:.60}" if part in data else f"found {', '.join(data) or 'nothing'}"
             raise preset_error_type(source)(
-                f"{preset_label(source)}: expected an entry {part!r} beside the others, {what}; {got}"
+                f"{preset_label(source)}: expected an entry {part!r} besides the others, {what}; {got}"
             )
     values = {"provenance": data["provenance"], **data["geometry"]}
     if not isinstance(source, Mapping):

@@ -5,7 +5,7 @@ which segment is assumed there, for the mechanism of the paper: it has no bones.
 down to the ground, as high as their centres are on average in the walk of `identified`;
 `docs/evidence/limb_masses.md` has them.
 
-Scapula, brachium and thigh are carried by the links. Parts above, such as muscles of the croup as far as they
+Scapula, brachium and thigh are carried by the links. Parts above, such as muscles of the croup where they
 were weighed with the trunk, belong to the trunk: `trunk_mass`.
 """
 

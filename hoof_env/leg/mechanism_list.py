@@ -14,11 +14,11 @@ from hoof_env.leg.mechanism import FRAME, FRAME_NAME, Body, BodyPoint, Dyad, Joi
 PARTS = ("fixed", "crank", "points", "bodies", "joints", "feet")
 OPTIONAL_PARTS = ("welds",)
 SOLID = ("mass", "centre", "inertia")
-"""Numbers of a body that is no uniform rod; they are part of a `Geometry`."""
+"""Numbers of a body that is not a uniform rod; they are part of a `Geometry`."""
 
 
 def read_mechanism(given: Any) -> Mechanism:
-    """Read and check the list of a mechanism, see `hoof_env.leg.mechanism`.
+    """Read and check the list of a mechanism; see `hoof_env.leg.mechanism`.
 
     Raises:
         ParameterError: an entry is missing, unknown or inconsistent; the message has its name and the remedy.
@@ -45,7 +45,9 @@ def read_mechanism(given: Any) -> Mechanism:
         read = _read_dyad if isinstance(entry, Mapping) and "dyad" in entry else _read_body_point
         step = read(where, entry, known, bodies, distances)
         if step.point in known:
-            raise ParameterError(f"{where}: point {step.point!r} is already there; give it another name")
+            raise ParameterError(
+                f"{where}: point {step.point!r} is already there; give this one another name"
+            )
         known[step.point] = None
         steps.append(step)
     whole = [_measured(body, known, distances) for body in bodies.values()]
@@ -80,7 +82,7 @@ def split_solids(given: Any) -> tuple[Any, dict[str, dict[str, Any]], dict[str, 
     for k, entry in enumerate(bodies):
         numbers = {key: entry[key] for key in SOLID if key in entry} if isinstance(entry, Mapping) else {}
         if numbers:
-            # `read_mechanism` refuses a name that is no text
+            # `read_mechanism` refuses a name that is not a string
             name = str(entry.get("name"))
             solids[name] = numbers
             labels[name] = f"mechanism.bodies[{k}]"
@@ -137,7 +139,7 @@ def _check_found(where: str, told: str, names: Iterable[str], known: Mapping[str
     for name in names:
         if name not in known:
             raise ParameterError(
-                f"{where}: {told} {name!r}, which is not found before it; known are {', '.join(known)}"
+                f"{where}: {told} {name!r}, which is not found before it; those found are {', '.join(known)}"
             )
 
 
@@ -236,7 +238,8 @@ def _check_feet(mechanism: Mechanism) -> None:
         if foot not in movable or foot not in on_bodies:
             able = [name for name in movable if name in on_bodies]
             raise ParameterError(
-                f"mechanism.feet: {foot!r} is no moving point of a body; expected of {', '.join(able)}"
+                f"mechanism.feet: {foot!r} is not a moving point of a body; expected some of"
+                f" {', '.join(able)}"
             )
 
 
@@ -245,14 +248,14 @@ def _check_crank(mechanism: Mechanism) -> None:
     driven = [body for body in mechanism.bodies if {body.tail, body.head} == {centre, pin}]
     if len(driven) != 1 or (driven[0].tail, driven[0].head) != (centre, pin):
         raise ParameterError(
-            f"mechanism.crank: the driver is no crank; expected one body with the tail {centre!r}, a fixed "
-            f"point, and the head {pin!r}, got {[body.name for body in driven] or 'none'}"
+            f"mechanism.crank: the driver is not a crank; expected one body with the tail {centre!r}, a "
+            f"fixed point, and the head {pin!r}, got {[body.name for body in driven] or 'none'}"
         )
     number = mechanism.crank
     held = [joint for joint in mechanism.joints if {FRAME, number} == {joint.i, joint.j}]
     if [joint.point for joint in held] != [centre] or len(mechanism.parts[number]) > 1:
         raise ParameterError(
-            f"mechanism.crank: body {driven[0].name!r} is no crank; expected one joint with the frame, "
+            f"mechanism.crank: body {driven[0].name!r} is not a crank; expected one joint with the frame, "
             f"at {centre!r}, and no weld"
         )
 
@@ -262,7 +265,7 @@ def _check_joints(mechanism: Mechanism) -> None:
     for one, other in mechanism.welds:
         if not any({one, other} == {joint.i, joint.j} for joint in mechanism.joints):
             names = f"{mechanism.bodies[one].name!r} and {mechanism.bodies[other].name!r}"
-            raise ParameterError(f"mechanism.welds: {names} need a joint that they share")
+            raise ParameterError(f"mechanism.welds: {names} need a joint between them")
     for point in mechanism.points:
         part = {number: {number} for number in mechanism.at(point)}
         for joint in mechanism.joints:

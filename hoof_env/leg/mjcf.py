@@ -66,7 +66,7 @@ SLIDES = {"fixed": (), "rail": ("x",), "suspended": ("x", "z"), "free": ("x", "z
 
 @runtime_checkable
 class TrunkLike(Protocol):
-    """Trunk as far as it is written; `hoof_env.dynamics.parts.Trunk` is one."""
+    """What the model needs of a trunk; `hoof_env.dynamics.parts.Trunk` is one."""
 
     @property
     def kind(self) -> str: ...
@@ -88,7 +88,7 @@ class TrunkLike(Protocol):
 
 @runtime_checkable
 class MotorLike(Protocol):
-    """Motor as far as it is written; `hoof_env.dynamics.parts.Motor` is one."""
+    """What the model needs of a motor; `hoof_env.dynamics.parts.Motor` is one."""
 
     @property
     def speed_gain(self) -> float: ...
@@ -102,7 +102,7 @@ class MotorLike(Protocol):
 
 @runtime_checkable
 class GroundLike(Protocol):
-    """Ground as far as it is written; `hoof_env.ground.contact.Ground` is one."""
+    """What the model needs of a ground; `hoof_env.ground.contact.Ground` is one."""
 
     @property
     def friction(self) -> float: ...
@@ -186,7 +186,7 @@ def leg_to_mjcf(
         ("motor", motor, MotorLike, "a Motor"),
         ("ground", ground, GroundLike, "a Ground"),
     ):
-        # a class has the names of its fields' defaults, but is no part
+        # a class has the names of its fields' defaults, but is not a part
         if given is not None and (isinstance(given, type) or not isinstance(given, kind)):
             raise ParameterError(f"{name}: expected {needed} of this package or None, got {brief(given)}")
     if not np.isfinite(geometry.pose(theta, swing).points).all():

@@ -95,9 +95,9 @@ def _check_bodies(mechanism: Mechanism, z: NDArray[np.complex128]) -> None:
             moved = float(np.abs(place - place[0]).max() * np.abs(axis[0]))
             if moved > ROUNDING * np.abs(z).max():
                 raise GeometryError(
-                    f"mechanism.bodies[{k}]: {point!r} is no point of body {body.name!r}, on which it moves "
-                    f"by {moved:.3g} m as the crank turns; leave it out of the body's points, or find it by "
-                    f"'body': {body.name!r}"
+                    f"mechanism.bodies[{k}]: {point!r} is not a point of body {body.name!r}, on which it "
+                    f"moves by {moved:.3g} m as the crank turns; leave it out of the body's points, or find "
+                    f"it by 'body': {body.name!r}"
                 )
 
 

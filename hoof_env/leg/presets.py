@@ -33,7 +33,7 @@ def preset_names() -> list[str]:
 
 @cache
 def _shipped() -> tuple[str, ...]:
-    """List the presets of this package, once, in alphabetic order."""
+    """List the presets of this package, once, in alphabetical order."""
     files = resources.files("hoof_env").joinpath("data").iterdir()
     return tuple(sorted(f.name.removesuffix(".json") for f in files if f.name.endswith(".json")))
 
@@ -50,7 +50,7 @@ def presets_of_paper() -> list[str]:
 
 
 def preset_label(preset: Preset) -> str:
-    """Return the name of a preset in an error."""
+    """Return the name that error messages give a preset."""
     return "preset" if isinstance(preset, Mapping) else f"preset {preset}"
 
 

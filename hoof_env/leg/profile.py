@@ -89,8 +89,8 @@ ROWS = 256
 """Number of rows that BLAS multiplies at once."""
 
 DERIVATIVE_ERROR = 1e-9
-"""Error of derivatives over their largest value that determines the number of cells: the smallest candidate
-that satisfies it, else the largest."""
+"""Error of derivatives relative to their largest value that determines the number of cells: the smallest
+candidate that satisfies it, else the largest."""
 
 
 def places(geometry: Geometry, theta: NDArray[np.float64]) -> tuple[NDArray[np.complex128], ...]:
@@ -188,7 +188,7 @@ class LegProfile:
                 break
         if not np.isfinite(self.table).any():
             raise GeometryError(
-                f"geometry {geometry.name!r}: expected a leg whose links have a place at some crank angle"
+                f"geometry {geometry.name!r}: expected a leg that can be assembled at some crank angle"
             )
 
     def with_cells(self, cells: int) -> LegProfile:
@@ -239,8 +239,8 @@ def leg_profile(geometry: Geometry, cells: int | None = None) -> LegProfile:
 def _evaluate(
     rows: NDArray[np.float64], x: NDArray[np.float64]
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Return values and derivatives of the polynomials in rows of a table, at angles from the middles of the
-    cells [rad], shape (len(rows), 1)."""
+    """Return the values and derivatives of the polynomials in rows of a table, at angles from the middles of
+    the cells [rad], shape (len(rows), 1)."""
     first = (DEGREE + 1) * SLOPED
     sloped = rows[:, :first].reshape(-1, DEGREE + 1, SLOPED)
     others = rows[:, first:].reshape(-1, DEGREE + 1, FUNCTIONS - SLOPED)
@@ -262,8 +262,8 @@ def _fit(geometry: Geometry, chosen: NDArray[np.int64], cells: int) -> NDArray[n
     if geometry.full_turn and not np.isfinite(value).all():
         where = theta.ravel()[~np.isfinite(value).all(1)][0]
         raise GeometryError(
-            f"geometry {geometry.name!r}: expected a leg whose links have a place at every crank angle, "
-            f"but at {np.degrees(where) % 360:.2f} deg it has none"
+            f"geometry {geometry.name!r}: expected a leg that can be assembled at every crank angle, "
+            f"but at {np.degrees(where) % 360:.2f} deg it cannot"
         )
     powers, rates = np.vander(nodes, DEGREE + 1), np.zeros((count, DEGREE + 1))
     rates[:, :-1] = np.vander(nodes, DEGREE) * np.arange(DEGREE, 0, -1)
@@ -286,7 +286,7 @@ def _fit(geometry: Geometry, chosen: NDArray[np.int64], cells: int) -> NDArray[n
 
 
 def _polynomials(rows: list[Any], angles: list[Any], first: int, last: int) -> tuple[Any, Any]:
-    """Return values and derivatives of functions `first` to `last` in each lane, a vector a lane.
+    """Return the values and derivatives of functions `first` to `last` in each lane, a vector a lane.
 
     A lane's row of the table holds their coefficients together.
     """
@@ -325,7 +325,7 @@ def locate(leg: Any, cells: Lanes | float) -> None:
 
 
 def look_up(leg: Any, table: Pointer) -> None:
-    """Fill a leg's functions and slopes, see `Functions`, in the cell that `locate` found; NaN
+    """Fill a leg's functions and slopes (see `Functions`) in the cell that `locate` found; NaN
     for an angle of NaN."""
     machine, fields, lanes = CURRENT.machine, leg._layout.fields, max(leg._n, 1)
     values, slopes = fields["functions"].start, fields["slopes"].start

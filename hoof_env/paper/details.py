@@ -29,7 +29,7 @@ UNITS = {
     "printed_grf": ("N^(1/2)", "highest value of sqrt(Fn + Ff), the resultant as printed"),
     "peak_delay": ("ms", "time of the elastic peak after the inelastic one"),
 }
-"""Unit and meaning of each figure; elastic ground but for the last one."""
+"""Unit and meaning of each figure; elastic ground except for the last one."""
 
 
 def details(traces: Mapping[tuple[str, str], Trace]) -> list[dict[str, Any]]:

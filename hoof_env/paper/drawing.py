@@ -65,7 +65,7 @@ def leg_at(geometry: Geometry, trace: Trace, t: float) -> dict[str, Point]:
 
 
 def elastic_cycles(reproduction: Reproduction) -> dict[str, tuple[Trace, Stance]]:
-    """Return trace and stance of each gait on elastic ground with the exact solver."""
+    """Return the trace and stance of each gait on elastic ground with the exact solver."""
     traces = {gait: reproduction.traces[gait, "elastic", EXACT] for gait in GAITS}
     return {gait: (trace, measure_stance(trace)) for gait, trace in traces.items()}
 
@@ -170,7 +170,7 @@ def mark_contacts(ax: Any, reproduction: Reproduction, gait: str, y: float) -> N
 
 
 def shade(ax: Any, stance: Stance) -> None:
-    """Shade the sub-phases of a stance behind curves over time [s]."""
+    """Shade the sub-phases of a stance behind curves plotted against time [s]."""
     intervals = {name: getattr(stance, name) for name in POINTS}
     # Sub-phases change where toe or heel enters or leaves the ground.
     instants = sorted({t for contacts in intervals.values() for contact in contacts for t in contact})

@@ -211,15 +211,15 @@ class Reproduction:
     """Result of the four conditions.
 
     Attributes:
-        rows: a dictionary for each published row and solver, see `compare`.
+        rows: a dictionary for each published row and solver; see `compare`.
         shapes: a dictionary for each claim and solver: the claim, its solver, a `shapes.Verdict` and its
             figure.
         traces: cycles of dtype `measure.CYCLE`, with their first row at t = 0, by (gait, condition, solver).
         geometry: leg of the preset, which is identified and not published.
         published: the published numbers.
         ground: elastic ground of the preset.
-        levels: a dictionary for each row that has a bar, see `level.compare_levels`.
-        details: a dictionary for each gait and figure, see `details.details`.
+        levels: a dictionary for each row that has a bar; see `level.compare_levels`.
+        details: a dictionary for each gait and figure; see `details.details`.
     """
 
     rows: list[dict[str, Any]]
@@ -330,7 +330,7 @@ def counted(rows: Iterable[Mapping[str, Any]], shapes: Iterable[Mapping[str, Any
 
 
 def _compare(row: PublishedRow, stances: Stances, solver: str) -> dict[str, Any]:
-    """Compare one published number, see `compare`."""
+    """Compare one published number; see `compare`."""
     simulated, definition, beside = _measure(row, stances)
     error = None if simulated is None else row.bar.error(simulated, row.value)
     if row.printed != row.value and simulated is not None:

@@ -107,7 +107,7 @@ def closed_form(geometry: Geometry, motion: Motion) -> tuple[Vector, Vector]:
     frame = FrameMotion(motion.phi, motion.phi_rate)
     p = pose(drawn, motion.theta, motion.theta_rate, frame=frame)
     angles = p.angles.copy()
-    # pose returns angles but for whole turns
+    # pose returns angles up to whole turns
     angles[geometry.mechanism.crank] = motion.phi - motion.theta
     for (one, other), angle in zip(geometry.mechanism.welds, weld_angles(geometry), strict=True):
         angles[one] = angles[other] + angle

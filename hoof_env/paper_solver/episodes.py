@@ -131,7 +131,7 @@ class PaperEngine(TrunkEngine):
         envs: ArrayLike | None = None,
         **trunk: Any,
     ) -> None:
-        """Start environments, see `TrunkEngine.reset`."""
+        """Start environments; see `TrunkEngine.reset`."""
         super().reset(gaits, crank_angle, x=x, envs=envs, **trunk)
         where = env_indices(envs, self.num_envs)
         memory = self._memory
@@ -253,7 +253,7 @@ class PaperEngine(TrunkEngine):
                 raise ValueError
         except (KeyError, TypeError, ValueError, AttributeError, IndexError):
             raise ParameterError(
-                f"state: expected what get_state gives of {len(self.legs)} legs of the paper's solver, got"
+                f"state: expected what get_state returns for {len(self.legs)} legs of the paper's solver, got"
                 f" {state!r:.60}"
             ) from None
         return legs, accounts, last

@@ -71,7 +71,7 @@ class Body:
 
 
 def record_type(kind: type) -> np.dtype[np.void]:
-    """Return the type of a record with the fields of a dataclass of numbers and truths."""
+    """Return the type of a record with the fields of a dataclass of numbers and booleans."""
     return np.dtype([(item.name, "b1" if item.type == "bool" else "f8") for item in fields(kind)])
 
 

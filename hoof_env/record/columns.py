@@ -57,7 +57,7 @@ def body_units(of_leg: Mapping[str, str], prefixes: Iterable[str]) -> dict[str, 
 
 def joined(parts: Sequence[Columns], units: Collection[str]) -> Columns:
     """Join the parts of an episode to one record with the columns of `units`, in their order; the free
-    moment, which is no column of an episode, comes last."""
+    moment, which is not a column of an episode, comes last."""
     record = {name: np.concatenate([part[name] for part in parts]) for name in units if name in parts[0]}
     moments = [name for name in units if name.endswith("free_moment")]
     return record | {name: np.zeros(len(record["time"])) for name in moments}

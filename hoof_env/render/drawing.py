@@ -99,7 +99,8 @@ class Drawing:
         full_scale: force of an arrow of `ARROW_M` at a leg of a horse's size [N].
         low, high, half_width: the camera's view around its place [m].
         size, girth: size of trunk and arrows, and of legs, over their usual size [-].
-        weights, far, trunk_parts: full scale over the weight [-], legs behind the trunk, parts of the trunk.
+        weights, far, trunk_parts: full scale relative to the weight [-], legs behind the trunk, parts of
+            the trunk.
     """
 
     weights = 4.0

@@ -47,12 +47,12 @@ class GroundPainter:
         return np.interp(x, self._knots, self._heights)
 
     def kinds(self) -> list[tuple[str, Colour]]:
-        """Return name and colour of each unusual kind of ground in the terrain."""
+        """Return the name and colour of each unusual kind of ground in the terrain."""
         return kinds_of(self._terrain)
 
     def draw(self, canvas: Any, feet: Sequence[Instant], corner: complex) -> None:
-        """Draw the ground under some legs; `corner` is the place in the world of the picture's upper left
-        corner [m]."""
+        """Draw the ground under some legs; `corner` is the place of the picture's upper left corner in the
+        world [m]."""
         pressing = [now for now in feet if max(now.toe_depth, now.heel_depth) > 0]
         x = self._places(pressing, corner.real)
         surface = (corner.imag - self.height(x)) * self._scale

@@ -59,8 +59,8 @@ class HorseScene(LegScene):
         """Do nothing, as the scene shows no paths."""
 
     def draw(self, canvas: Any, now: Any, full_scale: float) -> None:
-        """Draw an instant; the arrow of a force `full_scale` [N] is as long for animals of all sizes in the
-        picture."""
+        """Draw an instant; the arrow of a force of `full_scale` [N] is equally long in pictures of animals of
+        all sizes."""
         level = float(self._ground.height(now.x + self._animal * AROUND_M).mean())
         self._camera = complex(now.x, level)
         canvas.blit(self._sky, (0, 0))

@@ -48,7 +48,7 @@ def find_patches(terrain: Terrain) -> list[Patch]:
 
 
 def kinds_of(terrain: Terrain) -> list[tuple[str, Colour]]:
-    """Return name and colour of each unusual kind of ground in the terrain."""
+    """Return the name and colour of each unusual kind of ground in the terrain."""
     stiffness = np.array(terrain.stiffness)
     friction = np.array(terrain.friction)
     all_kinds = (

@@ -102,7 +102,7 @@ class Stances:
 class LegPanel:
     """Numbers, gait and force curve in one box (left, top, width, height) of the picture, with the weight of
     trunk and leg [N] as a line, unless it is 0, and stances from `lift_off_n` [N] on. `limits` are the
-    limits of the gait parameters, by name, see `gait.limits_of`.
+    limits of the gait parameters, by name; see `gait.limits_of`.
 
     Its `full_scale`, the force at the top of the curve's axis [N], only grows during an episode.
     """

@@ -62,7 +62,7 @@ class Picture(Protocol):
     """Interface of pictures.
 
     Attributes:
-        trunks: kinds of trunk that the scene can draw, see `dynamics.parts.TRUNKS`.
+        trunks: kinds of trunk that the scene can draw; see `dynamics.parts.TRUNKS`.
     """
 
     trunks: tuple[str, ...]
@@ -86,7 +86,7 @@ class LegPicture:
     trunks: tuple[str, ...] = ONE_LEG
 
     def scene(self, brush: Brush, here: Surroundings, size: tuple[int, int], right: int) -> Scene:
-        """Make the scene, see `Picture`."""
+        """Make the scene; see `Picture`."""
         from hoof_env.render.panel import unit_of
         from hoof_env.render.scene import LegScene
 
@@ -94,7 +94,7 @@ class LegPicture:
         return LegScene(brush, here.geometry, here.terrain, size, right, here.trunk, unit, here.hips)
 
     def panel(self, brush: Brush, box: tuple[int, int, int, int], here: Surroundings) -> Panel:
-        """Make the panel, see `Picture`."""
+        """Make the panel; see `Picture`."""
         from hoof_env.gait import limits_of
         from hoof_env.render.panel import LegPanel
 
@@ -104,7 +104,7 @@ class LegPicture:
         return LegPanel(brush, box, weight, here.lift_off_n, limits_of(here.geometry))
 
     def drawing(self, here: Surroundings, numbers: int) -> Drawing:
-        """Make the drawing of a page, see `Picture`."""
+        """Make the drawing of a page; see `Picture`."""
         from hoof_env.render.drawing import Drawing
 
         return Drawing(here, numbers)
@@ -114,7 +114,7 @@ class LegsPicture(LegPicture):
     """Picture of two to nine legs under the bar of a trunk, with forces of all hooves and their footfall."""
 
     def panel(self, brush: Brush, box: tuple[int, int, int, int], here: Surroundings) -> Panel:
-        """Make the panel, see `Picture`."""
+        """Make the panel; see `Picture`."""
         from hoof_env.render.legs_panel import MAX_LEGS, LegsPanel
 
         if len(here.hips) > MAX_LEGS:
@@ -128,13 +128,13 @@ class HorsePicture(LegsPicture):
     trunks: tuple[str, ...] = TRUNKS
 
     def scene(self, brush: Brush, here: Surroundings, size: tuple[int, int], right: int) -> Scene:
-        """Make the scene, see `Picture`."""
+        """Make the scene; see `Picture`."""
         from hoof_env.render.horse_scene import HorseScene
 
         return HorseScene(brush, here.geometry, here.terrain, size, right)
 
     def drawing(self, here: Surroundings, numbers: int) -> Drawing:
-        """Make the drawing of a page, see `Picture`."""
+        """Make the drawing of a page; see `Picture`."""
         from hoof_env.render.drawing import HorseDrawing
 
         return HorseDrawing(here, numbers)

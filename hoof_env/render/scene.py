@@ -64,7 +64,7 @@ class LegScene:
     """Scene in a picture of `size`, whose `right` pixels the legs at `hips` leave free.
 
     Attributes:
-        small: size of trunk and arrows over their full size, at most 1.
+        small: size of trunk and arrows relative to their full size, at most 1.
     """
 
     small = 1.0

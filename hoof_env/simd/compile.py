@@ -31,7 +31,7 @@ from hoof_env.simd.memory import AXES, Arrays, Given, Matrix, Pointer
 from hoof_env.simd.values import Index, Lanes, Mask, Number, Whole, word
 
 LEVEL = 2
-"""LLVM's level of optimisation: without its vectorisers, for the code is vectors already."""
+"""LLVM's level of optimisation: without its vectorisers, because the code is already in vectors."""
 
 CODE_MODEL = "jitdefault"
 """LLVM's code model: constants may lie anywhere. MCJIT allocates code and constants separately, and in a
@@ -104,7 +104,7 @@ def _check_processor() -> None:
             os.close(number)
     if b"not a recognized processor" in output:
         raise ParameterError(
-            f"{PROCESSOR}: expected a processor in LLVM's words, such as haswell or x86-64-v3, got"
+            f"{PROCESSOR}: expected a processor by LLVM's name, such as haswell or x86-64-v3, got"
             f" {os.environ[PROCESSOR]!r}"
         )
 
@@ -117,8 +117,8 @@ def _identity() -> str:
 
 
 def optimised(text: str, machine: Any = None) -> Any:
-    """Return the module of a text after LLVM's passes, for this processor or another of LLVM's target
-    machines.
+    """Return the module that LLVM parses from a text, after LLVM's passes, for this processor or another of
+    LLVM's target machines.
 
     Raises:
         CompilerError: LLVM refuses the text.
@@ -204,8 +204,8 @@ class Kernel:
     """Function that runs as machine code, traced at its first call.
 
     Args:
-        function: the function, of values.
-        parameters: types of its arguments, see `Parameter`.
+        function: the function, which takes values.
+        parameters: types of its arguments; see `Parameter`.
         name: name for messages and files.
         is_threaded: True if several threads may run it at once, without Python's lock; a call takes a little
             longer.
@@ -271,7 +271,7 @@ def _array(array: Any) -> list[Any]:
     """Return an array of the caller as arguments of machine code.
 
     Raises:
-        TypeError: it is no contiguous array of doubles that may be written.
+        TypeError: it is not a writable contiguous array of doubles.
     """
     expected = "expected a contiguous array of doubles that may be written"
     if not isinstance(array, np.ndarray):

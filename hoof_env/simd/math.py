@@ -98,7 +98,7 @@ def tanh(x: Lanes) -> Lanes:
 
 
 def cos_sin(angle: Lanes) -> tuple[Lanes, Lanes]:
-    """Return cosine and sine of `angle` [rad], error below 2e-16 for |angle| < 1e4."""
+    """Return the cosine and sine of `angle` [rad], error below 2e-16 for |angle| < 1e4."""
     shifted = steady(angle * TWO_OVER_PI + ROUNDER)
     turns = shifted - ROUNDER  # quarter turns to the nearest multiple of pi / 2
     # the first product is exact for up to 2^20 quarter turns, so no digits are lost in the difference

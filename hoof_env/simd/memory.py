@@ -63,7 +63,7 @@ def aligned(*shape: int) -> NDArray[np.float64]:
 # Arrays of the caller
 
 ITEMS = {"f8": "double", "f4": "float", "i8": "i64"}
-"""LLVM's types of NumPy's."""
+"""LLVM's types for NumPy's."""
 
 
 class Pointer(Value):
@@ -206,7 +206,7 @@ class Held(int):
 
     def __reduce__(self) -> NoReturn:
         raise TypeError(
-            "addresses hold in one process only: expected the arrays to be copied, and held again"
+            "addresses are valid in one process only: expected the arrays to be copied, and held again"
         )
 
     def __deepcopy__(self, memo: Any) -> NoReturn:
@@ -371,7 +371,7 @@ class Rows:
         return True
 
     def __array__(self, *arguments: Any, **named: Any) -> Any:
-        raise TraceError("a function of NumPy of memory: expected its numbers, by name or number")
+        raise TraceError("a NumPy function of memory: expected its numbers, by name or number")
 
     def __getitem__(self, k: Any) -> Lanes:
         if self._empty:
@@ -427,7 +427,7 @@ class Rows:
         start, size, kind = self._layout.fields[name]
         if kind is Vector:
             if not isinstance(value, Plane):
-                raise TraceError(f"{kind_of(value)} in the place of a planar vector, {name!r}")
+                raise TraceError(f"{kind_of(value)} in place of a planar vector, {name!r}")
             self._write(start, value.a)
             self._write(start + 1, value.b)
         elif kind is Row:
@@ -471,8 +471,8 @@ def locked(rows: Any, but: tuple[str, ...] = (), legs: int = 1) -> Any:
 
 
 class Columns(Rows):
-    """n columns of an array, `stride` apart, with rows that are `row` apart. Of a count of 0 it is one column
-    with ordinary numbers."""
+    """n columns of an array, `stride` apart, with rows that are `row` apart. With a count of 0 it is one
+    column of ordinary numbers."""
 
     __slots__ = ("_row", "_stride")
 

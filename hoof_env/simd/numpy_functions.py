@@ -85,7 +85,7 @@ LIBRARY = (
     "exp", "exp2", "expm1", "log", "log2", "log10", "log1p", "sin", "cos", "tan", "sinh", "cosh", "tanh",
     "hypot", "cbrt", "fmod",
 )  # fmt: skip
-"""Functions of NumPy that the C library has by the same name."""
+"""NumPy functions that the C library has by the same name."""
 
 UFUNCS |= {
     np.add: add,

@@ -18,7 +18,7 @@ from contextlib import suppress
 from pathlib import Path
 
 FOLDER = "HOOF_ENV_CACHE_DIR"
-"""Environment variable: folder of the files in the place of the user's cache folder."""
+"""Environment variable: folder of the files in place of the user's cache folder."""
 
 MAX_FILES = 2000
 """Number of files beyond which the least recently used half goes; a file has 5 to 100 kB."""

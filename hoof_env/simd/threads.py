@@ -34,9 +34,7 @@ def check_threads(num_threads: Any) -> int:
     threads = count("num_threads", num_threads)
     most = min(available(), MAX_THREADS)
     if threads > most:
-        raise ParameterError(
-            f"num_threads: expected 1 to {most}, the processors that there are, got {threads}"
-        )
+        raise ParameterError(f"num_threads: expected 1 to {most}, the number of processors, got {threads}")
     return threads
 
 

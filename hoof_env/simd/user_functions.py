@@ -96,7 +96,7 @@ def _steady(function: Callable[..., Any], arguments: tuple[Any, ...]) -> Any:
         machine.most = most
     if first != (_text(result), machine.slots[slots:], machine.lines[lines:]):
         raise _Unsteady(
-            f"{function.__name__} does something else at each call: a kernel is made of one call, so random"
+            f"{function.__name__} does something else at each call: a kernel is made from one call, so random"
             f" numbers, clocks and counters would stay as they were then{_at(function)}"
         )
     return result
@@ -153,7 +153,7 @@ def _is_wrong(x: Any) -> bool:
 
 def _result(x: Any) -> str:
     if isinstance(x, (bool, np.bool_, Mask)):
-        return "a truth (np.where(condition, 1.0, 0.0) makes a number of it)"
+        return "a boolean (np.where(condition, 1.0, 0.0) makes a number of it)"
     if isinstance(x, (tuple, list)):
         return f"a {type(x).__name__} of {len(x)}"
     if isinstance(x, Plane):
@@ -200,8 +200,9 @@ def _holds_value(x: Any) -> bool:
 
 
 NAMES = {
-    "Lanes": "a number", "float": "a number", "int": "a number", "Index": "a whole number", "Mask": "a truth",
-    "bool": "a truth", "Plane": "a planar vector", "Columns": "memory", "Rows": "memory",
+    "Lanes": "a number", "float": "a number", "int": "a number", "Index": "a whole number",
+    "Mask": "a boolean", "bool": "a boolean", "Plane": "a planar vector",
+    "Columns": "memory", "Rows": "memory",
     "Pointer": "an array", "Matrix": "an array", "Record": "the record", "Field": "an array of the record",
     "NoneType": "nothing",
 }  # fmt: skip
@@ -226,7 +227,7 @@ def _message_of(error: Exception) -> str:
 
 
 def _place(error: Exception) -> str:
-    """Return function and line of the user's file."""
+    """Return the function and line of the user's file."""
     if isinstance(error, _Unsteady):
         return ""
     frames = [
@@ -315,7 +316,7 @@ def check_imports(name: str, function: Any, error: type[ParameterError] = Parame
         for line in _imports(each.__code__):
             raise error(
                 f"{name}: `import` in {each.__name__} ({each.__code__.co_filename}, line {line}): expected it"
-                " at the top of the file, for a function becomes a kernel by one call"
+                " at the top of the file, because a function becomes a kernel by one call"
             )
 
 
@@ -375,5 +376,5 @@ def user_error(name: str, error: UserFunctionError) -> ParameterError:
 
 
 def function_name(function: Callable[..., Any]) -> str:
-    """Return module and name of a function, for messages."""
+    """Return the module and name of a function, for messages."""
     return f"{function.__module__}.{function.__qualname__}"

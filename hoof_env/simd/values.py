@@ -1,4 +1,4 @@
-"""Values of kernels: lanes, planar vectors, truths, whole numbers; the operators and functions on them.
+"""Values of kernels: lanes, planar vectors, booleans, whole numbers; the operators and functions on them.
 
 The machine that runs (`machines.CURRENT`) carries the operations out: a `Writer` writes instructions while a
 kernel is traced, `Eager` computes with NumPy at once. Ordinary numbers are computed at once on either.
@@ -48,11 +48,13 @@ class Value:
 
     def __iter__(self) -> Iterator[Any]:
         raise TraceError(
-            f"a loop over {self.kind}: a value of a kernel has no elements that Python could reach"
+            f"a loop over {self.kind}: a value of a kernel has no elements that Python could access"
         )
 
     def __len__(self) -> int:
-        raise TraceError(f"len() of {self.kind}: a value of a kernel has no elements that Python could reach")
+        raise TraceError(
+            f"len() of {self.kind}: a value of a kernel has no elements that Python could access"
+        )
 
     def _no_number(self) -> NoReturn:
         raise TraceError(
@@ -75,8 +77,8 @@ class Value:
 
     def __array__(self, *arguments: Any, **named: Any) -> Any:
         raise TraceError(
-            f"an array of NumPy with {self.kind}: a kernel has numbers only, so write out the operations on"
-            " each"
+            f"a NumPy array with {self.kind}: a kernel works on single"
+            " numbers, so write out the operation on each"
         )
 
     def __array_ufunc__(self, ufunc: Any, method: str, *inputs: Any, **named: Any) -> Any:
@@ -116,7 +118,7 @@ def _single(x: Any) -> Any:
     if isinstance(x, np.ndarray):
         if x.ndim:
             raise TraceError(
-                f"an array of NumPy, of shape {x.shape}, in an operation with a value of a kernel, which is"
+                f"a NumPy array, of shape {x.shape}, in an operation with a value of a kernel, which is"
                 " one number: take its elements"
             )
         return x.item()
@@ -126,7 +128,7 @@ def _single(x: Any) -> Any:
 def kind_of(x: Any) -> str:
     """Return the kind of an object, for messages."""
     if isinstance(x, np.ndarray):
-        return f"an array of NumPy, of shape {x.shape}"
+        return f"a NumPy array, of shape {x.shape}"
     kind = getattr(type(x), "kind", None)
     if isinstance(kind, str):
         return kind
@@ -226,10 +228,10 @@ class Lanes(Value):
 
 
 class Mask(Value):
-    """n truths; one that all lanes share if n is 0."""
+    """n booleans; one that all lanes share if n is 0."""
 
     __slots__ = ("n", "x")
-    kind = "a truth"
+    kind = "a boolean"
 
     def __init__(self, x: Any, n: int) -> None:
         self.x = x
@@ -272,7 +274,7 @@ class Mask(Value):
         return self ^ other if isinstance(other, (bool, np.bool_, Mask)) else self.to_real() != other
 
     def to_real(self) -> Lanes:
-        """Return 1.0 where it holds, else 0.0, like NumPy's arithmetic with truths."""
+        """Return 1.0 where it holds, else 0.0, like NumPy's arithmetic with booleans."""
         return where(self, 1.0, 0.0)
 
     def _sum(self, sign: str, one: Any, other: Any) -> Any:
@@ -625,7 +627,7 @@ def rounded(value: V) -> V:
     return made
 
 
-# Functions. Ordinary numbers, and arrays of NumPy, are computed at once, whatever the machine.
+# Functions. Ordinary numbers, and NumPy arrays, are computed at once, whatever the machine.
 
 
 class RealFunction(Protocol):
@@ -655,7 +657,7 @@ def _real_function(name: str, at_once: Any) -> RealFunction:
 
 
 def _other_kind(at_once: Any, x: Value) -> Any:
-    """Return NumPy's function of a truth, or the length of a planar vector; refuse the rest."""
+    """Return NumPy's function of a boolean, or the length of a planar vector; refuse the rest."""
     if isinstance(x, Plane) and at_once is np.abs:
         return library("hypot")(x.a, x.b)
     if isinstance(x, Mask):

@@ -50,7 +50,7 @@ class Body(Protocol):
     """Trunk on one leg or several.
 
     Attributes:
-        kernels: parts of the kernels of a step, see `BodyKernels`.
+        kernels: parts of the kernels of a step; see `BodyKernels`.
         geometry: geometry of a leg; all legs have the same linkage.
         height: nominal height of the trunk [m].
         hips: crank centre of each leg from the place of the trunk [m], by the prefix of the leg's quantities,
@@ -117,4 +117,4 @@ class Body(Protocol):
         """Write the body's own fields of the episodes' memory, in the rows `which`."""
 
     def action_for(self, gaits: Any, engine: TrunkEngine, dt: float) -> NDArray[np.float32]:
-        """Return the actions that move towards gaits, see `LegBase.action_for`."""
+        """Return the actions that move towards gaits; see `LegBase.action_for`."""

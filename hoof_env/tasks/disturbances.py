@@ -10,10 +10,10 @@ MAX_STRENGTH = 10.0
 ROUGH_PUSH = 1.5
 ROUGH_SLOPE = 0.1
 ROUGHNESS = 0.05
-"""Strengths of a horse's rough ground: largest push over the mass [m/s], steepest slope [-], largest bumps
-[m]. legged_gym pushes robots with hips at 0.55 m by 1 m/s (`max_push_vel_xy`), which is this push at the same
-Froude number, and its rough slopes have these bumps (`random_uniform_terrain`). The slope is that of a steep
-road. They were chosen before the first training."""
+"""Strengths of a horse's rough ground: largest push divided by the mass [m/s], steepest slope [-], largest
+bumps [m]. legged_gym pushes robots with hips at 0.55 m by 1 m/s (`max_push_vel_xy`), which is this push at
+the same Froude number, and its rough slopes have these bumps (`random_uniform_terrain`). The slope is that
+of a steep road. They were chosen before the first training."""
 
 
 def rough_ground(strength: float, mass: float) -> dict[str, Any]:

@@ -36,7 +36,7 @@ class Episode(Layout):
 
     # Saved states hold these rows: with another row, or another order, older states are not readable.
     steps: Row  # control steps so far
-    allowance: Row  # impulse over the weight that bearing is still paid for [s], see `reward.BEARING`
+    allowance: Row  # impulse over the weight that bearing is still paid for [s]; see `reward.BEARING`
     x_before: Row  # x of the trunk before this step [m]
     target: Row  # commanded speed [m/s]; infinite without a command
     weight: Row  # weight of trunk and leg [N]
@@ -51,7 +51,7 @@ class Episode(Layout):
     strength: Row  # factor of all disturbances [-]
     observation_delay: Row  # whole control steps
     action_delay: Row  # whole control steps
-    noise_key: Row  # key of the random numbers of noise and bias, see `simd.noise`
+    noise_key: Row  # key of the random numbers of noise and bias; see `simd.noise`
     push_at: Row  # control step after which the trunk is pushed next; infinite if it is not
     next_push: Vector  # impulse of that push [N s]
 
@@ -133,14 +133,14 @@ def task_type(terms: int, entries: int, gait: int = ACTIONS, more: tuple[Any, ..
 
     Args:
         terms: number of the reward's terms.
-        entries: number of slots of the observation, see `episodes.scene.Slots`.
+        entries: number of slots of the observation; see `episodes.scene.Slots`.
         gait: number of gait parameters of a leg.
         more: further fields of the body's own.
     """
     return np.dtype(
         [
-            ("reach", "f8", (gait,)),  # distance at which an action of 1 puts the command, see `OneLeg.reach`
-            ("lead", "f8"),  # time by which a command is ahead of the gait [s], see `one_leg.lead_of`
+            ("reach", "f8", (gait,)),  # distance at which an action of 1 puts the command; see `OneLeg.reach`
+            ("lead", "f8"),  # time by which a command is ahead of the gait [s]; see `one_leg.lead_of`
             ("half", "f8", (gait,)),  # half range of a parameter, for a horse span of an action
             ("low", "f8", (gait,)),  # lowest command
             ("high", "f8", (gait,)),  # highest command
@@ -172,7 +172,7 @@ def task_type(terms: int, entries: int, gait: int = ACTIONS, more: tuple[Any, ..
                 "i8",
                 (entries,),
             ),  # column of the true number of each slot; -1: not observed
-            ("parts", "i8"),  # parts of a control step, see `episodes.delays.Parts`
+            ("parts", "i8"),  # parts of a control step; see `episodes.delays.Parts`
             ("part_substeps", "i8", (MAX_PARTS,)),
             ("acting_part", "i8"),  # part at whose start an action takes effect
             ("seeing_part", "i8"),  # part after which a frame within the step is observed; -1: no such frame

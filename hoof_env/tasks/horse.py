@@ -1,7 +1,7 @@
 """Body of `Horse-v0`: a trunk on four legs, in the plane. The body of one leg is in `one_leg`.
 
 The horse has a mass of 475 kg and its hips are 1.4 m high. Its legs are the linkage of the preset, scaled,
-with the segment masses of Buchner and others (1997, see `leg.limb_masses`). Springs of 24 kN/m at toe and
+with the segment masses of Buchner and others (1997; see `leg.limb_masses`). Springs of 24 kN/m at toe and
 heel give a limb the stiffness of a horse's distal spring: 127 mm under 12.8 N/kg (McGuigan & Wilson 2003).
 Radius of gyration and hips are assumed: the leg stands half a metre behind its crank centre, so that the fore
 feet are half a metre before the trunk's centre and the hind feet 0.7 m behind.
@@ -80,7 +80,7 @@ STAND = -0.5  # x of a hoof from its crank centre, in the middle of a stance [m]
 PITCH = 0.5
 HEIGHT = (0.75, 1.8)
 CLEARANCE = 0.02
-"""Limits beyond which a horse has fallen: +-pitch [rad], lowest and highest trunk [m], lowest joint over the
+"""Limits beyond which a horse has fallen: +-pitch [rad], lowest and highest trunk [m], lowest joint above the
 ground [m]."""
 GAP = 0.005  # clearance of the lowest rigid hoof at a start [m]
 HOOF_STIFFNESS = 24000.0  # default for a horse of size 1 [N/m]
@@ -122,8 +122,8 @@ command, and after larger changes horses fall, see docs/evidence/horse.md."""
 SPEED_SPREAD = 0.1
 PITCH_SPREAD = 0.02
 PHASE_SPREAD = 0.02
-"""Largest deviations of a start from its gait: of the speed over the commanded one [-], of the pitch [rad],
-of each crank [strides]."""
+"""Largest deviations of a start from its gait: of the speed relative to the commanded one [-], of the pitch
+[rad], of each crank [strides]."""
 
 
 class HorseEpisode(Episode):
@@ -147,11 +147,11 @@ POLICIES = ("reference", "zero", "random", "bang-bang")
 
 
 class Horse:
-    """Four legs on a free trunk, see `body.Body`.
+    """Four legs on a free trunk; see `body.Body`.
 
     Attributes:
-        size: length over that of a horse of 475 kg [-].
-        speed_scale: speed over that of a horse of 475 kg, the root of the size [-].
+        size: length relative to that of a horse of 475 kg [-].
+        speed_scale: speed relative to that of a horse of 475 kg, the root of the size [-].
         gaits: stored gaits by name, converted to the size of the animal.
         gait: gait to which actions add offsets at all commanded speeds; None for `reference_gaits`.
         lowest, highest: heights of the trunk beyond which the animal has fallen [m].
@@ -199,7 +199,7 @@ class Horse:
         )
 
     def parts(self, s: ResolvedSettings) -> tuple[Trunk, Ground, tuple[Limb, ...]]:
-        """Make trunk, ground and legs from settings, see `Body.parts`."""
+        """Make trunk, ground and legs from settings; see `Body.parts`."""
         size = self.size
         mass = check_number("trunk_mass", s.trunk_mass, low=0, exclusive_low=True) * size**3
         # The legs keep their masses: `trunk_mass` is that of the trunk alone, which a reset may draw.
@@ -264,7 +264,7 @@ class Horse:
             "low": low,
             "high": high,
             "height": self.height,
-            # The engine's own limits end episodes, see `Horse.limits`.
+            # The engine's own limits end episodes; see `Horse.limits`.
             "lowest": -np.inf,
             "highest": np.inf,
             **reference_constants(self.speed_scale, follows=self.gait is None),
@@ -319,7 +319,7 @@ class Horse:
         is_known = option is None and self.gait is None
         motion = trunk_motion(targets / self.speed_scale, values["phase"]) if is_known else DEFAULT_MOTION
         slope = self._slope(engine.terrain, values["x"])
-        # Until here speed and pitch are deviations, see `draw`.
+        # Until here speed and pitch are deviations; see `draw`.
         if "speed" not in options:
             values["speed"] = values["speed"] * targets * motion["vx"]
         if "pitch" not in options:

@@ -31,7 +31,7 @@ IN_WEIGHTS = Scale("tanh(x / weight)", lambda x, scene: x / scene.episode.weight
 
 
 def _height(scene: ObservationInputs) -> Lanes:
-    """Measure the height of the trunk over the ground below it [m]."""
+    """Measure the height of the trunk above the ground below it [m]."""
     place = scene.trunk.report.place
     return place.imag - surface(place.real, scene.ground, scene.ground_origin, scene.ground_per_metre)[0]
 
@@ -160,7 +160,7 @@ def peak(step: Outcome, weight: Number) -> Lanes:
 
 
 def slip(step: Outcome, weight: Number) -> Lanes:
-    """Return the charge for sliding, over the commanded distance and at most 1, times the duration."""
+    """Return the charge for sliding, relative to the commanded distance and at most 1, times the duration."""
     asked = maximum(step.commanded_progress, 1e-9)
     return -weight * step.seconds * minimum(step.sums.slip / asked, 1.0)
 

@@ -85,7 +85,7 @@ def hoof_points(
     phi: Floats = gaits[:, 1] + gaits[:, 2] * np.sin(theta) + gaits[:, 3] * np.cos(theta) + np.asarray(turn)
     for k in range(2, gaits.shape[1] // 2):
         phi = phi + gaits[:, 2 * k] * np.sin(k * theta) + gaits[:, 2 * k + 1] * np.cos(k * theta)
-    # A leg that travels towards -x is mirrored, see `Geometry.travel`.
+    # A leg that travels towards -x is mirrored; see `Geometry.travel`.
     sine = profile.geometry.travel * np.sin(phi)
     cosine = np.cos(phi)
     f = by_name(profile(theta)[0])
@@ -97,7 +97,7 @@ def hoof_points(
 
 
 def hoof_height(profile: LegProfile, gaits: Floats, theta: Floats) -> Floats:
-    """Return the height of the lower hoof point relative to O [m], shape (n,), see `hoof_points`."""
+    """Return the height of the lower hoof point relative to O [m], shape (n,); see `hoof_points`."""
     return hoof_points(profile, gaits, theta)[1].min(0)
 
 
@@ -253,7 +253,7 @@ def _check_trunk(options: Mapping[str, float], trunk: Trunk) -> None:
             f"outside which an episode fails, got {height:g}"
         )
     if trunk.kind == "fixed" and speed != 0.0:
-        raise ParameterError(f"options['speed']: expected 0 of a fixed trunk, got {speed:g}")
+        raise ParameterError(f"options['speed']: expected 0 for a fixed trunk, got {speed:g}")
 
 
 def _gait(value: Any, gaits: Mapping[str, GaitParameters]) -> GaitParameters:

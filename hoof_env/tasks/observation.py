@@ -36,7 +36,7 @@ class ObservationInputs(NamedTuple):
     Attributes:
         trunk, leg, episode: memory of engine and episode, with fields as in `dynamics.layout.TrunkMemory`,
             `LegMemory` and `episode.Episode`; `block_at(leg, i)` is a horse's i-th leg.
-        task: record of the task's constants, see `episode.task_type`.
+        task: record of the task's constants; see `episode.task_type`.
         ground, ground_origin, ground_per_metre: terrain, the arguments of `surface` after x.
     """
 
@@ -207,7 +207,7 @@ _UNITS = ("rad/s", "rad", "rad", "rad")
 IN_RANGE = tuple(map(_in_range, range(4)))
 IN_RATE = tuple(map(_in_rate, range(4)))
 """Scales of the gait parameters and their rates. They use the limits and bounds of the leg; their texts show
-the limits and bounds of the published leg, see `envs.manual_bodies.LegTables.scaling`."""
+the limits and bounds of the published leg; see `envs.manual_bodies.LegTables.scaling`."""
 
 ENTRIES = (
     Entry("sin(crank angle)", "crank", "-", _sine, PLAIN),

@@ -68,15 +68,15 @@ def check_rates(s: Settings, speed_scale: float = 1.0) -> Floats:
 
 
 def reach_per_rate(filters: FilterSettings, dt: float, substep: float) -> float:
-    """Return the distance of a command from `heading_now` over the rate at which the gait changes if every
-    control step gives such a command [s].
+    """Return the distance of a command from `heading_now` per rate of the gait [s]: the rate at which the
+    gait changes if the command keeps that distance in every control step.
 
-    While a command stands, its distance d from the gait and the gait's rate v change in a substep h by
+    While a command is held, its distance d from the gait and the gait's rate v change in a substep h by
 
         d -= h v + h^2/2 a,    v += h a,    a = INNER gain (gain d - v),
 
-    which has two modes: v = m d, both becoming l times as much. A gait changes steadily by r where both modes
-    lose in a control step what a command that moves by r dt adds to them,
+    which has two modes, v = m d, in which a substep multiplies both by l. A gait changes at the steady rate r
+    if each mode loses in a control step what a command that moves by r dt adds to it,
 
         d_1 (1 - l_1^n) = r dt m_2 / (m_2 - m_1),    d_2 (1 - l_2^n) = r dt m_1 / (m_1 - m_2).
 
@@ -118,8 +118,8 @@ def action_towards(gaits: Floats, heading: Floats, reach: Floats) -> NDArray[np.
 
     Args:
         gaits: gait parameters [rad/s, rad, rad, rad], shape (..., 4).
-        heading: parameters towards which the gait is heading, see `heading_now`.
-        reach: distance of the command of an action of 1 from there, shape (4,), see `OneLeg.reach`.
+        heading: parameters towards which the gait is heading; see `heading_now`.
+        reach: distance of the command of an action of 1 from there, shape (4,); see `OneLeg.reach`.
     """
     gap = gaits - heading
     gap = np.where(np.abs(gap) < AT_REST, 0.0, gap)
@@ -169,10 +169,10 @@ POLICIES = ("zero", "idle", "random", "bang-bang", "drag", "airborne")
 
 
 class OneLeg:
-    """One leg under a trunk, see `body.Body`.
+    """One leg under a trunk; see `body.Body`.
 
     Attributes:
-        speed_scale: speed over that of the published leg, see `gait.speed_scale_of` [-].
+        speed_scale: speed relative to that of the published leg; see `gait.speed_scale_of` [-].
         low, high, middle, half: limits of the gait parameters, their middle and half range, shape (4,)
             [rad/s, rad, rad, rad].
         rates: rates of the parameters at an action of 1, shape (4,) [rad/s^2, rad/s, rad/s, rad/s].
@@ -224,7 +224,7 @@ class OneLeg:
         self.height = check_number("hip_height", height, low=MIN_HEIGHT * nominal, high=MAX_HEIGHT * nominal)
 
     def parts(self, s: ResolvedSettings) -> tuple[Trunk, Ground, tuple[Limb, ...]]:
-        """Make trunk, ground and legs from settings, see `Body.parts`."""
+        """Make trunk, ground and legs from settings; see `Body.parts`."""
         trunk = Trunk(
             kind=s.trunk,
             mass=s.trunk_mass,
@@ -288,7 +288,7 @@ class OneLeg:
         }
 
     def check_options(self, options: Any, trunk: Trunk, settings: Settings) -> dict[str, Any]:
-        """Check reset options, see `leg_starts.check_options`; a gait must be one that can be commanded."""
+        """Check reset options; see `leg_starts.check_options`; a gait must be one that can be commanded."""
         checked = check_options(options, self.gaits, trunk, settings)
         if checked.get("gait") is not None:
             self.check_reachable("options['gait']", checked["gait"].to_array())
@@ -297,7 +297,7 @@ class OneLeg:
     def draw(
         self, options: Mapping[str, Any], generators: Sequence[np.random.Generator], engine: TrunkEngine
     ) -> Start:
-        """Draw starts of episodes, see `leg_starts.draw_starts`."""
+        """Draw starts of episodes; see `leg_starts.draw_starts`."""
         return draw_starts(
             options, generators, engine.profiles[0], engine.trunk, self.gaits, engine.terrain, self.gait
         )
@@ -316,7 +316,7 @@ class OneLeg:
     def action_for(
         self, gaits: str | GaitParameters | Floats, engine: TrunkEngine, dt: float
     ) -> NDArray[np.float32]:
-        """Return the actions that move towards gaits, shape (num_envs, 4), see `LegBase.action_for`.
+        """Return the actions that move towards gaits, shape (num_envs, 4); see `LegBase.action_for`.
 
         Raises:
             ParameterError: an unknown name, another shape, or a gait that cannot be commanded.

@@ -52,7 +52,7 @@ class Task:
         body: function that makes the `body.Body` of settings.
         speeds: range of commanded speeds for a `target_speed` of None, of a horse of size 1; proportional to
             the root of the size [m/s].
-        contact_law: user's law instead of `normal_law`, see `dynamics.hoof.contact_force`.
+        contact_law: user's law instead of `normal_law`; see `dynamics.hoof.contact_force`.
         action_map: map from the task's actions to the body's.
         module: module that registers the task; worker processes import it.
     """
@@ -145,7 +145,7 @@ class Task:
                     check_unscheduled(name, settings)
         if self.contact_law and settings.solver == "paper":
             raise ParameterError(
-                f'{self.id}: solver: expected "exact" beside a contact law of one\'s own, got "paper"'
+                f'{self.id}: solver: expected "exact" with a contact law of one\'s own, got "paper"'
             )
         return settings
 
@@ -336,7 +336,7 @@ def _task_like(name: str, names: tuple[list[str], ...]) -> Task:
     task = task_of(name)
     if task.names() != names:
         raise ParameterError(
-            f"{name}: pickled with other terms, entries or law: {names}, here {task.names()}"
+            f"{name}: pickled with other terms, entries or law: {names}; here it has {task.names()}"
         )
     return task
 
@@ -449,6 +449,6 @@ def _add_to_gymnasium(task: Task) -> None:
         entry_point="hoof_env.envs.horse_leg:HorseLegEnv",
         vector_entry_point="hoof_env.envs.vector:HorseLegVectorEnv",
         kwargs={"task": task.key},
-        # As for the package's own ids, see `hoof_env/__init__.py`.
+        # As for the package's own ids; see `hoof_env/__init__.py`.
         disable_env_checker=True,
     )

@@ -33,7 +33,7 @@ class Outcome(NamedTuple):
         commanded_progress: forward travel at the commanded speed; infinite without one [m].
         sums: `dynamics.layout.StrideSums` of the step, `sums.slip` and so on; sums over all legs, of peaks
             the highest.
-        borne: impulse over the weight for which bearing is rewarded [s], see `BEARING`.
+        borne: impulse divided by the weight, for which bearing is rewarded [s]; see `BEARING`.
         failed: 1 where the episode ends by failure, else 0.
         episode_seconds: duration of a whole episode [s].
         weight: weight of trunk and legs [N].
@@ -247,7 +247,7 @@ TERMS = (
 
 
 def check_weights(changes: Mapping[str, float] | None, terms: tuple[Term, ...] = TERMS) -> dict[str, float]:
-    """Return the weights of all terms by name: `changes` over the terms' defaults.
+    """Return the weights of all terms by name: the terms' defaults with `changes`.
 
     Raises:
         ParameterError: an unknown term, or a weight out of range.

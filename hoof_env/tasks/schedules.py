@@ -68,7 +68,7 @@ def check_unscheduled(name: str, settings: Settings) -> None:
     """
     if isinstance(settings.schedule, Mapping) and name in settings.schedule:
         raise ParameterError(
-            f"{name}: expected none beside schedule[{name!r}], which sets it, got"
+            f"{name}: expected none together with schedule[{name!r}], which sets it, got"
             f" {getattr(settings, name)!r}; change the schedule, or give it up with schedule=None"
         )
 
@@ -117,7 +117,7 @@ def _range(name: str, title: str, value: Any, settings: Settings, body: Body) ->
         return number, number
     if name == SPEED:
         if settings.target_speed is None:
-            raise ParameterError(f"{title}: expected a target_speed beside it, got None")
+            raise ParameterError(f"{title}: expected a target_speed with it, got None")
         try:
             speeds = body.commanded_speeds(replace(settings, target_speed=value))
         except ParameterError as error:

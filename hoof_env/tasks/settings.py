@@ -36,7 +36,7 @@ class About(NamedTuple):
 
     Attributes:
         unit: unit of the value; "" if it has no unit.
-        text: meaning, for the manual; $names stand for numbers and choices, see `envs.manual.choices`.
+        text: meaning, for the manual; $names stand for numbers and choices; see `envs.manual.choices`.
         of_horse: meaning for a horse, if it differs.
         per_episode: True if `reset(options={"parameters": ...})` and `randomize` can change the setting.
         needs: another setting and its values with which this one has an effect; () for any range, `GIVEN` for
@@ -365,8 +365,8 @@ class Settings:
         About(
             "-",
             (
-                "of a horse: length over that of one of $horse_mass kg, $smallest_size to $largest_size; "
-                "None for 1"
+                "of a horse: length relative to that of one of $horse_mass kg, $smallest_size to "
+                "$largest_size; None for 1"
             ),
             needs=("trunk", ("free",)),
         ),

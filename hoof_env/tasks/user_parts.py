@@ -197,7 +197,7 @@ def constants_of(terms: Iterable[Any], entries: Iterable[Any]) -> dict[str, Cons
             known = found.setdefault(constant.name, constant)
             if known != constant:
                 raise ParameterError(
-                    f"{part.title}: constant {constant.name!r}: expected that of another term or entry,"
+                    f"{part.title}: constant {constant.name!r}: expected the one of another term or entry,"
                     f" {known}, got {constant}"
                 )
     return found

@@ -131,7 +131,9 @@ def test_a_contact_law_that_lanes_cannot_run_is_refused_with_its_operation():
 def test_no_start_where_the_links_have_no_place():
     rocker = LEG.replace(lengths={"CF": 0.8 * LEG.lengths["CF"]}, full_turn=False)
     e = TrunkEngine(Limb(rocker), Trunk("fixed"), num_envs=2)
-    with pytest.raises(ParameterError, match="crank_angle: the links of leg 0 have no place at some of"):
+    with pytest.raises(
+        ParameterError, match="crank_angle: the links of leg 0 cannot be assembled at some of"
+    ):
         e.reset(WALK, np.array([[0.0, np.pi]]))
 
 
@@ -215,7 +217,7 @@ def test_a_column_of_another_engine():
         (lambda s: s["layout"].update(substeps=4), "another engine; substeps: expected 1, got 4$"),
         (lambda s: s["layout"].pop("ground.friction"), "ground.friction: expected 0.4, got None"),
         (lambda s: s["layout"].update(more=1), "more: expected None, got 1"),
-        (lambda s: s.update(layout=7), "state: expected .*a layout by name is missing"),
+        (lambda s: s.update(layout=7), "state: expected .*a mapping as layout is missing"),
         (
             lambda s: s["limbs"].__setitem__((1, 0, 2), 1e10),
             r"crank angles: expected .*\+-1e\+09",
@@ -296,7 +298,7 @@ PARTS = [
     (lambda: animal(Limits()).command(np.zeros(6)), r"command: expected shape \(4,\), .*got \(6,\)"),
     (
         lambda: animal(Limits(), contact_law=lambda d, v, s, ground: d),
-        r"contact_law: expected none beside springs",
+        r"contact_law: expected none together with springs",
     ),
     *(
         (of(Trunk, settings), words)

@@ -210,7 +210,7 @@ def test_a_sole_without_mass_gets_the_step_that_its_damping_allows(ratio, stiffn
 def test_a_sole_with_too_few_substeps_is_named():
     _, engine = dropped(0.02, 1e7, 0.5, 0.1)
     assert engine.step_limits["hoof"] == min(engine.step_limits.values())
-    with pytest.warns(StepWarning, match="are too long for the damping of the hoofs' springs against"):
+    with pytest.warns(StepWarning, match="are too long for the damping of the hooves' springs against"):
         TrunkEngine(engine.limbs, engine.trunk, engine.ground, substeps=1)
 
 

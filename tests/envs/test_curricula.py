@@ -121,7 +121,7 @@ def test_a_callback_of_stable_baselines_promotes_rows():
     assert [one.target_speed for one in envs.get_attr("settings", [0, 1])] == [(1.0, 3.5), [3.0, 3.25]]
     envs.env_method("change_settings", envs=[2], strength=0.5)
     assert [one.strength for one in envs.get_attr("settings")] == [1.0, 1.0, 0.5, 1.0]
-    with pytest.raises(ParameterError, match=r"envs: expected none beside indices \[1\], got \[2\]"):
+    with pytest.raises(ParameterError, match=r"envs: expected none together with indices \[1\], got \[2\]"):
         envs.env_method("change_settings", indices=[1], envs=[2], strength=0.5)
 
 
@@ -233,7 +233,7 @@ def test_options_go_before_a_schedule():
 )
 def test_a_setting_that_a_schedule_sets_is_refused(name, value, ramp):
     env = gym.make(SPEED, schedule={name: ramp}).unwrapped
-    words = rf"{name}: expected none beside schedule\['{name}'\], which sets it, got .*schedule=None"
+    words = rf"{name}: expected none together with schedule\['{name}'\], which sets it, got .*schedule=None"
     with pytest.raises(ParameterError, match=words):
         env.change_settings(**{name: value})
     if name != "target_speed":  # without which there is no commanded speed

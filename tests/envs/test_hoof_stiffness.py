@@ -72,7 +72,7 @@ def test_the_default_damping_is_that_of_the_settings_whatever_is_drawn():
 
 def test_a_law_of_ones_own_has_none():
     hoof_env.register("test/OwnLaw-v0", contact_law=lambda d, rate, slowness, ground: 1e4 * d)
-    with pytest.raises(ParameterError, match="contact_law: expected none beside springs"):
+    with pytest.raises(ParameterError, match="contact_law: expected none together with springs"):
         gym.make("test/OwnLaw-v0", **SOFT)
 
 

@@ -164,7 +164,7 @@ def test_a_bad_state_of_the_papers_solver_is_refused_and_changes_nothing():
     short = {**engine, "legs": [{**engine["legs"][0], "qd": np.zeros(41)}]}
     without = {name: values for name, values in engine.items() if name != "accounts"}
     for bad in (None, 5, {}, without, {**engine, "legs": []}, infinite, short):
-        with pytest.raises(ParameterError, match="state: expected what get_state gives of 1 legs"):
+        with pytest.raises(ParameterError, match="state: expected what get_state returns for 1 legs"):
             env.set_state({**then, "engine": bad})
         assert pickle.dumps(env.get_state()) == here
 

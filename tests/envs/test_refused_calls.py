@@ -205,7 +205,7 @@ def foreign(kind, **kwargs):
 
 
 STATES = {
-    "nothing": (lambda state: None, "state: expected what get_state gives, but id, settings.* is missing"),
+    "nothing": (lambda state: None, "state: expected what get_state returns, but id, settings.* is missing"),
     "a part": (lambda state: without(state, "episode"), "but episode is missing"),
     "no form": (
         lambda state: without(state, "actions"), "actions are rates, got None",
@@ -215,7 +215,10 @@ STATES = {
     "a version": (
         lambda state: {**state, "id": "hoof_env/HorseLeg-v1"}, "got .*hoof_env/HorseLeg-v1",
     ),
-    "no settings": (lambda state: {**state, "settings": 5}, "of other settings; preset: 'identified' here"),
+    "no settings": (
+        lambda state: {**state, "settings": 5},
+        "made with other settings; preset: 'identified' here",
+    ),
     "no engine": (lambda state: {**state, "engine": {}}, "state: .* is missing"),
     "not a number": (
         lambda state: {**state, "engine": {**state["engine"], "trunk": state["engine"]["trunk"] * NAN}},
@@ -276,7 +279,7 @@ def test_states_of_other_numbers_of_environments():
     two = gym.make_vec(LEG, num_envs=2).unwrapped
     two.reset(seed=0)
     cases = [
-        ("vector", two.get_state(), "one of 3 environments.*of 2"),
+        ("vector", two.get_state(), "a state of 3 environments.*of 2"),
         ("single", vector, "state"),
     ]
     message = r"state\['ended'\]: expected a bool array of shape \(3,\), got"
@@ -349,7 +352,7 @@ NO_GAITS = (
     "trot", None, 3, [1.0, 2.0], [1.0, 2.0, 3.0, NAN], HarmonicGait(5.0, 0.4, 0.1, -0.2), HARMONIC,
     {"crank_speed": 1.0},
 )  # fmt: skip
-OF_ONE = "state: expected what get_state gives of one"
+OF_ONE = "state: expected what get_state returns for one"
 BESIDE = r"options\['parameters'\]: 'trunk_damping': expected trunk='suspended'"
 CALLS = [
     # gaits to go to
@@ -429,7 +432,7 @@ CALLS = [
         ParameterError,
         "state: expected .*single environment, got .*3 environments",
     ),
-    ("single", state_with(id="own/Everything-v0"), ParameterError, f"one of {LEG}, got .*own"),
+    ("single", state_with(id="own/Everything-v0"), ParameterError, f"a state of {LEG}, got .*own"),
     # attributes, methods, records and generators of rows
     *(
         ("vector", asks("set_attr", name, 5), FixedSettingError, f"{name}: expected no assignment.*m.make")

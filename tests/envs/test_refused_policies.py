@@ -68,7 +68,7 @@ def test_calls(call, words):
 
 
 GAIT = {"env_id": LEG, "form": "gait", "parameters": CLOCKED}
-NO_GAIT = r"gait\.json: expected the JSON .*agents\.open_loop"
+NO_GAIT = r"gait\.json: expected a JSON .*agents\.open_loop"
 OLD = r"gait\.json: expected form 'gait'.*got .*agents"
 FILES = [
     ({**GAIT, "form": None}, OLD),

@@ -261,7 +261,7 @@ DELAYS = [
             ({"observation_delay": -1}, "observation_delay: expected"),
             (
                 {"observation_delay": 0.51},
-                "observation_delay: expected whole substeps, .*control step has 20",
+                "observation_delay: expected a whole number of substeps, .*control step has 20",
             ),
             ({"action_delay": (0.5, 1)}, "action_delay: expected .*range"),
             ({"action_delay": (2, 1)}, r"action_delay\[1\]: expected"),
@@ -327,7 +327,7 @@ SCHEDULES = [
     (
         LEG,
         {"schedule": {"friction": [0.1, 0.2, 5]}, "randomize": {"friction": (0.2, 0.3)}},
-        r"schedule\['friction'\]: expected none beside randomize",
+        r"schedule\['friction'\]: expected none together with randomize",
     ),
     (
         RAIL,

@@ -152,7 +152,7 @@ VALUES = [
                 {"lengths": {name: 1.0 for name in KLANN.lengths if name != "EG"}},
                 r"lengths: expected exactly OP, BH.*missing EG",
             ),
-            ({"pivot": (0.0, 1.0)}, "pivot: expected the places of B, D by name, got"),
+            ({"pivot": (0.0, 1.0)}, "pivot: expected a mapping of B, D to their places, got"),
             ({"heel": "E"}, "toe and heel: expected G and None, got 'G' and 'E'"),
             ({"masses": (1, 1, 1, 0, 1, 1, 1, 1, 1)}, r"masses\[3\]: expected"),
         )
@@ -169,7 +169,7 @@ VALUES = [
         FOUR_BAR_LEG,
         {"mechanism": with_a_stranger()},
         GeometryError,
-        r"mechanism.bodies\[2\]: 'D' is no point of body 'BC', on which",
+        r"mechanism.bodies\[2\]: 'D' is not a point of body 'BC', on which",
     ),
     (
         IDENTIFIED.to_dict(),
@@ -329,7 +329,7 @@ CALLS = [
     (
         lambda _: LegProfile(LEG.replace(lengths={"GJ": 0.8 * LEG.lengths["GJ"]}, full_turn=False)),
         GeometryError,
-        "a place at some crank angle",
+        "can be assembled at some crank angle",
     ),
     (
         lambda _: ConstrainedLeg(ROCKER, Ground()),
@@ -357,9 +357,9 @@ CALLS = [
                 r"gaits\['trot'\]\['crank_speed'\]: expected .*fast",
             ),
             ({"gaits": ["walk"]}, "gaits: expected a mapping"),
-            ({"gaits": {5: {"crank_speed": 1.0}}}, "gaits: expected names .*texts, got 5"),
-            ({"gaits": {"trot": {5: 1.0}}}, r"gaits\['trot'\]: expected names .*texts, got 5"),
-            ({"gaits": {"trot": {}}}, r"gaits\['trot'\]: expected .*name, got {}"),
+            ({"gaits": {5: {"crank_speed": 1.0}}}, "gaits: expected names .*strings, got 5"),
+            ({"gaits": {"trot": {5: 1.0}}}, r"gaits\['trot'\]: expected names .*strings, got 5"),
+            ({"gaits": {"trot": {}}}, r"gaits\['trot'\]: expected .*names to numbers, got {}"),
             ({"ground": 1.4}, "ground: expected .*stiffness, exponent, got 1.4"),
             *(
                 (

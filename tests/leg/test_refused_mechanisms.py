@@ -55,12 +55,12 @@ WRONG = {
     ),
     "ends without a length": (
         changed(bodies=[*JANSEN["bodies"], {"name": "BE", "tail": "B", "head": "E"}]),
-        r"mechanism.bodies\[11\]: 'BE' needs ends whose distance is a length of the list \(B-C, .*'B'",
+        r"mechanism.bodies\[11\]: 'BE' needs two ends whose distance is a length \(B-C, .*'B'",
     ),
     **{
         f"a name with {letter!r}": (
             changed(feet=[f"a{letter}b"]),
-            r"mechanism.feet\[0\]: expected a name that prints, without comma, semicolon and quotes, got",
+            r"mechanism.feet\[0\]: expected a printable name without commas, semicolons and quotes, got",
         )
         for letter in (",", ";", '"', "\t", "\n", "\x00")
     },
@@ -91,9 +91,9 @@ WRONG = {
     ),
     "a foot that is no point": (
         changed(feet=["X"]),
-        "mechanism.feet: 'X' .*moving point .*body; expected of P, B, F, D, E, G",
+        "mechanism.feet: 'X' .*moving point .*body; expected some of P, B, F, D, E, G",
     ),
-    "a fixed foot": (changed(feet=["C"]), "mechanism.feet: 'C' is no moving point of a body"),
+    "a fixed foot": (changed(feet=["C"]), "mechanism.feet: 'C' is not a moving point of a body"),
     "three feet": (changed(feet=["G", "E", "F"]), "mechanism.feet: expected one point .*got "),
     "a driver that is no crank": (
         changed(crank={"point": "F", "length": "OF"}),
@@ -120,7 +120,7 @@ WRONG = {
     ),
     "a weld of strangers": (
         changed(welds=[["EG", "CB"]]),
-        "mechanism.welds: 'EG' and 'CB' need a joint that they share",
+        "mechanism.welds: 'EG' and 'CB' need a joint between them",
     ),
     "a coordinate": (
         {**copy.deepcopy(EVERYTHING), "points": [*EVERYTHING["points"][:4], {"point": "G", "body": "ankle"}]},

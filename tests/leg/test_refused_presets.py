@@ -91,7 +91,7 @@ PRESETS = [
     ),
     (
         lambda: load_gait("walk", {**CONTENT, "gaits": {5: CONTENT["gaits"]["walk"]}}),
-        "gaits: expected names .*texts",
+        "gaits: expected names .*strings",
     ),
     (
         lambda: load_geometry({**CONTENT, "geometry": {**BARE, "colour": "bay"}}),

@@ -83,7 +83,7 @@ def test_an_array_that_it_would_misread_is_refused(array):
 @pytest.mark.parametrize(
     ("wrong", "words"),
     [
-        (lambda x: 1.0 if x > 0.0 else 2.0, "`if`, `while`, `and`.*a truth.*np.where"),
+        (lambda x: 1.0 if x > 0.0 else 2.0, "`if`, `while`, `and`.*a boolean.*np.where"),
         (lambda x: x > 0.0 and 1.0, "`if`, `while`, `and`"),
         (lambda x: max(x, 1.0), "max.*np.minimum and np.maximum"),
         (lambda x: float(x), "float.*write NumPy's function"),
@@ -91,13 +91,13 @@ def test_an_array_that_it_would_misread_is_refused(array):
         (lambda x: [1.0, 2.0][x], "float.., int"),
         (lambda x: sum(x), "a loop over a number"),
         (lambda x: len(x), "len.. of a number"),
-        (lambda x: np.array(x), "an array of NumPy with a number"),
+        (lambda x: np.array(x), "a NumPy array with a number"),
         (lambda x: np.sort(x), "np.sort of a number: kernels have np.absolute"),
         (lambda x: np.add.reduce(x), "np.add.reduce of a number: kernels have"),
         (lambda x: np.add(x, 1.0, where=True), "np.add with where of a number"),
         (lambda x: where(x, 1.0, 2.0), "where.. of a number: expected a condition"),
         (lambda x: where(x > 0.0, None, 2.0), "where.. of nothing: expected two numbers"),
-        (lambda x: x + np.arange(3.0), "an array of NumPy, of shape .3,., in an operation"),
+        (lambda x: x + np.arange(3.0), "a NumPy array, of shape .3,., in an operation"),
     ],
 )
 def test_what_a_kernel_cannot_do_is_refused_in_words(wrong, words):

@@ -132,9 +132,9 @@ def test_arrays_live_as_long_as_what_holds_them():
 def test_addresses_are_not_copied_to_where_they_do_not_hold():
     held = ARRAYS.hold(made())
     for copied in (pickle.dumps, copy.copy, copy.deepcopy):
-        with pytest.raises(TypeError, match="addresses hold in one process only"):
+        with pytest.raises(TypeError, match="addresses are valid in one process only"):
             copied(held)
-        with pytest.raises(TypeError, match="addresses hold in one process only"):
+        with pytest.raises(TypeError, match="addresses are valid in one process only"):
             copied({"held": [held]} if copied is not copy.copy else held)
 
 

@@ -194,7 +194,7 @@ def test_a_processor_that_llvm_does_not_know_is_refused(place):
     said = process.communicate(timeout=120)[1].strip().splitlines()
     assert process.returncode == 1
     assert said[-1].endswith(
-        "expected a processor in LLVM's words, such as haswell or x86-64-v3, got 'Haswell'"
+        "expected a processor by LLVM's name, such as haswell or x86-64-v3, got 'Haswell'"
     )
     assert not files(place)
 
