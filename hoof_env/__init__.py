@@ -27,6 +27,7 @@ if TYPE_CHECKING:
     from hoof_env.envs.horse_leg import RandomizeParameters as RandomizeParameters
     from hoof_env.envs.policies import make_policy as make_policy
     from hoof_env.envs.sb3 import Sb3VecEnv as Sb3VecEnv
+    from hoof_env.envs.separate_cost import SeparateCost as SeparateCost
     from hoof_env.envs.vector import HorseLegVectorEnv as HorseLegVectorEnv
     from hoof_env.errors import DataFileError as DataFileError
     from hoof_env.errors import GeometryError as GeometryError
@@ -62,6 +63,7 @@ _MODULES = {
     "envs.horse_leg": "HorseLegEnv HorseLegMOEnv RandomizeParameters",
     "tasks.observation": "Entry Scale",
     "envs.policies": "make_policy",
+    "envs.separate_cost": "SeparateCost",
     "policies.find": "load_policy",
     "policies.onnx_file": "stamp_onnx",
     "tasks.horse_gaits": "HorseGait",

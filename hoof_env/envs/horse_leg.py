@@ -69,6 +69,7 @@ class HorseLegEnv(LegBase, gym.Env[NDArray[np.float32], NDArray[np.float32]]):
     def _attach(self) -> None:
         """Collect what a step reads, writes or calls: looking it up costs as much as a substep."""
         batch, rows = self.batch, self.batch.rows
+        self._costs = batch.plan.costs.keys
         weighted = [(k, term) for k, term in enumerate(self.task.terms) if batch.plan.weights[term.name]]
         # Terms that can differ from 0 before the end of an episode; infos start with 0 for the rest.
         paid = [(term.key, k) for k, term in weighted if term.compute is not failure]
@@ -164,6 +165,8 @@ class HorseLegEnv(LegBase, gym.Env[NDArray[np.float32], NDArray[np.float32]]):
         # not through the batch, unless kernels are looked into: a call costs as much as a substep
         happened = self.batch.calls.step(held) if BLOCKS else kernel(held)
         measured = measure()  # before a push that is due, which changes speeds at once
+        if self._costs:
+            self.batch.plan.costs.add(self.batch.rows, self.batch.engine)
         ended = happened != 0 and self._follow(happened)
         info = self._begun[0]()  # has all keys already, in the order of the reset's info
         info["gait"] = self._begun[1]()
@@ -172,6 +175,8 @@ class HorseLegEnv(LegBase, gym.Env[NDArray[np.float32], NDArray[np.float32]]):
             info["parameters"] = info["parameters"].copy()  # callers may change their info
         for key, k in paid:
             info[key] = terms[k]
+        if self._costs:
+            info |= self._cost_info()
         failed = truncated = False
         if ended:
             info.update(zip(self.batch.terms, terms, strict=True))
@@ -208,8 +213,15 @@ class HorseLegEnv(LegBase, gym.Env[NDArray[np.float32], NDArray[np.float32]]):
         if self.batch.plan.commands.speeds:
             info["target_speed"] = self.batch.rows.named.target[0]
         info |= {"measured": None, **dict.fromkeys(self.batch.terms, np.float64(0.0))}
+        if self._costs:
+            info |= dict.fromkeys(("cost", *self._costs), np.float64(0.0))
         self._began_with = self._start_and_target()
         self._begun = (info.copy, gait.copy)
+
+    def _cost_info(self) -> dict[str, Any]:
+        """Return the costs of the last step by their keys in infos."""
+        costs = self.batch.rows.costs[:, 0].copy()
+        return {"cost": costs.sum(), **dict(zip(self._costs, costs, strict=True))}
 
     def _start_and_target(self) -> tuple[bytes, float]:
         """Return the part of infos that no step measures, to notice when it changes."""

@@ -385,6 +385,8 @@ class EpisodeBatch:
             happened = int(np.bitwise_or.reduce(codes))
         else:
             happened = self._step()
+        if self.plan.costs.limits:
+            self.plan.costs.add(self.rows, self.engine, idle)
         # A step between two episodes does not count.
         if idle is not None:
             self.rows.named.steps[: self.num_envs][idle] -= 1.0

@@ -14,6 +14,7 @@ from hoof_env.dynamics.engine import TrunkEngine
 from hoof_env.dynamics.parts import MAX_COEFFICIENT, Mechanics
 from hoof_env.dynamics.stepping import SCHEMES
 from hoof_env.episodes.commands import Commands
+from hoof_env.episodes.costs import Costs
 from hoof_env.episodes.delays import Delays
 from hoof_env.episodes.noise import Noise
 from hoof_env.episodes.observed import Observed
@@ -67,7 +68,7 @@ class Plan:
         dt: control step [s].
         episode_seconds: time limit of an episode [s], which the charge for a failure counts to.
         steps_per_episode: control steps of an episode.
-        observed, delays, commands, strength, noise, pushes, randomization: features.
+        observed, delays, commands, strength, noise, pushes, costs, randomization: features.
         mechanics: engine's parts.
         record: constants of the task that the kernels read, shape (1,); see `episode.task_type`.
     """
@@ -89,6 +90,7 @@ class Plan:
     strength: Strength
     noise: Noise
     pushes: Pushes
+    costs: Costs
     randomization: Randomization
     mechanics: Mechanics
     record: NDArray[Any]
@@ -97,7 +99,7 @@ class Plan:
     def features(self) -> tuple[Feature, ...]:
         """Features with a start of their own, in the order in which they draw. That order is part of what a
         seed means: parameters and the body's start come before."""
-        return self.commands, self.strength, self.noise, self.delays, self.pushes
+        return self.commands, self.strength, self.noise, self.delays, self.pushes, self.costs
 
     @property
     def action_names(self) -> tuple[str, ...]:
@@ -159,6 +161,9 @@ class Plan:
             steps_before=np.zeros(num_envs),
             has_overrides=np.zeros(num_envs, bool),
             pushes=pushes,
+            costs=np.zeros((len(self.costs.limits), num_envs)),
+            cost_sums=np.zeros((len(self.costs.limits), num_envs)),
+            stance_rises=np.zeros((self.legs if self.costs.rises else 0, num_envs)),
         )
 
     def __deepcopy__(self, memo: dict[int, Any]) -> Plan:
@@ -208,6 +213,7 @@ def make_plan(
     strength = Strength.of(s, schedule)
     pushes = Pushes.of(s, dt, steps)
     delays = Delays.of(s, substeps, steps)
+    costs = Costs.of(s)
     observed = Observed.of(s, task, groups)
     randomization = Randomization(s, body, terrain, given, schedule)
     engine = _make_engine(task, s, body, terrain, randomization.substeps(), num_envs, num_threads)
@@ -229,6 +235,7 @@ def make_plan(
         strength=strength,
         noise=noise,
         pushes=pushes,
+        costs=costs,
         randomization=randomization,
         mechanics=engine.mechanics,
         record=np.zeros(1, _record_type(task, body, engine)),

@@ -56,6 +56,9 @@ class Rows:
         has_overrides: True where the engine's parameters may differ from the settings, shape (num_envs,).
         pushes: tuple of the pushes that were given for the present episode, in the order of their times, as
             objects, shape (num_envs,).
+        costs, cost_sums: costs of the last step and of the episode so far, shape (costs, num_envs).
+        stance_rises: steepest rise of the normal force in the present stance of each leg [N/s], shape (legs,
+            num_envs); no rows without a cost of them.
         named: views of `episode` by name.
     """
 
@@ -73,6 +76,9 @@ class Rows:
     steps_before: Annotated[Floats, Declared(0, is_saved=True)]
     has_overrides: Annotated[NDArray[np.bool_], Declared(0)]
     pushes: Annotated[NDArray[Any], Declared(0)]
+    costs: Annotated[Floats, Declared(-1, is_saved=True)]
+    cost_sums: Annotated[Floats, Declared(-1, is_saved=True)]
+    stance_rises: Annotated[Floats, Declared(-1, is_saved=True)]
     named: Any = field(init=False, repr=False)
 
     def __post_init__(self) -> None:

@@ -19,6 +19,9 @@ from hoof_env.tasks.settings import Settings, to_json
 
 Floats = NDArray[np.float64]
 
+COSTS = ("costs", "cost_sums", "stance_rises")
+"""Arrays of `Rows` about costs."""
+
 UNBOUNDED = frozenset({"target", "switch", "next_target", "commanded", "push_at", "own", "terms"})
 """Fields of `episode.Episode` that are infinite where there is no command and no push, and rows of users'
 terms, which may have any value."""
@@ -148,6 +151,7 @@ def _set_state(batch: EpisodeBatch, state: Mapping[str, Any]) -> None:
             f" {state['start_values']!r:.60}"
         )
     pushes = _read_pushes(batch, state.get("pushes"))
+    costs = {name: _read_costs(batch, name, state.get(name)) for name in COSTS if name in rows.saved()}
     seen = [name for name in rows.saved() if name in ("frames", "past_actions")]
     if state.get("observations") is not None:
         seen.append("observations")
@@ -160,6 +164,8 @@ def _set_state(batch: EpisodeBatch, state: Mapping[str, Any]) -> None:
     rows.put("start_values", start_values)
     rows.put("steps_before", steps_before)
     rows.pushes[:] = pushes
+    for name in costs:
+        rows.put(name, costs[name])
     # The state's engine may have drawn parameters, which the next reset must replace.
     rows.put("has_overrides", True)
     batch.is_push_unseen = "observations" in state
@@ -284,6 +290,22 @@ def _read_pushes(batch: EpisodeBatch, given: Any) -> NDArray[Any]:
         )
     found[:] = pushes
     return found
+
+
+def _read_costs(batch: EpisodeBatch, name: str, given: Any) -> Floats:
+    """Return costs in a state.
+
+    Raises:
+        ParameterError: not numbers from 0, or another shape.
+    """
+    expected = batch.rows.get(name).shape
+    try:
+        values = np.asarray(given, np.float64)
+    except (TypeError, ValueError):
+        values = np.array(np.nan)
+    if values.shape != expected or not ((values >= 0.0) & np.isfinite(values)).all():
+        raise ParameterError(f"state[{name!r}]: expected numbers from 0, shape {expected}")
+    return values
 
 
 def _read_seen(batch: EpisodeBatch, name: str, given: Any) -> NDArray[np.float32]:

@@ -80,6 +80,9 @@ def infos_of(batch: EpisodeBatch, ended: bool = True) -> dict[str, NDArray[Any]]
         infos["target_speed"] = batch.rows.named.target[:n].copy()
     infos["measured"] = measured.T.view(batch.measurements.kind)
     infos.update(zip(batch.terms, batch.rows.named.terms[:, :n].copy(), strict=True))
+    if batch.plan.costs.limits:
+        infos["cost"] = batch.rows.costs.sum(axis=0)
+        infos.update(zip(batch.plan.costs.keys, batch.rows.costs.copy(), strict=True))
     return infos
 
 
@@ -122,6 +125,7 @@ def summaries_of(batch: EpisodeBatch, envs: Sequence[int] | NDArray[np.int64]) -
         "support_share": 1 - mean / weight,
         "failed": (batch.rows.named.ended[envs] == FAILED).astype(np.float64),
         "success": is_success(batch, envs).astype(np.float64),
+        **dict(zip(batch.plan.costs.keys, batch.rows.cost_sums[:, envs], strict=True)),
     }
 
 

@@ -454,6 +454,18 @@ class Settings:
         float, About("-", "factor of noise, bias and pushes, 0 to 10; a reset option, too")
     ] = 1.0
 
+    # Costs
+    cost: Annotated[
+        Mapping[str, float] | None,
+        About(
+            "N, N/s",
+            (
+                "limits of the costs `peak`, `excess`, `indicator` [N] and `loading` [N/s] in infos, which "
+                "are no part of the reward"
+            ),
+        ),
+    ] = None
+
     # Delays, and the observed past
     observation_delay: Annotated[
         Range,
