@@ -30,8 +30,11 @@ from hoof_env.envs.shipped import shipped_returns
 from hoof_env.evaluation.episodes import FINAL_SEEDS, score_vector
 from hoof_env.evaluation.statistics import iqm
 
-CUT = (20, 60, 310, 270)
+CUT = (27, 80, 413, 360)
 """Part of a film's frame that shows the animal: left, top, right, bottom [pixels]."""
+
+SMALL = (290, 210)
+"""Size of a still [pixels]."""
 
 PLACE = 2 / 3
 """Place of the frame in the film, over its length: agents have found their gait there."""
@@ -51,7 +54,7 @@ def write_still(folder: Path) -> None:
 
     with Image.open(folder / FILM) as film:
         film.seek(int(PLACE * getattr(film, "n_frames", 1)))
-        still = film.convert("RGB").crop(CUT)
+        still = film.convert("RGB").crop(CUT).resize(SMALL, Image.Resampling.LANCZOS)
     still.save(folder / STILL, "WEBP", quality=80, method=6)
 
 

@@ -197,7 +197,7 @@ def film(folder: Path, env_id: str) -> None:
     policy = str(folder / FILE)
     seconds = FILM_SECONDS
     while not path.is_file() or path.stat().st_size > FILM_LIMIT:
-        render_episode(path, policy, env_id, seed=SCORE_SEEDS[0], seconds=seconds, fps=20, size=(480, 270))
+        render_episode(path, policy, env_id, seed=SCORE_SEEDS[0], seconds=seconds, fps=20, size=(640, 360))
         # The size is known only after the film is made
         seconds *= 0.75
 

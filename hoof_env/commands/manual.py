@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 import shutil
+import textwrap
 
 from hoof_env._output import terminal_table
 from hoof_env.commands.said import say
@@ -15,7 +16,7 @@ def manual(env_id: str = "hoof_env/HorseLeg-v0") -> None:
     Args:
         env_id: id of the environment; one of your own may be module:id.
     """
-    from hoof_env.envs.manual import tables_of, task_of_id
+    from hoof_env.envs.manual import leg_of, tables_of, task_of_id
     from hoof_env.envs.shipped import summaries
 
     tables = tables_of(env_id)
@@ -23,6 +24,7 @@ def manual(env_id: str = "hoof_env/HorseLeg-v0") -> None:
     width = shutil.get_terminal_size((110, 24)).columns
     module = f" (import {task.module})" if task.module else ""
     say(f"{env_id.rpartition(':')[2]}{module}: {summaries().get(env_id, task.summary)}")
+    say("\n".join(textwrap.wrap(f"Leg: {leg_of(task)}", width)))
     for title, table in tables.items():
         say(f"\n{title}\n")
         say(terminal_table(table.head, [[without_links(cell) for cell in row] for row in table.rows], width))

@@ -6,6 +6,7 @@
 from __future__ import annotations
 
 import json
+import re
 from collections.abc import Mapping
 from itertools import groupby
 from string import Template
@@ -17,7 +18,8 @@ from hoof_env.envs.manual_bodies import tables_of_body
 from hoof_env.errors import check_choice
 from hoof_env.gait import FilterSettings
 from hoof_env.ground.laws import FRICTION_LAWS, NORMAL_LAWS
-from hoof_env.leg.presets import preset_names, presets_of_paper
+from hoof_env.leg.geometry import load_geometry
+from hoof_env.leg.presets import preset_label, preset_names, presets_of_paper
 from hoof_env.paper_solver.integrators import INTEGRATORS
 from hoof_env.render.size import USUAL_SIZE
 from hoof_env.tasks import horse, leg_starts, observation
@@ -90,9 +92,19 @@ def tables_of(id: str) -> dict[str, Table]:
     return {title: table for title, table in tables.items() if table.rows}
 
 
+def leg_of(task: Task) -> str:
+    """Return a line about the leg of a task: its preset, its hips, and where its lengths come from."""
+    settings = task.settings({})
+    geometry = task.body(settings).geometry
+    source = load_geometry(settings.preset).provenance
+    first = re.split(r"(?<=\w{3}\.) (?=[A-Z])", source, maxsplit=1)[0]
+    return f"{preset_label(settings.preset)}, hips {geometry.hip_height:.5g} m high. {first}"
+
+
 def arguments(task: Task) -> Table:
     """Return the settings of a task that its body takes, and the arguments of pictures."""
     settings = task.settings({})
+    body = task.body(settings)
     defaults = {name: literal(value) for name, value in to_json(settings).items()}
     words = {name: (about.unit, about.text, about.of_horse) for name, about in ABOUT.items()}
     filled = {
@@ -100,7 +112,7 @@ def arguments(task: Task) -> Table:
     }
     rows = [
         (name, defaults[name], *cells)
-        for name, cells in tables_of_body(task.body(settings)).settings(settings, filled).items()
+        for name, cells in tables_of_body(body).settings(settings, filled, body).items()
     ]
     return Table(("Name", "Default", "Unit", "Meaning"), [*rows, *PICTURES])
 

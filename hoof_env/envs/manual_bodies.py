@@ -34,7 +34,7 @@ class BodyTables(ABC):
         """Return the head and rows of the table of actions."""
 
     @abstractmethod
-    def settings(self, s: Settings, words: Words) -> dict[str, tuple[str, str]]:
+    def settings(self, s: Settings, words: Words, body: Any) -> dict[str, tuple[str, str]]:
         """Return the unit and meaning of the settings that the body takes, by name."""
 
     def scaling(self, scale: observation.Scale, body: Any) -> str:
@@ -67,9 +67,14 @@ class LegTables(BodyTables):
             rows.append((str(k), value.name, *ends, rate.unit, limits))
         return ("Num", "Rate of", "At -1", "At +1", "Unit", "Limits of the value"), rows
 
-    def settings(self, s: Settings, words: Words) -> dict[str, tuple[str, str]]:
-        """Return the unit and meaning of all settings, by name."""
-        return {name: (unit, text) for name, (unit, text, _) in words.items()}
+    def settings(self, s: Settings, words: Words, body: OneLeg) -> dict[str, tuple[str, str]]:
+        """Return the unit and meaning of all settings, by name; of rates that depend on the leg, also its own."""
+        found = {name: (unit, text) for name, (unit, text, _) in words.items()}
+        if body.speed_scale != 1.0:
+            for name, rate in zip(("crank_rate", "swing_rate"), body.rates, strict=False):
+                unit, text = found[name]
+                found[name] = unit, f"{text}: {rate:.4g} of this leg"
+        return found
 
     def scaling(self, scale: observation.Scale, body: OneLeg) -> str:
         """Return the formula of a scale, with limits and bounds of the leg."""
@@ -100,7 +105,7 @@ class HorseTables(BodyTables):
         """Return the name of an observation without that of its leg."""
         return re.sub(rf"({'|'.join(LEGS).replace('_', ' ')})[:,] ", "", name)
 
-    def settings(self, s: Settings, words: Words) -> dict[str, tuple[str, str]]:
+    def settings(self, s: Settings, words: Words, body: Horse) -> dict[str, tuple[str, str]]:
         """Return the unit and meaning of the settings that a horse takes, by name."""
         # Some settings need a rigid hoof, or pushes.
         contexts = (s, replace(s, hoof_stiffness=None), replace(s, push_impulse=1.0))

@@ -25,6 +25,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from functools import cached_property
+from itertools import pairwise
 from typing import Any
 
 FRAME = -1
@@ -251,6 +252,17 @@ class Mechanism:
         corners = [dyad for dyad in self.dyads if self.is_corner(dyad)]
         triangles = [(dyad.first, dyad.second, dyad.point) for dyad in corners]
         return (*triangles, *(body.all_points for body in self.bodies if body.points))
+
+    @cached_property
+    def edges(self) -> tuple[tuple[str, str], ...]:
+        """Edges of bodies with further points than tail and head, whose plate may be a straight rod."""
+        return tuple(
+            pair
+            for body in self.bodies
+            if body.points
+            for pair in pairwise((*body.all_points, body.all_points[0]))
+            if {*pair} != {body.tail, body.head}
+        )
 
     @cached_property
     def sole(self) -> tuple[str, ...]:

@@ -12,6 +12,7 @@ import pygame
 from hoof_env.render.colours import Colour
 
 FINE = 2  # resolution of smooth painting over that of the picture
+LEAST_LETTERS = 10  # least size of letters, whatever the size of the picture [pixels]
 
 Position = tuple[float, float]
 
@@ -35,7 +36,8 @@ class Brush:
     """Lettering and smooth shapes for a picture of `size` pixels.
 
     Attributes:
-        unit: 1 for a picture of 960 x 540 pixels; line widths and letters grow with it.
+        unit: 1 for a picture of 960 x 540 pixels; line widths and letters grow with it, and letters shrink
+            to `LEAST_LETTERS`.
     """
 
     def __init__(self, size: tuple[int, int]) -> None:
@@ -51,8 +53,16 @@ class Brush:
         place = image.get_rect(**{side: (round(at[0]), round(at[1]))})
         canvas.blit(image, place, special_flags=pygame.BLEND_PREMULTIPLIED)
 
+    def width(self, text: str, size: int) -> float:
+        """Return the width of a text [pixels]."""
+        return float(self._font(size).size(text)[0] / FINE)
+
+    def _font(self, size: int) -> Any:
+        """Return the font of letters of a size, at `FINE` times the resolution."""
+        return _font(round(max(size * self.unit, LEAST_LETTERS) * FINE))
+
     def _paint_letters(self, text: str, size: int, colour: Colour) -> Any:
-        image = _font(round(size * self.unit * FINE)).render(text, True, colour)
+        image = self._font(size).render(text, True, colour)
         image = image.copy().premul_alpha()  # the copy: pygame (not pygame-ce) misreads rows with padding
         return pygame.transform.smoothscale(image, (image.get_width() // FINE, image.get_height() // FINE))
 

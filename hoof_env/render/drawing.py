@@ -146,7 +146,11 @@ class Drawing:
         """Find the points of flesh and hooves, if the legs have them."""
         points = self._geometry.mechanism.points
         self._number = {name: k for k, name in enumerate(points)}
-        self._flesh = flesh_of(self._geometry.mechanism)
+        mechanism = self._geometry.mechanism
+        self._flesh = flesh_of(mechanism)
+        edges = [[self._number[name] for name in ends] for ends in zip(*mechanism.edges, strict=True)]
+        tails, heads = edges or ([], [])
+        self._rods = [*mechanism.tails, *tails], [*mechanism.heads, *heads]
         self._corners = [self._number[name] for name in self._geometry.corners]
         sole = self._geometry.mechanism.sole
         self._ankle = self._number[sole[0]] if sole else self._corners[0]
@@ -163,7 +167,7 @@ class Drawing:
             return
         self._claim(f"{group}_flesh", legs * max(len(self._flesh), 1), 2 * ARC)
         self._claim(f"{group}_hoof", 2 * legs, 4)
-        self._claim(f"{group}_links", legs * len(self._geometry.mechanism.tails), 2)
+        self._claim(f"{group}_links", legs * len(self._rods[0]), 2)
         self._claim(f"{group}_joints", 0, legs * len(self._number))
 
     @property
@@ -205,8 +209,8 @@ class Drawing:
             [sole, back, back + HORN_SHARE * (ankle - back), sole + HORN_SHARE * (ankle - sole)], axis=1
         )
         hooves = np.stack([pastern, horn], axis=1)
-        mechanism = self._geometry.mechanism
-        links = np.stack([whole[:, mechanism.tails], whole[:, mechanism.heads]], axis=-1)
+        tails, heads = self._rods
+        links = np.stack([whole[:, tails], whole[:, heads]], axis=-1)
         outlines = (flesh, hooves, links, whole)
         return [part.ravel() for outline in outlines for part in (outline.real, outline.imag)]
 

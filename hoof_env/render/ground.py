@@ -107,8 +107,11 @@ class GroundPainter:
             metre = half % 2 == 0
             length = round((10 if metre else 6) * unit)
             canvas.fill(SOIL_LINE, (round(at - thick / 2), top, thick if metre else 1, length))
-            if metre:
-                self._brush.write(canvas, f"{half // 2} m", (at, top + 13 * unit), 17, SOIL_LINE, "midtop")
+            text = f"{half // 2} m"
+            room = self._brush.width(text, 17) / 2
+            # A label that the picture's edge or the panel would cut could be read as another number.
+            if metre and room <= at <= self._clear - room:
+                self._brush.write(canvas, text, (at, top + 13 * unit), 17, SOIL_LINE, "midtop")
 
     def _draw_labels(self, canvas: Any, corner: complex) -> None:
         unit = self._brush.unit
@@ -124,6 +127,8 @@ class GroundPainter:
             y = (corner.imag - float(self.height(middle))) * self._scale + 36 * unit
             factors = [("stiffness", patch.stiffness), ("friction", patch.friction)]
             words = [f"{name} × {factor:.2g}" for name, factor in factors if abs(factor - 1) > TOLERANCE]
+            room = max(self._brush.width(text, 16) for text in words) / 2
+            x = min(max(x, room), self._clear - room)
             for k, text in enumerate(words):
                 self._brush.write(canvas, text, (x, y + 15 * k * unit), 16, SOIL_LINE, "midtop")
 

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from functools import lru_cache
 from itertools import cycle
 from string import ascii_letters
-from typing import Any
+from typing import Any, NamedTuple
 
 import pygame
 
@@ -22,11 +22,30 @@ NUMBERS = (
     ("pitch", "deg", INK),
     ("highest force", "kN", FORCE),
 )
-ROW = 13  # height of a row of the footfall diagram [pixels of a picture of 960 x 540]
-CURVE = 50  # largest height of a leg's curve [same]
-GAP = 17  # between curves, for the name of a leg [same]
+CURVE = 50  # largest height of a leg's curve [pixels of a picture of 960 x 540]
 ROOM = 320  # for all curves and rows [same]
 MAX_LEGS = 9  # for which there is room
+
+
+class Lines(NamedTuple):
+    """Heights of the parts of a panel [pixels of a picture of 960 x 540].
+
+    Attributes:
+        row: of a row of the footfall diagram.
+        gap: between curves, for the name of a leg.
+        name: of the letters of a leg's name.
+        letters: of numbers at axes, and of the names of rows.
+    """
+
+    row: int
+    gap: int
+    name: int
+    letters: int
+
+
+WIDE = Lines(16, 19, 20, 18)
+NARROW = Lines(13, 17, 17, 16)
+MAX_WIDE = 6  # legs for which there is room with `WIDE`
 
 
 class LegsPanel:
@@ -52,14 +71,16 @@ class LegsPanel:
         left = self._inside.left + round(34 * unit)
         width = self._inside.width - round(40 * unit)
         top = self._inside.top + 126 * unit
-        high = min(CURVE, (ROOM - ROW * len(legs)) / len(legs) - GAP) * unit
+        self._lines = WIDE if len(legs) <= MAX_WIDE else NARROW
+        row, gap, *_ = self._lines
+        high = min(CURVE, (ROOM - row * len(legs)) / len(legs) - gap) * unit
         self._plots = [
-            pygame.Rect(left, round(top + k * (high + GAP * unit)), width, round(high))
+            pygame.Rect(left, round(top + k * (high + gap * unit)), width, round(high))
             for k in range(len(legs))
         ]
         first = self._plots[-1].bottom + 34 * unit
         self._rows = [
-            pygame.Rect(left, round(first + k * ROW * unit), width, round((ROW - 4) * unit))
+            pygame.Rect(left, round(first + k * row * unit), width, round((row - 4) * unit))
             for k in range(len(legs))
         ]
         self._card = lru_cache(maxsize=8)(self._paint_card)
@@ -137,6 +158,7 @@ class LegsPanel:
 
     def _paint_card(self, full_scale: float) -> Any:
         unit = self._brush.unit
+        lines = self._lines
         whole = pygame.Surface(self._box.bottomright, pygame.SRCALPHA, 32)
 
         def paint(fine: Any, place: Any) -> None:
@@ -159,17 +181,17 @@ class LegsPanel:
             for part in (0.0, 1.0):
                 y = plot.bottom - part * plot.height
                 whole.fill(FAINT, (plot.left, round(y), plot.width, 1))
-                write(f"{part * full_scale / 1000:g}", plot.left - 7 * unit, y, 16, "midright")
-            write(leg.replace("_", " "), plot.right, plot.top - 8 * unit, 17, "midright", colour)
+                write(f"{part * full_scale / 1000:g}", plot.left - 7 * unit, y, lines.letters, "midright")
+            write(leg.replace("_", " "), plot.right, plot.top - 9 * unit, lines.name, "midright", colour)
         first = self._rows[0]
         last = self._rows[-1]
         write("footfall", self._inside.left, first.top - 14 * unit, 20)
         for row, leg in zip(self._rows, self._legs, strict=True):
             whole.fill(FAINT, row)
             letters = "".join(word[0].upper() + word.lstrip(ascii_letters) for word in leg.split("_") if word)
-            write(letters, row.left - 7 * unit, row.centery, 16, "midright")
+            write(letters, row.left - 7 * unit, row.centery, lines.letters, "midright")
         for second in range(SECONDS + 1):
             x = last.right - second / SECONDS * last.width
-            write(f"{-second}", x, last.bottom + 5 * unit, 16, "midtop")
-        write("time before now, s", last.centerx, last.bottom + 31 * unit, 17, "midbottom")
+            write(f"{-second}", x, last.bottom + 5 * unit, lines.letters, "midtop")
+        write("time before now, s", last.centerx, last.bottom + 33 * unit, lines.letters, "midbottom")
         return whole.subsurface(self._box)

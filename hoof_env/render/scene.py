@@ -204,6 +204,8 @@ class LegScene:
             for corners in mechanism.plates:
                 if corners not in hoof:
                     pygame.draw.polygon(fine, PLATE, [at[name] for name in corners])
+            for a, b in mechanism.edges:
+                bar(fine, LINK, at[a], at[b], 0.015 * metre, 0.015 * metre)
             for i, link in enumerate(mechanism.bodies):
                 colour, radius = (CRANK, 0.024 * metre) if i == mechanism.crank else (LINK, 0.015 * metre)
                 bar(fine, colour, at[link.tail], at[link.head], radius, radius)
@@ -271,7 +273,10 @@ class LegScene:
             return
         tip = ends[0][3]
         text = f"{now.grf / self._newtons:.{self._digits}f} {self._unit}"
-        self._brush.write(canvas, text, (tip.real + 12 * self._brush.unit, tip.imag), 21, FORCE)
+        # On the side to which the arrow leans, where its shaft is not.
+        is_left = ends[0][2].real > tip.real
+        beside = tip.real + (-12 if is_left else 12) * self._brush.unit
+        self._brush.write(canvas, text, (beside, tip.imag), 21, FORCE, "midright" if is_left else "midleft")
 
     def _paint_key(self, full_scale: float) -> Any:
         unit = self._brush.unit

@@ -88,6 +88,9 @@ class Body(Protocol):
     def parts(self, s: ResolvedSettings) -> tuple[Trunk, Ground, tuple[Limb, ...]]:
         """Make trunk, ground and legs from settings of `parameters.resolved`."""
 
+    def scale_of(self, name: str) -> float:
+        """Return the body's own value of a setting over the value of the setting, 1 for most."""
+
     def commanded_speeds(self, s: Settings) -> tuple[float, float] | None:
         """Return the lowest and highest commanded speed [m/s]; None if no speed is commanded."""
 

@@ -84,6 +84,16 @@ CLEARANCE = 0.02
 ground [m]."""
 GAP = 0.005  # clearance of the lowest rigid hoof at a start [m]
 HOOF_STIFFNESS = 24000.0  # default for a horse of size 1 [N/m]
+POWERS = {
+    "trunk_mass": 3,
+    "hoof_stiffness": 2,
+    "hoof_damping": 2.5,
+    "motor_gain": 4.5,
+    "motor_torque": 4,
+    "motor_inertia": 5,
+}
+"""Power of the size by which the settings that are given at size 1 grow. Torque is weight times length,
+inertia mass times length squared; a gain is torque times time, damping stiffness times time."""
 # Two legs with two hoof points each bear the weight.
 SAG = MASS * GRAVITY / (4 * HOOF_STIFFNESS)  # compression of the springs at a start [m]
 DEFAULT_MOTION: dict[str, Any] = {"vx": 1.0, "vy": 0.0, "pitch": 0.0, "pitch_rate": 0.0}
@@ -198,10 +208,15 @@ class Horse:
             (-PITCH, PITCH), (self.lowest, self.highest), CLEARANCE * self.size
         )
 
+    def scale_of(self, name: str) -> float:
+        """Return the animal's own value of a setting over its value at size 1, see `POWERS`."""
+        return float(self.size ** POWERS.get(name, 0))
+
     def parts(self, s: ResolvedSettings) -> tuple[Trunk, Ground, tuple[Limb, ...]]:
         """Make trunk, ground and legs from settings; see `Body.parts`."""
         size = self.size
-        mass = check_number("trunk_mass", s.trunk_mass, low=0, exclusive_low=True) * size**3
+        given = check_number("trunk_mass", s.trunk_mass, low=0, exclusive_low=True)
+        mass = given * self.scale_of("trunk_mass")
         # The legs keep their masses: `trunk_mass` is that of the trunk alone, which a reset may draw.
         inertia = mass * (GYRATION * size) ** 2
         trunk = Trunk("free", mass, drag=0.0, height=self.height, pitch_inertia=inertia)
@@ -215,15 +230,13 @@ class Horse:
 
     def _drive(self, s: Settings) -> Drive:
         drive = drive_of(s)
-        size = self.size
         if not isinstance(drive, Motor):
             return drive
-        # Torque is weight times length, inertia mass times length squared, a gain torque times time.
         return replace(
             drive,
-            speed_gain=drive.speed_gain * size**4.5,
-            torque_limit=drive.torque_limit * size**4,
-            rotor_inertia=drive.rotor_inertia * size**5,
+            speed_gain=drive.speed_gain * self.scale_of("motor_gain"),
+            torque_limit=drive.torque_limit * self.scale_of("motor_torque"),
+            rotor_inertia=drive.rotor_inertia * self.scale_of("motor_inertia"),
         )
 
     def _ground(self, s: ResolvedSettings, mass: float) -> Ground:
@@ -244,8 +257,9 @@ class Horse:
             damping = HoofSpring.with_ratio(stiffness, MASS / COUNT).damping
         else:
             damping = check_number("hoof_damping", s.hoof_damping, low=0, exclusive_low=True)
-        # Damping is stiffness times time.
-        return HoofSpring(stiffness * self.size**2, damping * self.size**2.5)
+        return HoofSpring(
+            stiffness * self.scale_of("hoof_stiffness"), damping * self.scale_of("hoof_damping")
+        )
 
     def commanded_speeds(self, s: Settings) -> tuple[float, float]:
         """Return the lowest and highest commanded speed [m/s]."""

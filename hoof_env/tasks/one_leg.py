@@ -223,6 +223,10 @@ class OneLeg:
         height = nominal if s.hip_height is None else s.hip_height
         self.height = check_number("hip_height", height, low=MIN_HEIGHT * nominal, high=MAX_HEIGHT * nominal)
 
+    def scale_of(self, name: str) -> float:
+        """Return 1: settings are the values of this leg, see `Body.scale_of`."""
+        return 1.0
+
     def parts(self, s: ResolvedSettings) -> tuple[Trunk, Ground, tuple[Limb, ...]]:
         """Make trunk, ground and legs from settings; see `Body.parts`."""
         trunk = Trunk(

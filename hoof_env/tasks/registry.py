@@ -422,12 +422,14 @@ def register(
     added = {term.name: term for term in new_terms}
     kept = [added.pop(term.name, term) for term in old.terms]
     law = f" The normal force is that of `{function_name(contact_law)}`." if contact_law else ""
+    has_more = bool(new_terms or new_entries or contact_law or action_map)
+    foreign = " With terms, entries or laws from outside this package." if has_more else ""
     caller = str(sys._getframe(1).f_globals.get("__name__", ""))
     task = replace(
         old,
         name=env_id,
         module="" if caller in ("__main__", "__mp_main__") else caller,  # worker processes import it
-        summary=f"{old.summary} With terms, entries or laws from outside this package.",
+        summary=f"{old.summary}{foreign}",
         about=old.about + law,
         terms=(*kept, *added.values()),
         entries=(*old.entries, *new_entries),

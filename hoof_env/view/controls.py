@@ -4,15 +4,18 @@ from __future__ import annotations
 
 import json
 import math
+from collections.abc import Mapping
 from contextlib import suppress
 from typing import Any, NamedTuple
 
 import gymnasium as gym
+import numpy as np
 
 from hoof_env.envs.open_loop import gait_file
 from hoof_env.envs.policies import policy_names
 from hoof_env.errors import DataFileError, HoofEnvError
 from hoof_env.gait import PARAMETERS
+from hoof_env.leg.mechanism_list import PAPER
 from hoof_env.paper.rows import load_published
 from hoof_env.policies.find import shipped_ids
 from hoof_env.policies.record import own_id
@@ -65,6 +68,7 @@ class Slider(NamedTuple):
         low, high, step, value: as the slider has them; logarithms to base ten where `is_log`.
         is_log: True for a logarithmic slider.
         marks: the paper's values, as positions and texts.
+        scale: number that the page writes over the value of the slider, see `Body.scale_of`.
     """
 
     ask: str
@@ -77,6 +81,57 @@ class Slider(NamedTuple):
     value: float
     is_log: bool
     marks: tuple[tuple[float, str], ...] = ()
+    scale: float = 1.0
+
+
+class Shown(NamedTuple):
+    """A setting that has an effect.
+
+    Attributes:
+        group, name, label: its group on the page, its name, and words for it.
+        value: present value.
+        scale: the animal's own value over that, see `Body.scale_of`.
+    """
+
+    group: str
+    name: str
+    label: str
+    value: float
+    scale: float
+
+    @property
+    def text(self) -> str:
+        """The animal's own value with its unit."""
+        number = np.format_float_positional(float(f"{self.value * self.scale:.4g}"), trim="-")
+        return f"{number} {unit_of(self.name)}".rstrip()
+
+
+def shown_settings(simulation: Simulation, parameters: Mapping[str, float] | None = None) -> list[Shown]:
+    """Return the settings of `GROUPS` that have an effect, with finite values.
+
+    Args:
+        simulation: simulation.
+        parameters: parameters that were touched, by default those of the simulation.
+    """
+    env: Any = simulation.env.unwrapped
+    touched = simulation.parameters if parameters is None else parameters
+    found = []
+    for group, labels in GROUPS.items():
+        for name, label in labels.items():
+            with suppress(HoofEnvError):
+                check_effect(name, env.settings)
+                if name == "target_speed":
+                    value = simulation.commanded_speed
+                else:
+                    value = touched.get(name, getattr(env.resolved_settings, name))
+                if value is not None and math.isfinite(value):
+                    found.append(Shown(group, name, label, float(value), env.body.scale_of(name)))
+    return found
+
+
+def has_paper_leg(simulation: Simulation) -> bool:
+    """Return True for a single leg with the paper's mechanism, to which the paper's values belong."""
+    return len(simulation.legs) == 1 and simulation.setting.geometry.mechanism == PAPER
 
 
 def paper_values() -> dict[str, tuple[float, ...]]:
@@ -91,9 +146,16 @@ def paper_values() -> dict[str, tuple[float, ...]]:
 
 
 def slider(
-    ask: str, name: str, label: str, value: float, span: tuple[float, float], step: float | None = None
+    ask: str,
+    name: str,
+    label: str,
+    value: float,
+    span: tuple[float, float],
+    is_marked: bool,
+    step: float | None = None,
+    scale: float = 1.0,
 ) -> Slider:
-    """Make a slider over a span, extended to the present value."""
+    """Make a slider over a span, extended to the present value, with the paper's values if it is marked."""
     low = min(span[0], value)
     high = max(span[1], value)
     is_log = low > 0 and high / low >= LOGARITHMIC
@@ -103,35 +165,30 @@ def slider(
     marks = tuple(
         ((place(number) - low) / (high - low), f"{round(number, 3):.6g}")
         for number in paper_values().get(name, ())
-        if span[0] <= number <= span[1]
+        if is_marked and span[0] <= number <= span[1]
     )
-    return Slider(ask, name, label, unit_of(name), low, high, step, place(value), is_log, marks)
+    return Slider(ask, name, label, unit_of(name), low, high, step, place(value), is_log, marks, scale)
 
 
 def setting_sliders(simulation: Simulation) -> dict[str, list[Slider]]:
     """Return the sliders of the settings that have an effect, by group."""
-    settings = simulation.env.unwrapped.settings  # type: ignore[attr-defined]
+    is_marked = has_paper_leg(simulation)
     found: dict[str, list[Slider]] = {}
-    for group, labels in GROUPS.items():
-        for name, label in labels.items():
-            value = simulation.commanded_speed if name == "target_speed" else simulation.value_of(name)
-            span = ABOUT[name].span
-            try:
-                check_effect(name, settings)
-            except HoofEnvError:
-                continue
-            if value is None or span is None or not math.isfinite(value):
-                continue
+    for group, name, label, value, scale in shown_settings(simulation):
+        span = ABOUT[name].span
+        if span is not None:
             step = 0.125 if name == "exponent" else None
-            found.setdefault(group, []).append(slider("touch", name, label, value, span, step))
+            made = slider("touch", name, label, value, span, is_marked, step, scale)
+            found.setdefault(group, []).append(made)
     return found
 
 
 def gait_sliders(simulation: Simulation) -> list[Slider]:
     """Return the sliders that drive one leg by hand."""
     now = simulation.gait_now()
-    limits = simulation.gait_limits
-    return [slider("drive", name, GAIT[name], now[name], span) for name, span in limits.items()]
+    is_marked = has_paper_leg(simulation)
+    limits = simulation.gait_limits.items()
+    return [slider("drive", name, GAIT[name], now[name], span, is_marked) for name, span in limits]
 
 
 def known_ids() -> list[str]:

@@ -56,6 +56,13 @@ TICKS = (
 """Script of the texts at ticks: thousands as k, and without the digits that rounding errors add."""
 
 
+AWAY_FROM_EDGES = """
+const at = (tick - range.start) / (range.end - range.start)
+return at < 0.035 || at > 0.965 ? "" : String(Number(tick.toPrecision(6))).replace("-", "\u2212")
+"""
+"""Script of the texts at the ticks of a scene: none that its edge would cut, without room beside it."""
+
+
 class Trace(NamedTuple):
     """A curve: its column, its name in the legend, colour and dash."""
 
@@ -105,6 +112,7 @@ class Scene:
         f.grid.visible = False
         f.yaxis.visible = False
         f.xaxis.axis_label = "way forward [m]"
+        f.xaxis.formatter = CustomJSTickFormatter(args={"range": f.x_range}, code=AWAY_FROM_EDGES)
         f.min_border_left = 0
         return f
 

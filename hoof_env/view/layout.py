@@ -13,12 +13,11 @@ from numpy.typing import NDArray
 from hoof_env.leg.presets import preset_names
 from hoof_env.record.columns import Columns
 from hoof_env.records import default_policy
-from hoof_env.render.outline import ARROW_M
 from hoof_env.view import controls, figures
 from hoof_env.view.history import RESOLUTION, STANCE
 from hoof_env.view.player import Player
 from hoof_env.view.recording import FORMATS
-from hoof_env.view.templates import legend_of, scene_arguments, script, template
+from hoof_env.view.templates import legend_of, scene_arguments, scene_key, script, template
 
 SPEEDS = (0.05, 2.0)  # slowest and fastest play, over real time [-]
 POINTS = round(1.15 * figures.SECONDS / RESOLUTION)  # of a curve that the browser keeps
@@ -105,7 +104,6 @@ def empty_source(columns: Columns) -> ColumnDataSource:
 def variables(player: Player, shown: list[figures.Curves]) -> dict[str, Any]:
     """Return what the template of a tab says."""
     simulation = player.simulation
-    drawing = player.drawing
     env: Any = simulation.env.unwrapped
     arguments = {name: value for name, value in simulation.arguments.items() if name != "preset"}
     return {
@@ -114,7 +112,6 @@ def variables(player: Player, shown: list[figures.Curves]) -> dict[str, Any]:
         "summary": env.task.summary,
         "figures": [legend_of(each) for each in shown],
         "refusal": simulation.other_ground.refusal,
-        "has_heel": drawing.has_heel,
         "legs": [figures.leg_name(leg) for leg in player.legs],
         "stance": STANCE,
         "ids": controls.known_ids(),
@@ -126,9 +123,9 @@ def variables(player: Player, shown: list[figures.Curves]) -> dict[str, Any]:
         "arguments": controls.as_text(arguments),
         "groups": controls.setting_sliders(simulation),
         "gait": controls.gait_sliders(simulation),
+        "has_paper_leg": controls.has_paper_leg(simulation),
         "conditions": [*controls.CONDITIONS],
         "formats": FORMATS,
         "speeds": SPEEDS,
-        "kinds": figures.ground_key(simulation.setting.terrain),
-        "arrow": f"{drawing.full_scale / (ARROW_M * drawing.size) / 1000:.3g}",
+        "scene_key": scene_key(player),
     }

@@ -19,12 +19,14 @@ from hoof_env._input import as_path
 from hoof_env._output import staged
 from hoof_env.errors import ParameterError, check_number
 from hoof_env.record.columns import Columns
+from hoof_env.records import default_policy
 from hoof_env.render import colours
 from hoof_env.render.colours import Colour
 from hoof_env.view import figures
+from hoof_env.view.controls import as_text, shown_settings
 from hoof_env.view.player import Player
 from hoof_env.view.simulation import Chunk, Simulation
-from hoof_env.view.templates import legend_of, scene_arguments, script, template
+from hoof_env.view.templates import legend_of, scene_arguments, scene_key, script, template
 
 SHADES: tuple[Colour, ...] = (colours.FORCE, colours.TOE, colours.CRANK, colours.HEEL)
 """Colours of the records of a page with several."""
@@ -44,12 +46,49 @@ class Record(NamedTuple):
         player: player that showed it, for its drawing data.
         rows: rows of the scene, shape (n, length).
         curves: curves, shape (m,).
+        about: names and texts of what was played, and of the settings that have an effect.
     """
 
     label: str
     player: Player
     rows: NDArray[np.float32]
     curves: Columns
+    about: Sequence[tuple[str, str]] = ()
+
+
+class Played(NamedTuple):
+    """What a simulation played, which may go on to another episode before its record is written.
+
+    Attributes:
+        policy: name of the policy, None for the default.
+        seed: seed of the episode.
+        parameters: physical parameters that were touched, by name.
+    """
+
+    policy: str | None
+    seed: int
+    parameters: Mapping[str, float]
+
+    @classmethod
+    def of(cls, simulation: Simulation) -> Played:
+        """Return what a simulation plays at present."""
+        return cls(simulation.policy_name, simulation.seed, dict(simulation.parameters))
+
+    def about(self, simulation: Simulation) -> list[tuple[str, str]]:
+        """Return names and texts of what was played, and of the settings that have an effect."""
+        env: Any = simulation.env.unwrapped
+        preset = env.settings.preset
+        told = [
+            ("environment", simulation.env_id),
+            ("policy", self.policy or f"{default_policy(env)} (default)"),
+            ("seed", str(self.seed)),
+            ("leg preset", preset if isinstance(preset, str) else simulation.setting.geometry.name or "own"),
+        ]
+        arguments = {name: value for name, value in simulation.arguments.items() if name != "preset"}
+        if arguments:
+            told.append(("arguments", as_text(arguments)))
+        shown = shown_settings(simulation, self.parameters)
+        return told + [(one.label, one.text) for one in shown if one.name != "target_speed"]
 
 
 class Playback:
@@ -70,8 +109,16 @@ class Playback:
         self.records = tuple(records)
 
     @classmethod
-    def of_chunks(cls, simulation: Simulation, chunks: Sequence[Chunk]) -> Playback:
-        """Return the page of chunks of one episode of a simulation."""
+    def of_chunks(
+        cls, simulation: Simulation, chunks: Sequence[Chunk], played: Played | None = None
+    ) -> Playback:
+        """Return the page of chunks of one episode of a simulation.
+
+        Args:
+            simulation: simulation.
+            chunks: chunks.
+            played: policy, seed and touched parameters of that episode, by default those of the present one.
+        """
         player = Player(simulation)
         rows = []
         shown = -np.inf
@@ -81,7 +128,8 @@ class Playback:
                 rows.append(player.row().astype(np.float32))
                 shown = player.shown
         label = simulation.env_id.rpartition("/")[2]
-        return cls(label, [Record(label, player, np.array(rows), player.curves())])
+        about = (played or Played.of(simulation)).about(simulation)
+        return cls(label, [Record(label, player, np.array(rows), player.curves(), about)])
 
     @classmethod
     def play(
@@ -159,12 +207,10 @@ class Playback:
         doc.template = template("alone.html")
         doc.template_variables.update(
             style=script("style.css"),
-            records=[
-                {"label": record.label, "legs": [figures.leg_name(leg) for leg in record.player.legs]}
-                for record in self.records
-            ],
+            records=[facts_of(record) for record in self.records],
             figures=[legend_of(each) for each in shown],
             several=len(self.records) > 1,
+            common_key=common_key([record.player for record in self.records]),
         )
         return doc
 
@@ -237,3 +283,23 @@ class Playback:
         seconds = self.records[0].curves["time"][-1] - self.records[0].curves["time"][0]
         labels = ", ".join(record.label for record in self.records)
         return f"<Playback of {labels}: {seconds:.2f} s>"
+
+
+def common_key(players: Sequence[Player]) -> dict[str, Any] | None:
+    """Return the legend of the scenes of some players, None where they differ."""
+    key, *others = [scene_key(player) | {"legs": player.legs} for player in players]
+    return key if all(other == key for other in others) else None
+
+
+def facts_of(record: Record) -> dict[str, Any]:
+    """Return what a page writes about a record: its label, legs, summary, legend, times and settings."""
+    time = record.curves["time"]
+    env: Any = record.player.simulation.env.unwrapped
+    return {
+        "label": record.label,
+        "summary": env.task.summary,
+        "span": f"{time[0]:.2f} to {time[-1]:.2f} s",
+        "legs": [figures.leg_name(leg) for leg in record.player.legs],
+        "about": record.about,
+        "scene_key": scene_key(record.player),
+    }

@@ -59,7 +59,7 @@ class Recording:
             records.check_place(self.path, FORMATS)
         self._simulation = simulation
         # Of the recorded episode: the next one may have begun when the file is written.
-        self._played = {"policy": simulation.policy_name, "seed": simulation.seed}
+        self._played: dict[str, Any] = {"policy": simulation.policy_name, "seed": simulation.seed}
         self._parameters = simulation.parameters
         self._tell = tell
         self._chunks: list[Chunk] = []
@@ -101,9 +101,10 @@ class Recording:
         simulation = self._simulation
         suffix = self.path.suffix
         if suffix == ".html":
-            from hoof_env.view.playback import Playback
+            from hoof_env.view.playback import Playback, Played
 
-            Playback.of_chunks(simulation, self._chunks).write(self.path)
+            played = Played(**self._played, parameters=self._parameters)
+            Playback.of_chunks(simulation, self._chunks, played).write(self.path)
         elif suffix in film.FFMPEG:
             from hoof_env.render.renderer import Renderer
 

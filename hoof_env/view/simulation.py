@@ -105,10 +105,6 @@ class Simulation:
         """Limits of the gait parameters that `drive` takes, empty for a horse."""
         return limits_of(self.setting.geometry) if self.is_driven else {}
 
-    def value_of(self, name: str) -> Any:
-        """Return the present value of a setting."""
-        return self.parameters.get(name, getattr(self._leg.resolved_settings, name))
-
     def _find(self, policy: Any, seed: int) -> Actor:
         """Return the actor of a policy, which may be a name."""
         if policy is None or isinstance(policy, str):

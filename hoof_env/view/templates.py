@@ -8,6 +8,7 @@ from typing import Any
 from jinja2 import Environment, FileSystemLoader, Template
 
 from hoof_env.render.drawing import HEAD
+from hoof_env.render.outline import ARROW_M
 from hoof_env.view import figures
 from hoof_env.view.player import Player
 
@@ -39,6 +40,16 @@ def scene_arguments(scene: figures.Scene, player: Player) -> dict[str, Any]:
         "camera": {"low": drawing.low, "high": drawing.high, "wide": drawing.half_width},
         "head": HEAD,
         "numbers": [list(number) for number in player.numbers],
+    }
+
+
+def scene_key(player: Player) -> dict[str, Any]:
+    """Return what the legend of a scene says: kinds of ground, the scale of the arrows, and the heel."""
+    drawing = player.drawing
+    return {
+        "has_heel": drawing.has_heel,
+        "kinds": figures.ground_key(player.simulation.setting.terrain),
+        "arrow": f"{drawing.full_scale / (ARROW_M * drawing.size) / 1000:.3g}",
     }
 
 

@@ -5,12 +5,14 @@ from __future__ import annotations
 import math
 import re
 from dataclasses import fields
+from pathlib import Path
 
 import gymnasium as gym
 import numpy as np
 import pytest
 from family import HORSE, OTHER, scaled
 
+import hoof_env
 from hoof_env import cli
 from hoof_env.envs import manual
 from hoof_env.errors import ParameterError
@@ -68,6 +70,39 @@ def test_unknown_ids_are_one_line(capsys):
     assert capsys.readouterr().err.startswith("hoof-env: error: id: ")
     with pytest.raises(ParameterError, match="HorseLegRail-v0"):
         manual.tables_of("hoof_env/Trot-v0")
+
+
+def test_the_manual_of_an_own_id_says_which_leg_it_has(capsys, tmp_path):
+    """And not that of the paper, or parts from outside that it does not have."""
+    texts = {}
+    pony = hoof_env.load_geometry("identified").scaled(0.5).replace(provenance="half as tall as another one")
+    gaits = {name: hoof_env.load_gait(name, "identified") for name in ("walk", "run")}
+    pony.save(tmp_path / "pony.json", gaits=gaits, ground={})
+    for preset in ("identified", "jansen", "klann", "fourbar", str(tmp_path / "pony.json")):
+        hoof_env.register("test/OtherLeg-v0", preset=preset)
+        assert cli.main(["manual", "--env-id", "test/OtherLeg-v0"]) == 0
+        printed = texts[preset] = capsys.readouterr().out
+        assert "outside this package" not in printed
+        leg = hoof_env.load_geometry(preset)
+        about = " ".join(printed.partition("Arguments")[0].split())
+        assert f"hips {leg.hip_height:.5g} m high. {leg.provenance[:20]}" in about
+        assert f"Leg: preset {preset}" in about
+        assert ("Batbaatar" in about) == (preset == "identified")
+        env = gym.make("test/OtherLeg-v0")
+        rows = {row[0]: row[3] for row in manual.arguments(manual.task_of_id("test/OtherLeg-v0")).rows}
+        own = re.search(r": ([\d.]+) of this leg", rows["crank_rate"])
+        rate = float(own.group(1)) if own else 18.0
+        assert rate == pytest.approx(env.unwrapped.body.rates[0], rel=1e-3)
+    assert len(set(texts.values())) == 5
+    assert rate == pytest.approx(36.0)
+
+
+@pytest.mark.parametrize("preset", ["jansen", "klann", "fourbar"])
+def test_the_page_of_the_horse_says_which_mechanisms_it_refuses(preset):
+    page = Path(__file__).parents[2] / "docs" / "environments" / "Horse.md"
+    assert re.search(rf'"{preset}".* is refused', page.read_text("utf-8"), re.DOTALL)
+    with pytest.raises(ParameterError, match="mechanism"):
+        gym.make(HORSE, preset=preset)
 
 
 @pytest.mark.parametrize("task", TASKS)

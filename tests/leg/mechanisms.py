@@ -65,6 +65,34 @@ def random_leg(rng, dyads=4):
     return leg, at
 
 
+def lambda_leg(crank=0.35):
+    """Return Chebyshev's lambda: a coupler that goes on, straight, beyond its dyad to the foot."""
+    return Geometry(
+        lengths={"OP": crank, "PB": 2.5 * crank, "CB": 2.5 * crank, "BF": 2.5 * crank},
+        pivot=(2 * crank, 0.0),
+        assembly={"B": 1},
+        toe="F",
+        heel=None,
+        travel=1,
+        hip_height=1.2,
+        mechanism={
+            "fixed": ["O", "C"],
+            "crank": {"point": "P", "length": "OP"},
+            "points": [
+                {"point": "B", "dyad": ["C", "P"], "lengths": ["CB", "PB"]},
+                {"point": "F", "body": "PB", "from": "B", "along": "-BF"},
+            ],
+            "bodies": [
+                {"name": "OP", "tail": "O", "head": "P"},
+                {"name": "PB", "tail": "P", "head": "B"},
+                {"name": "CB", "tail": "C", "head": "B"},
+            ],
+            "joints": [["O", "OP", "frame"], ["P", "PB", "OP"], ["C", "CB", "frame"], ["B", "CB", "PB"]],
+            "feet": ["F"],
+        },
+    )
+
+
 EVERYTHING = {
     "fixed": ["O", "C"],
     "crank": {"point": "P", "length": "OP"},

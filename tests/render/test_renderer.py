@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 import subprocess
 import sys
 from itertools import product
@@ -23,12 +24,14 @@ from hoof_env.record.columns import columns_of_engine
 from hoof_env.record.instant import Instant, leg_instants
 from hoof_env.record.surroundings import Surroundings
 from hoof_env.render.brush import Brush
-from hoof_env.render.colours import COAT, HOOF
+from hoof_env.render.colours import COAT, HOOF, LINK
+from hoof_env.render.drawing import Drawing
 from hoof_env.render.ground import footprint
 from hoof_env.render.kinds import find_patches, kinds_of
 from hoof_env.render.outline import TRUNK_M
 from hoof_env.render.panel import Stances
 from hoof_env.render.renderer import Renderer
+from tests.leg.mechanisms import lambda_leg
 from tests.render.drawn import (
     BLUE,
     GEOMETRY,
@@ -37,6 +40,7 @@ from tests.render.drawn import (
     PURPLE,
     VERMILION,
     add,
+    body,
     draw,
     loaded,
     pixels,
@@ -130,6 +134,87 @@ def test_the_ground_scrolls_under_the_trunk_by_its_ticks(run):
 
     np.testing.assert_array_equal(ticks(60.0), ticks(0.0))
     assert (ticks(60.25) != ticks(0.0)).any()
+
+
+def written(monkeypatch) -> list[tuple[str, float, float, int]]:
+    """Return a list that gets, of each text, its left and right edge and the middle of its height."""
+    found = []
+    write = Brush.write
+
+    def noted(self, canvas, text, at, size, colour, side="midleft"):
+        image = self._letters(text, size, colour)
+        place = image.get_rect(**{side: (round(at[0]), round(at[1]))})
+        found.append((text, place.left, place.right, place.centery))
+        write(self, canvas, text, at, size, colour, side)
+
+    monkeypatch.setattr(Brush, "write", noted)
+    return found
+
+
+@pytest.mark.parametrize("size", [(960, 540), (480, 270)])
+def test_labels_of_the_ruler_are_whole(run, monkeypatch, size):
+    """Neither the panel nor an edge cuts one, wherever the trunk is."""
+    found = written(monkeypatch)
+    picture = renderer(size=size)
+    (now,) = run[0]
+    for x in np.arange(100.0, 102.0, 0.05):
+        add(picture, [now._replace(x=x, toe_x=now.toe_x + x, heel_x=now.heel_x + x)])
+        picture.frame()
+    labels = [(left, right) for text, left, right, _ in found if text.endswith(" m")]
+    assert len(labels) > 150
+    assert min(left for left, _ in labels) >= 0
+    assert max(right for _, right in labels) <= picture._panel._box.left
+
+
+@pytest.mark.parametrize("friction", [-900.0, -400.0, 0.0, 400.0, 900.0])
+def test_no_arrow_crosses_its_own_number(run, monkeypatch, friction):
+    """Its pixels are those of the arrow of the same force without a number."""
+    found = written(monkeypatch)
+    step = loaded(run, 1000.0, friction)
+    draw(step, weight_n=1000.0)
+    ((left, right, middle),) = [place for text, *place in found if re.fullmatch(r"[\d.]+ kN", text)]
+    box = slice(middle - 6, middle + 7), slice(left, right)
+    monkeypatch.setattr(Brush, "write", lambda *_: None)
+    bare = draw(step, weight_n=1000.0)
+    for colour in (VERMILION, BLUE, PURPLE, (255, 255, 255)):
+        assert not len(pixels(bare, colour, box)[0])
+
+
+def test_a_rod_beyond_its_dyad_is_as_thick_as_a_link():
+    """A coupler with its foot in a straight line: its plate has no area."""
+    leg = lambda_leg()
+    picture = Renderer(Surroundings(leg, trunk="fixed"))
+    engine = TrunkEngine(Limb(leg), Trunk("fixed", height=leg.hip_height), Ground())
+    engine.reset(GaitParameters(0.0, 0.0, 0.0, 0.0), 1.0)
+    add(picture, leg_instants(columns_of_engine(engine.state | engine.report)))
+    frame = picture.frame()
+    at = picture._scene.look_at(picture.latest)[0]
+    wide = {}
+    for a, b in (("P", "B"), ("B", "F")):
+        middle = 0.5 * (at[a] + at[b])
+        across = 1j * (at[b] - at[a]) / abs(at[b] - at[a])
+        places = [middle + d * across for d in np.arange(-6.0, 6.1, 0.25)]
+        wide[a + b] = sum(tuple(frame[round(z.imag), round(z.real)]) == LINK for z in places)
+    assert wide["BF"] == pytest.approx(wide["PB"], rel=0.3)
+    assert wide["PB"] > 6
+
+
+def test_a_page_draws_the_rod_of_a_foot_beyond_its_dyad():
+    """A link of its row ends in the foot, as one ends in each other point."""
+    leg = lambda_leg()
+    drawing = Drawing(Surroundings(leg, trunk="fixed"), numbers=0)
+    engine = TrunkEngine(Limb(leg), Trunk("fixed", height=leg.hip_height), Ground())
+    engine.reset(GaitParameters(0.0, 0.0, 0.0, 0.0), 1.0)
+    (now,) = leg_instants(columns_of_engine(engine.state | engine.report))
+    row = drawing.row(body(now), [])
+    assert len(row) == drawing.length
+    x, y = (
+        row[place.start : place.start + place.pieces * place.length]
+        for place in drawing.places
+        if place.source == "near_links"
+    )
+    ends = np.hypot(x - now.toe_x, y - now.toe_y)
+    assert ends.min() < 1e-6
 
 
 def surface(frame: np.ndarray, column: int) -> int:

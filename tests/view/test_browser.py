@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import json
 import os
+import re
 import shutil
 import subprocess
 import sys
@@ -37,7 +38,8 @@ class Broken:
     def predict(self, observation, **_):
         raise ValueError("there is no layer 3")
 policy = Broken() if "broken" in sys.argv else None
-setup = dict(env_id={LEG!r}, arguments={MOTOR!r}, policy=policy, seed=0)
+env_id = "hoof_env/Horse-v0" if "horse" in sys.argv else {LEG!r}
+setup = dict(env_id=env_id, arguments={MOTOR!r}, policy=policy, seed=0)
 server, url = start(setup, port=0, out=Path("."))
 print(url, flush=True)
 server.io_loop.start()
@@ -46,6 +48,11 @@ NAMES = """[...document.querySelectorAll('button, input, select, summary')].filt
     .filter((e) => !(e.labels?.length || e.textContent.trim() || e.getAttribute('aria-label')))
     .map((e) => e.outerHTML)"""
 TOO_WIDE = "document.documentElement.scrollWidth - document.documentElement.clientWidth"
+CUT_CELLS = """() => {
+    const edge = document.querySelector('.numbers').getBoundingClientRect().right + 0.5
+    const cells = [...document.querySelectorAll('.numbers th, .numbers td')]
+    return cells.filter((cell) => cell.getBoundingClientRect().right > edge).map((cell) => cell.textContent)
+}"""
 PAINTED = """(canvas) => new Set(new Uint32Array(canvas.getContext('2d').getImageData(
     0, 0, canvas.width, canvas.height).data.buffer)).size"""
 SOURCE = "Bokeh.documents[0].get_model_by_name(name).renderers[0].data_source.data"
@@ -441,6 +448,7 @@ def test_a_narrow_page_plays_with_closed_controls(browser, url):
     assert page.locator("aside details[open]").count() == 0
     tab.wait_number("peak 0", "> 500")
     assert page.evaluate(TOO_WIDE) <= 0
+    assert page.evaluate(CUT_CELLS) == []
     page.get_by_text("Ground", exact=True).click()
     tab.set("touch-friction", 0.1)
     tab.wait_number("time", f"> {tab.number('time') + 0.3}")
@@ -455,6 +463,39 @@ def test_a_narrow_page_plays_with_closed_controls(browser, url):
     tab.wait_number("time", f"> {before}")
     page.close()
     assert not tab.faults
+
+
+def test_a_narrow_page_of_a_horse_has_the_whole_table(browser, tmp_path):
+    """Four legs of the largest numbers: no column is cut."""
+    with served(tmp_path, "horse") as address:
+        tab = Tab(browser, address, width=390)
+        cells = tab.page.locator(".numbers td")
+        assert cells.count() == 24
+        tab.pause()
+        cells.evaluate_all("(all) => all.forEach((cell) => { cell.textContent = '8888.8' })")
+        assert tab.page.evaluate(CUT_CELLS) == []
+        assert tab.page.locator(".marks").count() == 0
+        tab.page.close()
+
+
+def test_pictures_of_the_report_fit_a_phone(browser):
+    """Each figure as the template has it, with a picture that is wider."""
+    template = (ROOT / "hoof_env" / "demo" / "report.html.j2").read_text(encoding="utf-8")
+    wide = "data:image/svg+xml,<svg xmlns='http://www.w3.org/2000/svg' width='900' height='400'/>"
+    figures = re.findall(r'<figure class="card picture.*?</figure>', template)
+    assert len(figures) == 2
+    body = "".join(re.sub(r'src="[^"]*"', f'src="{wide}"', figure) for figure in figures)
+    page = browser.new_page(viewport={"width": 390, "height": 844})
+    style = template[template.index("<style>") : template.index("</style>")]
+    page.set_content(f"<!doctype html>{style}</style><main>{body}</main>")
+    for image in page.locator("img").all():
+        image.evaluate("(image) => image.decode()")
+        box = image.bounding_box()
+        assert 300 < box["width"] < 390
+        assert box["x"] + box["width"] <= 390
+    hidden = "[...document.querySelectorAll('*')].filter((e) => e.scrollWidth > e.clientWidth + 1).length"
+    assert page.evaluate(hidden) == 0
+    page.close()
 
 
 def test_a_page_alone_plays_from_disk(browser, tmp_path):
@@ -474,6 +515,9 @@ def test_a_page_alone_plays_from_disk(browser, tmp_path):
     assert time.text_content() == at
     page.locator("#at").fill("60")
     assert time.text_content() == "1.20 s"
+    for shown in ("h1", ".legend", ".settings"):
+        assert page.locator(shown).bounding_box()["height"] > 15
+    assert page.locator("h1").text_content() == "HorseLeg-v0"
     assert page.evaluate(NAMES) == []
     page.emulate_media(reduced_motion="reduce")
     page.locator("#at").fill("0")

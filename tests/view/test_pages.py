@@ -17,9 +17,10 @@ from bokeh.embed import file_html
 from bokeh.models import Div
 from bokeh.resources import INLINE
 
-from hoof_env.view.controls import CONDITIONS, PAPER_ID, setting_sliders
-from hoof_env.view.playback import Playback
+from hoof_env.view.controls import CONDITIONS, PAPER_ID, setting_sliders, shown_settings
+from hoof_env.view.playback import Playback, Played
 from hoof_env.view.session import HANDLERS
+from hoof_env.view.simulation import Simulation
 from hoof_env.view.templates import template
 from tests.view.pages import HORSE, LEG, Page
 
@@ -70,9 +71,54 @@ def test_every_slider_of_a_setting_has_unit_and_range(tmp_path):
             assert one.low - 1e-9 <= one.value <= one.high + 1e-9
         assert {"touch", "drive"} <= set(HANDLERS)
         marks = {one.name: [text for _, text in one.marks] for one in sliders}
-        assert marks["stiffness"] == ["20000"]
-        assert marks["restitution"] == ["0", "1"]
+        # The paper has values for a leg, not for a horse.
+        assert marks["stiffness"] == (["20000"] if env_id == LEG else [])
+        assert marks["restitution"] == (["0", "1"] if env_id == LEG else [])
+        assert ("paper's values" in html_of(made)) == (env_id == LEG)
         made.tab.close()
+
+
+def test_sliders_of_a_small_horse_say_its_own_values(tmp_path):
+    """Settings are given at size 1, and the page says what the engine has."""
+    made = Page(tmp_path, env_id=HORSE, arguments={"size": 0.5, "drive": "motor"})
+    simulation = made.player.simulation
+    said = {one.name: one.value * one.scale for one in shown_settings(simulation)}
+    engine = simulation.env.unwrapped.engine
+    assert said["trunk_mass"] == pytest.approx(engine.trunk.mass) == pytest.approx(365.84 / 8)
+    drive = engine.limbs[0].drive
+    assert said["motor_torque"] == pytest.approx(drive.torque_limit)
+    assert said["motor_gain"] == pytest.approx(drive.speed_gain)
+    assert said["motor_inertia"] == pytest.approx(drive.rotor_inertia)
+    sliders = {one.name: one for group in setting_sliders(simulation).values() for one in group}
+    assert sliders["trunk_mass"].scale == 1 / 8
+    assert f'data-name="trunk_mass"\n    data-unit="kg" data-scale="{1 / 8}"' in html_of(made)
+    assert made.ask("touch", setting="trunk_mass", value=200.0).get("kind") != "error"
+    assert dict(Played.of(simulation).about(simulation))["trunk mass"] == "25 kg"
+    made.tab.close()
+
+
+def test_a_page_that_stands_alone_says_what_was_played():
+    """Also when the simulation has gone on to another episode."""
+    simulation = Simulation(HORSE, {"size": 0.5}, seed=4)
+    chunks = [simulation.reset(), simulation.step()]
+    played = Played.of(simulation)
+    simulation.touch("friction", 0.3)
+    simulation.reset(7)
+    text = Playback.of_chunks(simulation, chunks, played).html("bokeh.min.js")
+    heading = re.search(r"<h1>(.*?)</h1>\s*<p>(.*?)</p>", text)
+    assert heading.group(1) == "Horse-v0"
+    assert "four legs" in heading.group(2)
+    assert "0.00 to 0.02 s" in heading.group(2)
+    told = dict(re.findall(r"<dt>(.*?)</dt><dd>(.*?)</dd>", text))
+    assert told["environment"] == HORSE
+    assert told["seed"] == "4"
+    assert told["policy"] == "reference (default)"
+    assert told["arguments"] == "size=0.5"
+    assert told["trunk mass"] == "45.73 kg"
+    assert told["friction"] == "0.6"
+    assert told["stiffness K"] == "2000000 N/m^n"
+    for name in ("force on the hoof", "toe", "heel", "crank", "1 m of arrow"):
+        assert name in text
 
 
 # Pages that stand alone

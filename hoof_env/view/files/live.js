@@ -143,7 +143,8 @@ const value_of = (input) => (input.dataset.log != null ? 10 ** Number(input.valu
 function write_output(input, value = value_of(input)) {
   const output = input.closest(".slider")?.querySelector("output")
   if (output != null) {
-    const text = String(Number(value.toPrecision(4)))
+    const own = value * Number(input.dataset.scale ?? 1)
+    const text = String(Number(own.toPrecision(4)))
     output.textContent = `${text} ${input.dataset.unit ?? ""}`.trim()
     input.setAttribute("aria-valuetext", output.textContent)
   }
