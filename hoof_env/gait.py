@@ -258,7 +258,7 @@ def _read_gaits(preset: Preset) -> dict[str, Any]:
         )
     if not all(isinstance(name, str) for name in gaits):
         raise preset_error_type(preset)(
-            f"{preset_label(preset)}: gaits: expected names that are texts, got {brief([*gaits])}"
+            f"{preset_label(preset)}: gaits: expected names that are strings, got {brief([*gaits])}"
         )
     return dict(gaits)
 

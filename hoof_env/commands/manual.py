@@ -24,7 +24,8 @@ def manual(env_id: str = "hoof_env/HorseLeg-v0") -> None:
     width = shutil.get_terminal_size((110, 24)).columns
     module = f" (import {task.module})" if task.module else ""
     say(f"{env_id.rpartition(':')[2]}{module}: {summaries().get(env_id, task.summary)}")
-    say("\n".join(textwrap.wrap(f"Leg: {leg_of(task)}", width)))
+    lines = textwrap.wrap(f"Leg: {leg_of(task)}", width, break_long_words=False, break_on_hyphens=False)
+    say("\n".join(lines))
     for title, table in tables.items():
         say(f"\n{title}\n")
         say(terminal_table(table.head, [[without_links(cell) for cell in row] for row in table.rows], width))

@@ -157,8 +157,8 @@ class TrunkEngine:
         memory.check_limbs(trunk, legs, features.has_springs)
         if contact_law is not None and features.has_springs:
             raise ParameterError(
-                "contact_law: expected none beside springs of the hoofs, whose speed follows from a law that "
-                f"is linear in it, got {brief(contact_law)}"
+                "contact_law: expected none together with springs of the hooves, whose speed follows from a"
+                f" law that is linear in it, got {brief(contact_law)}"
             )
         ground = Ground() if ground is None else one_of("ground", ground, Ground)
         terrain = Terrain.flat() if terrain is None else one_of("terrain", terrain, Terrain)

@@ -99,7 +99,7 @@ class LimitedSpec(EnvSpec):
     limit never see 1.
     """
 
-    # Slots are no fields, which JSON would hold.
+    # Slots are not fields, so JSON does not hold them.
     __slots__ = ("dt", "own_limit", "times")
     own_limit: int
     dt: float

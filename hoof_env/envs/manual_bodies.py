@@ -68,7 +68,7 @@ class LegTables(BodyTables):
         return ("Num", "Rate of", "At -1", "At +1", "Unit", "Limits of the value"), rows
 
     def settings(self, s: Settings, words: Words, body: OneLeg) -> dict[str, tuple[str, str]]:
-        """Return the unit and meaning of all settings, by name; of rates that depend on the leg, also its own."""
+        """Return the unit and meaning of all settings, by name; for rates also the values of this leg."""
         found = {name: (unit, text) for name, (unit, text, _) in words.items()}
         if body.speed_scale != 1.0:
             for name, rate in zip(("crank_rate", "swing_rate"), body.rates, strict=False):

@@ -186,8 +186,8 @@ def open_loop_record(path: Path | str) -> dict[str, Any]:
                 raise TypeError(f"{name} {brief(record[name])}")
     except (OSError, ValueError, TypeError, KeyError, AttributeError) as error:
         raise DataFileError(
-            f"open-loop gait {path}: expected the JSON object of agents.open_loop with form and parameters:"
-            f" {getattr(error, 'strerror', None) or error}"
+            f"open-loop gait {path}: expected a JSON object as agents.open_loop writes it, with form and"
+            f" parameters: {getattr(error, 'strerror', None) or error}"
         ) from None
     if not isinstance(record.get("form"), str) or not record["form"].startswith((GAIT, "offsets")):
         raise DataFileError(

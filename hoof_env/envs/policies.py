@@ -95,8 +95,8 @@ def heading_seen(env: Any) -> Any:
     leg: Any = env.unwrapped
     if "gait" not in leg.settings.observation:
         raise ParameterError(
-            "policy: expected 'gait' among the observed groups, for a policy that goes to a gait must see the"
-            f" present one; got {brief(leg.settings.observation)}"
+            "policy: expected 'gait' among the observed groups, because a policy that goes to a gait must see"
+            f" the present one; got {brief(leg.settings.observation)}"
         )
     names = leg.observation_names
     first = names.index("crank speed")
@@ -111,8 +111,8 @@ def heading_seen(env: Any) -> Any:
         seen = np.asarray(observation, float)
         if not seen.ndim:
             raise ParameterError(
-                f"observation: expected what the environment returned, of shape (..., {len(names)}), for a"
-                f" policy that goes to a gait must see the present one; got {brief(observation)}"
+                f"observation: expected what the environment returned, of shape (..., {len(names)}), because"
+                f" a policy that goes to a gait must see the present one; got {brief(observation)}"
             )
         gait = body.middle + body.half * seen[..., first:middle]
         return gait + lead * rate_bounds * seen[..., middle:last]

@@ -50,14 +50,15 @@ def check_delay(name: str, given: Any, substeps: int, steps: int) -> Delay:
     if isinstance(given, (list, tuple)):
         low, high = check_range(name, given, 0.0, most)
         if low != round(low) or high != round(high):
-            raise ParameterError(f"{name}: expected whole numbers of a range, got {brief(given)}")
+            raise ParameterError(f"{name}: expected a range between whole numbers, got {brief(given)}")
         return Delay(round(low), round(high), 0)
     delay = check_number(name, given, low=0.0, high=most)
     whole = math.floor(delay + 1e-9)
     rest = (delay - whole) * substeps
     if abs(rest - round(rest)) > 1e-6:
         raise ParameterError(
-            f"{name}: expected whole substeps, of which a control step has {substeps}, got {brief(given)}"
+            f"{name}: expected a whole number of substeps, of which a control step has {substeps}, got"
+            f" {brief(given)}"
         )
     return Delay(whole, whole, round(rest))
 

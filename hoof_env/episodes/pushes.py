@@ -104,7 +104,7 @@ class Pushes:
         # Intervals shorter than a control step do no harm where nothing is pushed.
         seconds = check_range("push_seconds", s.push_seconds, dt if impulse else 0.0)
         if given and impulse:
-            raise ParameterError(f"pushes: expected none beside a push_impulse, got {brief(s.pushes)}")
+            raise ParameterError(f"pushes: expected none together with a push_impulse, got {brief(s.pushes)}")
         pushes = cls(given, impulse, seconds, s.trunk, dt, steps_per_episode)
         if impulse:
             pushes.check_trunk("push_impulse", upward=False)

@@ -23,7 +23,7 @@ def numbers_of(what: str, given: Any) -> dict[str, Any]:
     """Return the numbers, or lists of them, of a dataclass or mapping by name, as JSON can hold them."""
     found = asdict(given) if is_dataclass(given) and not isinstance(given, type) else given
     if not isinstance(found, Mapping) or not found:
-        raise ParameterError(f"{what}: expected numbers by name, got {brief(given)}")
+        raise ParameterError(f"{what}: expected a mapping of names to numbers, got {brief(given)}")
     check_names(what, found)
     return {
         name: [check_number(f"{what}[{name!r}][{k}]", part) for k, part in enumerate(value)]
@@ -37,7 +37,7 @@ def check_names(what: str, given: Mapping[Any, Any]) -> None:
     """Raise `ParameterError` unless all names are strings; a file would store any other name as a string."""
     for name in given:
         if not isinstance(name, str):
-            raise ParameterError(f"{what}: expected names that are texts, got {brief(name)}")
+            raise ParameterError(f"{what}: expected names that are strings, got {brief(name)}")
 
 
 MIN_LENGTH = 1e-3
@@ -70,7 +70,9 @@ def checked_path(given: Any, suffix: str) -> Path:
         ParameterError: no path, or a path with another suffix.
     """
     if not isinstance(given, (str, Path)):
-        raise ParameterError(f"path: expected the path of a file that ends in {suffix}, got {brief(given)}")
+        raise ParameterError(
+            f"path: expected the path of a file whose name ends in {suffix}, got {brief(given)}"
+        )
     path = Path(given)
     if path.suffix != suffix:
         raise ParameterError(f"path: expected a file that ends in {suffix}, got {brief(str(path))}")
@@ -111,7 +113,7 @@ def check_texts(texts: Mapping[str, Any]) -> None:
     """Raise `ParameterError` unless all values are strings."""
     for name, text in texts.items():
         if not isinstance(text, str):
-            raise ParameterError(f"{name}: expected a text, got {brief(text)}")
+            raise ParameterError(f"{name}: expected a string, got {brief(text)}")
 
 
 def checked_masses(given: Any, bodies: int) -> tuple[float, ...]:
@@ -145,7 +147,9 @@ def checked_pivot(given: Any, pivots: Sequence[str]) -> Any:
     elif len(pivots) == 1:
         given = {pivots[0]: given}
     else:
-        raise ParameterError(f"pivot: expected the places of {', '.join(pivots)} by name, got {brief(given)}")
+        raise ParameterError(
+            f"pivot: expected a mapping of {', '.join(pivots)} to their places, got {brief(given)}"
+        )
     places = {}
     for name in pivots:
         if count_of(given[name]) != 2:

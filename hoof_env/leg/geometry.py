@@ -313,7 +313,7 @@ def _preset_content(
         }
     if gaits is not None:
         if not isinstance(gaits, Mapping):
-            raise ParameterError(f"gaits: expected a mapping of gaits by name, got {brief(gaits)}")
+            raise ParameterError(f"gaits: expected a mapping of names to gaits, got {brief(gaits)}")
         check_names("gaits", gaits)
         content["gaits"] = {name: numbers_of(f"gaits[{name!r}]", gait) for name, gait in gaits.items()}
     return content

@@ -110,7 +110,7 @@ def _read_bodies(given: Any) -> dict[str, dict[str, Any]]:
             raise ParameterError(f"{where}: expected points that differ, got {', '.join([*ends, *points])}")
         role = keys.get("role", "")
         if not isinstance(role, str):
-            raise ParameterError(f"{where}.role: expected a text, got {brief(role)}")
+            raise ParameterError(f"{where}.role: expected a string, got {brief(role)}")
         length = _name(f"{where}.length", keys.get("length", name))
         bodies[name] = {
             "where": where,
@@ -184,7 +184,7 @@ def _measured(read: Mapping[str, Any], known: Mapping[str, None], distances: Any
     if length is None:
         apart = ", ".join(sorted("-".join(sorted(pair)) for pair in distances))
         raise ParameterError(
-            f"{read['where']}: {body.name!r} needs ends whose distance is a length of the list ({apart}), "
+            f"{read['where']}: {body.name!r} needs two ends whose distance is a length ({apart}), "
             f"got {brief(body.tail)} and {body.head!r}"
         )
     if length != body.length:
@@ -349,7 +349,7 @@ def _name(where: str, given: Any) -> str:
     # Names become columns of files, with these characters as separators.
     if not given.isprintable() or any(letter in given for letter in ',;"'):
         raise ParameterError(
-            f"{where}: expected a name that prints, without comma, semicolon and quotes, got {brief(given)}"
+            f"{where}: expected a printable name without commas, semicolons and quotes, got {brief(given)}"
         )
     return given
 

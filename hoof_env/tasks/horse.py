@@ -184,7 +184,7 @@ class Horse:
         self.size = checked_size(s.size)
         self.speed_scale = math.sqrt(self.size)
         if s.trunk != TRUNKS[FREE]:
-            raise ParameterError(f'trunk: expected "free" of a horse, got {brief(s.trunk)}')
+            raise ParameterError(f'trunk: expected "free" for a horse, got {brief(s.trunk)}')
         self.geometry = _leg_of(s.preset, self.size)
         self.height = HIP_HEIGHT * self.size
         self.hips: Hips = {f"{leg}_": (HIPS[leg.partition("_")[2]] * self.size, 0.0) for leg in LEGS}
@@ -249,7 +249,7 @@ class Horse:
         if s.hoof_stiffness is None:
             if s.hoof_damping is not None:
                 raise ParameterError(
-                    f"hoof_damping: expected a hoof_stiffness beside it, got {brief(s.hoof_damping)}"
+                    f"hoof_damping: expected a hoof_stiffness with it, got {brief(s.hoof_damping)}"
                 )
             return None
         stiffness = check_number("hoof_stiffness", s.hoof_stiffness, low=0, exclusive_low=True)

@@ -98,7 +98,7 @@ class Entry:
     def __post_init__(self) -> None:
         for text in (self.name, self.group):
             if not isinstance(text, str) or not text:
-                raise ParameterError(f"name and group: expected a text, got {brief(text)}")
+                raise ParameterError(f"name and group: expected a string, got {brief(text)}")
         constants = check_parts(f"{self.title}: constants", Constant, self.constants)
         object.__setattr__(self, "constants", constants)
         check_arguments(f"{self.title}: measure", self.measure, 1, constants)

@@ -137,7 +137,7 @@ def hoof_spring(settings: Settings) -> HoofSpring | None:
     damping = settings.hoof_damping
     if stiffness is None:
         if damping is not None:
-            raise ParameterError(f"hoof_damping: expected a hoof_stiffness beside it, got {brief(damping)}")
+            raise ParameterError(f"hoof_damping: expected a hoof_stiffness with it, got {brief(damping)}")
         return None
     check_number("hoof_stiffness", stiffness, low=0, exclusive_low=True)
     if damping is None:

@@ -159,7 +159,7 @@ class Term:
 
     def __post_init__(self) -> None:
         if not isinstance(self.name, str) or not self.name:
-            raise ParameterError(f"name: expected a text, got {brief(self.name)}")
+            raise ParameterError(f"name: expected a string, got {brief(self.name)}")
         check_number(f"{self.title}: weight", self.weight, low=0, high=1e6)
         # Without one the term is divided among all objectives.
         if self.objective is not None:

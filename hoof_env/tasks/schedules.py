@@ -101,7 +101,7 @@ def _ramp(name: str, given: Any, settings: Settings, body: Body) -> Ramp:
         raise ParameterError(f"{title}: expected [first, last, control steps], got {brief(given)}")
     steps = count(f"{title}, control steps", given[2], most=MAX_STEPS)
     if name in (settings.randomize or {}):
-        raise ParameterError(f"{title}: expected none beside randomize[{name!r}], got {brief(given)}")
+        raise ParameterError(f"{title}: expected none together with randomize[{name!r}], got {brief(given)}")
     first, last = (
         _range(name, f"{title}, {which}", value, settings, body)
         for which, value in zip(("first", "last"), given, strict=False)

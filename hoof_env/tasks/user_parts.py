@@ -108,12 +108,12 @@ class ActionMap:
 
     def __post_init__(self) -> None:
         if not isinstance(self.form, str) or not self.form or _is_reserved(self.form):
-            raise ParameterError(f"action_map: form: expected a text of its own, got {brief(self.form)}")
+            raise ParameterError(f"action_map: form: expected a name of its own, got {brief(self.form)}")
         # Kernels are looked up by a hash of their parts, and a mapping has none; a copy is made of pairs.
         pairs = tuple(self.actions.items()) if isinstance(self.actions, Mapping) else self.actions
         if not isinstance(pairs, tuple) or not pairs or not all(map(_is_text_by_name, pairs)):
             raise ParameterError(
-                f"{self.title}: actions: expected meanings by name, got {brief(self.actions)}"
+                f"{self.title}: actions: expected a mapping of names to meanings, got {brief(self.actions)}"
             )
         object.__setattr__(self, "actions", pairs)
         check_function(f"{self.title}: compute", self.compute, 2)
@@ -139,7 +139,7 @@ def check_parts(title: str, kind: type[Constant] | type[TermState], parts: Any) 
     names = [part.name for part in given if isinstance(part, kind)]
     if len(set(names)) < len(given):
         raise ParameterError(
-            f"{title}: expected a list of hoof_env.{kind.__name__}, names once, got {brief(parts)}"
+            f"{title}: expected a list of hoof_env.{kind.__name__}, each name once, got {brief(parts)}"
         )
     return given
 
