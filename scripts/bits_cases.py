@@ -424,14 +424,21 @@ def files() -> Cases:
         yield f"frames {env_id}", digests
 
 
+def options_of(*arguments: str) -> tuple[str, ...]:
+    """Arguments of a command line by the names that the commit has for its options."""
+    from hoof_env.commands.played import Episode
+
+    if hasattr(Episode, "env_id"):
+        return arguments
+    names = {"--env-id": "--id", "--env-kwargs": "--args"}
+    return tuple(names.get(word, word) for word in arguments)
+
+
 def cli(*arguments: str) -> str:
     """What the command line says, on stdout and stderr, and its exit code."""
     from hoof_env.cli import main
-    from hoof_env.commands.played import Episode
 
-    if not hasattr(Episode, "env_id"):  # a base whose options have other names
-        names = {"--env-id": "--id", "--env-kwargs": "--args"}
-        arguments = tuple(names.get(word, word) for word in arguments)
+    arguments = options_of(*arguments)
     said = io.StringIO()
     with contextlib.redirect_stdout(said), contextlib.redirect_stderr(said), warnings.catch_warnings():
         warnings.simplefilter("ignore")
@@ -469,7 +476,7 @@ def policies() -> Cases:
                 command("agents.evaluate", *options, "--episodes", "3")
             else:
                 options = (policy, "--env-id", env_id, "--out", str(scores))
-                command("hoof_env.cli", "evaluate", *options, "--episodes", "3")
+                command("hoof_env.cli", "evaluate", *options_of(*options), "--episodes", "3")
             found = json.loads(scores.read_text())
             digests = Digests()
             digests.add("episodes", [score["episodes"] for score in found["policies"].values()])
