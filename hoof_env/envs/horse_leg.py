@@ -69,7 +69,6 @@ class HorseLegEnv(LegBase, gym.Env[NDArray[np.float32], NDArray[np.float32]]):
     def _attach(self) -> None:
         """Collect what a step reads, writes or calls: looking it up costs as much as a substep."""
         batch, rows = self.batch, self.batch.rows
-        self._costs = batch.plan.costs.keys
         weighted = [(k, term) for k, term in enumerate(self.task.terms) if batch.plan.weights[term.name]]
         # Terms that can differ from 0 before the end of an episode; infos start with 0 for the rest.
         paid = [(term.key, k) for k, term in weighted if term.compute is not failure]
@@ -83,6 +82,7 @@ class HorseLegEnv(LegBase, gym.Env[NDArray[np.float32], NDArray[np.float32]]):
             rows.rewards.data,
             self._checked if batch.plan.observed.has_user_entries else rows.observations[0].copy,
             batch.measurements.reader(batch.engine.arrays[0][:, 0]),
+            batch.plan.costs.keys,
         )
 
     @property
@@ -133,7 +133,7 @@ class HorseLegEnv(LegBase, gym.Env[NDArray[np.float32], NDArray[np.float32]]):
             if self.render_mode == "human":
                 self.render()
         self._begin()
-        info = copy.deepcopy(self._begun[0]()) | {"measured": self._views[-1]()}
+        info = copy.deepcopy(self._begun[0]()) | {"measured": self._views[-2]()}
         if parameters:
             info["parameters"] = name_columns([values[0] for values in parameters.values()], [*parameters])
         return self._checked(), info
@@ -156,7 +156,7 @@ class HorseLegEnv(LegBase, gym.Env[NDArray[np.float32], NDArray[np.float32]]):
         if self._phase != "running":
             self._check_started("step")
             self._warn_ended()
-        buffer, kernel, held, draws, paid, terms, rewards, observe, measure = self._views
+        buffer, kernel, held, draws, paid, terms, rewards, observe, measure, costs = self._views
         # A copy from buffer to buffer is the fastest way; it takes float32 arrays of the right shape only.
         try:
             buffer[:] = action
@@ -165,7 +165,7 @@ class HorseLegEnv(LegBase, gym.Env[NDArray[np.float32], NDArray[np.float32]]):
         # not through the batch, unless kernels are looked into: a call costs as much as a substep
         happened = self.batch.calls.step(held) if BLOCKS else kernel(held)
         measured = measure()  # before a push that is due, which changes speeds at once
-        if self._costs:
+        if costs:
             self.batch.plan.costs.add(self.batch.rows, self.batch.engine)
         ended = happened != 0 and self._follow(happened)
         info = self._begun[0]()  # has all keys already, in the order of the reset's info
@@ -175,7 +175,7 @@ class HorseLegEnv(LegBase, gym.Env[NDArray[np.float32], NDArray[np.float32]]):
             info["parameters"] = info["parameters"].copy()  # callers may change their info
         for key, k in paid:
             info[key] = terms[k]
-        if self._costs:
+        if costs:
             info |= self._cost_info()
         failed = truncated = False
         if ended:
@@ -213,15 +213,15 @@ class HorseLegEnv(LegBase, gym.Env[NDArray[np.float32], NDArray[np.float32]]):
         if self.batch.plan.commands.speeds:
             info["target_speed"] = self.batch.rows.named.target[0]
         info |= {"measured": None, **dict.fromkeys(self.batch.terms, np.float64(0.0))}
-        if self._costs:
-            info |= dict.fromkeys(("cost", *self._costs), np.float64(0.0))
+        if keys := self.batch.plan.costs.keys:
+            info |= dict.fromkeys(("cost", *keys), np.float64(0.0))
         self._began_with = self._start_and_target()
         self._begun = (info.copy, gait.copy)
 
     def _cost_info(self) -> dict[str, Any]:
         """Return the costs of the last step by their keys in infos."""
         costs = self.batch.rows.costs[:, 0].copy()
-        return {"cost": costs.sum(), **dict(zip(self._costs, costs, strict=True))}
+        return {"cost": costs.sum(), **dict(zip(self.batch.plan.costs.keys, costs, strict=True))}
 
     def _start_and_target(self) -> tuple[bytes, float]:
         """Return the part of infos that no step measures, to notice when it changes."""
