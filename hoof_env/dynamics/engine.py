@@ -349,6 +349,14 @@ class TrunkEngine:
         with memory.only(envs, self.num_envs, arrays):
             yield
 
+    def snapshot(self) -> Any:
+        """Return a copy of everything that changes, for `restore`."""
+        return self._memory.data.copy()
+
+    def restore(self, snapshot: Any) -> None:
+        """Restore what `snapshot` returned of this engine, bit by bit, reports included."""
+        self._memory.data[:] = snapshot
+
     def observe_again(self, envs: NDArray[np.int64]) -> None:
         """Report the present state of environments whose report is still of the point at which their step
         failed."""

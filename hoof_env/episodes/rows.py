@@ -7,7 +7,7 @@ these declarations alone.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, fields
 from typing import Annotated, Any, NamedTuple, get_type_hints
 
@@ -110,12 +110,16 @@ class Rows:
         """Write all rows of an array, except idle columns."""
         self._used(name)[...] = values
 
-    def take(self, other: Rows) -> None:
-        """Write the arrays of other rows of this batch into these, at their addresses."""
-        for name in ARRAYS:
-            array = getattr(self, name)
-            if array is not None:
-                array[...] = getattr(other, name)
+    def snapshot(self) -> dict[str, NDArray[Any]]:
+        """Return copies of all arrays by name, for `restore`."""
+        return {
+            name: array.copy() for name, array in vars(self).items() if name in ARRAYS and array is not None
+        }
+
+    def restore(self, arrays: Mapping[str, NDArray[Any]]) -> None:
+        """Write what `snapshot` returned into the arrays, at their addresses."""
+        for name, values in arrays.items():
+            getattr(self, name)[...] = values
 
     def _used(self, name: str) -> NDArray[Any]:
         array: NDArray[Any] = getattr(self, name)
@@ -124,8 +128,7 @@ class Rows:
     def copy(self) -> Rows:
         """Return a copy with arrays of its own."""
         given = {item.name: getattr(self, item.name) for item in fields(self) if item.init}
-        arrays = {name: given[name] for name in ARRAYS if given[name] is not None}
-        return Rows(**{**given, **{name: array.copy() for name, array in arrays.items()}})
+        return Rows(**{**given, **self.snapshot()})
 
     def __getstate__(self) -> dict[str, Any]:
         """Return the fields for a pickle: without layout and views, whose classes are of one process. The

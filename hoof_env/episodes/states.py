@@ -91,14 +91,13 @@ def set_state(batch: EpisodeBatch, state: Mapping[str, Any]) -> None:
     row_plans = _read_row_plans(batch, state.get("rows"))
     if row_plans is not batch.row_plans:
         batch.put_under(row_plans)
-    memory, rows = batch.engine.arrays[0].copy(), batch.rows.copy()
+    engine, rows = batch.engine.snapshot(), batch.rows.snapshot()
     try:
         _set_state(batch, state)
-        _check_settings(state["engine"])
         _check_observed(batch)
     except BaseException:
-        batch.engine.arrays[0][:] = memory
-        batch.rows.take(rows)
+        batch.engine.restore(engine)
+        batch.rows.restore(rows)
         batch.row_plans, plan, batch.drawn_names, batch.rows.start_values = before
         batch.enter(plan)
         raise
@@ -114,10 +113,13 @@ def _check_settings(engine: Mapping[str, Any]) -> None:
     Raises:
         ParameterError: a mass is not positive, or a setting of a leg is beyond `MAX_SETTING`.
     """
-    masses = np.asarray(engine["trunk_settings"])[TrunkSettings.rows("total_mass")]
-    if not (masses > 0.0).all():
+    try:
+        masses = np.asarray(engine["trunk_settings"], np.float64)[TrunkSettings.rows("total_mass")]
+        largest = float(np.abs(np.asarray(engine["limb_settings"], np.float64)).max())
+    except (TypeError, ValueError, KeyError, IndexError):
+        return  # the engine says what is wrong
+    if (masses <= 0.0).any():
         raise ParameterError(f"state['trunk_settings']: expected positive masses, got {masses.min():g}")
-    largest = np.abs(engine["limb_settings"]).max()
     if largest > MAX_SETTING:
         raise ParameterError(
             f"state['limb_settings']: expected numbers within +-{MAX_SETTING:g}, got {largest:g}"
@@ -157,6 +159,7 @@ def _set_state(batch: EpisodeBatch, state: Mapping[str, Any]) -> None:
         seen.append("observations")
     observed = {name: _read_seen(batch, name, state.get(name)) for name in seen}
     steps_before = _read_steps(batch, state.get("steps_before"))
+    _check_settings(state["engine"])
     batch.engine.set_state(state["engine"])
     if not batch.engine.in_kernels:
         batch.under_each(np.arange(batch.num_envs), batch.engine.adopt)

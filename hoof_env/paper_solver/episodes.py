@@ -7,7 +7,7 @@ solves one environment after the other and is some ten thousand times slower.
 from __future__ import annotations
 
 import copy
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import astuple
 from typing import Any, ClassVar, NamedTuple
@@ -172,22 +172,37 @@ class PaperEngine(TrunkEngine):
                 memory.stride_sums[0, :, env] = [sums[name] for name in stride_sums()]
                 self._write(env)
 
+    def snapshot(self) -> Any:
+        """Return a copy of everything that changes, for `restore`."""
+        states = [leg.state.copy() for leg in self.legs]
+        own = [*self.legs], states, [*self.traces], self._accounts.copy(), self.apart.copy()
+        return super().snapshot(), own
+
+    def restore(self, snapshot: Any) -> None:
+        """Restore what `snapshot` returned of this engine."""
+        memory, own = snapshot
+        super().restore(memory)
+        self._restore(own, range(self.num_envs))
+
+    def _restore(self, own: Any, envs: Sequence[int]) -> None:
+        """Restore the solver's part of a snapshot in some environments."""
+        legs, states, traces, accounts, apart = own
+        for env in envs:
+            self.legs[env] = legs[env]
+            self.legs[env].state = states[env]
+            self.traces[env] = traces[env]
+            self._accounts[env] = accounts[env]
+            self.apart[env] = apart[env]
+
     @contextmanager
     def only(self, envs: NDArray[np.int64]) -> Iterator[None]:
         """Restore all environments but some after a block."""
-        rest = np.setdiff1d(np.arange(self.num_envs), envs).tolist()
-        states = {env: self.legs[env].state.copy() for env in rest}
-        traces = {env: self.traces[env] for env in rest}
-        accounts, apart = self._accounts.copy(), self.apart.copy()
+        _, own = self.snapshot()
         try:
             with super().only(envs):
                 yield
         finally:
-            for env in rest:
-                self.legs[env].state = states[env]
-                self.traces[env] = traces[env]
-            self._accounts[rest] = accounts[rest]
-            self.apart[rest] = apart[rest]
+            self._restore(own, np.setdiff1d(np.arange(self.num_envs), envs).tolist())
 
     def observe_again(self, envs: NDArray[np.int64]) -> None:
         """Leave the report as it is: a step that failed has not changed it."""

@@ -190,3 +190,19 @@ def test_rows_of_the_papers_solver_have_their_own_settings():
             assert rewards[row] == reward
             highest[row] = max(highest[row], env.record()["toe_normal"].max())
     assert 0.0 < highest[0] != highest[1] > 0.0
+
+
+def test_a_refused_state_leaves_the_papers_solver_where_it_was():
+    env = gym.make(FIXED, solver="paper", gait="run").unwrapped
+    env.reset(seed=0)
+    for _ in range(3):
+        env.step(np.zeros(4, np.float32))
+    twin, state = copy.deepcopy(env), env.get_state()
+    other = copy.deepcopy(state)
+    other["engine"]["last"]["crank_speed"] = np.nan  # found only by what is observed then
+    with pytest.raises(ParameterError, match=r"state: expected numbers of a motion .* is nan"):
+        env.set_state(other)
+    for _ in range(5):
+        one, same_one = env.step(np.ones(4, np.float32)), twin.step(np.ones(4, np.float32))
+        assert (one[0] == same_one[0]).all()
+        assert one[1] == same_one[1]
