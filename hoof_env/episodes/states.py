@@ -143,7 +143,7 @@ def _check_observed(batch: EpisodeBatch) -> None:
 
 def _set_state(batch: EpisodeBatch, state: Mapping[str, Any]) -> None:
     """Restore a state whose plans the batch is under."""
-    rows = batch.rows
+    rows, saved = batch.rows, batch.rows.saved()
     episode = _read_episode(batch, state["episode"])
     # States of older versions have no start values: infos then contain NaN.
     start_values = np.asarray(state.get("start_values", np.nan))
@@ -153,8 +153,8 @@ def _set_state(batch: EpisodeBatch, state: Mapping[str, Any]) -> None:
             f" {state['start_values']!r:.60}"
         )
     pushes = _read_pushes(batch, state.get("pushes"))
-    costs = {name: _read_costs(batch, name, state.get(name)) for name in COSTS if name in rows.saved()}
-    seen = [name for name in rows.saved() if name in ("frames", "past_actions")]
+    costs = {name: _read_costs(batch, name, state.get(name)) for name in COSTS if name in saved}
+    seen = [name for name in saved if name in ("frames", "past_actions")]
     if state.get("observations") is not None:
         seen.append("observations")
     observed = {name: _read_seen(batch, name, state.get(name)) for name in seen}
