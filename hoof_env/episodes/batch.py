@@ -386,7 +386,7 @@ class EpisodeBatch:
         else:
             happened = self._step()
         if self.plan.costs.limits:
-            self.plan.costs.add(self.rows, self.engine, idle)
+            self.plan.costs.add(self.rows, self.engine)
         # A step between two episodes does not count.
         if idle is not None:
             self.rows.named.steps[: self.num_envs][idle] -= 1.0

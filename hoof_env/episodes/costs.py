@@ -89,13 +89,13 @@ class Costs:
         rows.cost_sums[:, which] = 0.0
         rows.stance_rises[:, which] = 0.0
 
-    def add(self, rows: Rows, engine: TrunkEngine, idle: NDArray[np.bool_] | None = None) -> None:
-        """Compute the costs of a control step, after its kernel, and add them up.
+    def add(self, rows: Rows, engine: TrunkEngine) -> None:
+        """Compute the costs of a control step, after its kernel, and add them up. A row between two episodes
+        starts after it, without costs.
 
         Args:
             rows: rows of the batch.
             engine: engine of the batch.
-            idle: environments between two episodes, which have no costs.
         """
         n, legs = rows.num_envs, len(engine.limbs)
         memory = engine.arrays[0]
@@ -106,8 +106,6 @@ class Costs:
 
         highest = sums("highest_grf").max(axis=0)
         counts = ~broken(engine.results)  # a step that failed was taken back
-        if idle is not None:
-            counts &= ~idle
         for k, (name, limit) in enumerate(self.limits.items()):
             if name == "peak":
                 excess = np.maximum(highest - limit, rows.cost_sums[k])
