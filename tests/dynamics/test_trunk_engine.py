@@ -225,19 +225,24 @@ def check_instants(engine, horses):
         push = max(engine.weight, np.abs(now.hoof_force).max())
         turn = max(push, np.abs(now.crank_torque).max(), np.abs(now.hip_torque).max())
         quick = max(1.0, np.abs(now.theta_acc).max(), np.abs(now.phi_acc).max(), np.abs(now.trunk_acc).max())
-        # Forces and torques are right to their scale; a motor's crank turns them into accelerations by its
-        # inertia, which is small where the linkage transmits little.
-        cranks = np.abs(np.linalg.inv(now.mass_matrix))[len(horse.trunk_freedom) :].sum(1)
-        swift = max(quick, turn * cranks.max(initial=0.0))
+        # The acceleration of a motor's crank follows from torques by its inertia, each crank by its own.
+        swift = np.full(len(horse.motors), quick)
+        inverse = np.abs(np.linalg.inv(now.mass_matrix))[len(horse.trunk_freedom) :].sum(1)
+        swift[horse.motors] = np.maximum(quick, turn * inverse)
         fast = max(1.0, np.abs(s["crank_angle_rate"][:, e]).max())
         for name, found, expected, scale in (
             ("hoof", hoof, now.hoof, 1.0),
             ("force", force, now.hoof_force, push),
             ("trunk_acc", [r[k][e] for k in ("ax", "ay", "pitch_acceleration")], now.trunk_acc, quick),
-            ("crank_angle_acceleration", r["crank_angle_acceleration"][:, e], now.theta_acc, swift),
+            (
+                "crank_angle_acceleration",
+                r["crank_angle_acceleration"][:, e] / swift,
+                now.theta_acc / swift,
+                1.0,
+            ),
             ("swing_angle", r["swing_angle"][:, e], now.phi, 1.0),
             ("swing_angle_rate", r["swing_angle_rate"][:, e], now.phi_rate, fast),
-            ("swing_angle_acceleration", r["swing_angle_acceleration"][:, e], now.phi_acc, swift),
+            ("swing_angle_acceleration", r["swing_angle_acceleration"][:, e], now.phi_acc, quick),
             ("crank_torque", r["crank_torque"][:, e], now.crank_torque, turn),
             ("hip_torque", r["hip_torque"][:, e], now.hip_torque, turn),
             ("crank_power", r["crank_power"][:, e].sum(), now.power["crank"], turn * fast),
