@@ -3,6 +3,7 @@
 from dataclasses import replace
 
 import numpy as np
+import pytest
 from hypothesis import Phase, given, settings
 from hypothesis import strategies as st
 
@@ -140,6 +141,21 @@ def oracle(engine, horse, e):
     )
 
 
+def finer_tables(patch):
+    """Give engines tables of legs with four times as many cells.
+
+    The error of a table's derivatives is relative to their largest value in a turn. Where they are small, and
+    a motor without a rotor drives a crank of little inertia, an acceleration of the default table is off by
+    4e-8 rad/s^2, of one with twice as many cells by 4e-10: the tables' error, not the mechanics'.
+    """
+
+    def profile(geometry):
+        usual = leg_profile(geometry)
+        return usual.with_cells(4 * usual.cells)
+
+    patch.setattr("hoof_env.dynamics.engine.leg_profile", profile)
+
+
 def assert_close(found, expected, scale, name, rtol=1e-9):
     np.testing.assert_allclose(found, expected, rtol=0, atol=rtol * scale, err_msg=name)
 
@@ -158,9 +174,11 @@ def test_every_instant_is_d_alembert_s(legs, trunk, ground, terrain, depth, seed
     rng = np.random.default_rng(seed)
     theta, gait = rng.uniform(0, 6, len(legs)), np.tile((LOW + HIGH) / 2, (len(legs), 1))
     trunk = Trunk(**{**vars(trunk), "height": reach(legs, gait, theta) - depth})
-    engine = TrunkEngine(
-        legs, trunk, ground, terrain, substeps=1000, num_envs=STATES, filters=FilterSettings()
-    )
+    with pytest.MonkeyPatch.context() as patch:
+        finer_tables(patch)
+        engine = TrunkEngine(
+            legs, trunk, ground, terrain, substeps=1000, num_envs=STATES, filters=FilterSettings()
+        )
     put_somewhere(engine, rng, depth)
     check_instants(engine, [PlainHorse(trunk, legs, ground, terrain)] * STATES)
 
@@ -225,21 +243,12 @@ def check_instants(engine, horses):
         push = max(engine.weight, np.abs(now.hoof_force).max())
         turn = max(push, np.abs(now.crank_torque).max(), np.abs(now.hip_torque).max())
         quick = max(1.0, np.abs(now.theta_acc).max(), np.abs(now.phi_acc).max(), np.abs(now.trunk_acc).max())
-        # The acceleration of a motor's crank follows from torques by its inertia, each crank by its own.
-        swift = np.full(len(horse.motors), quick)
-        inverse = np.abs(np.linalg.inv(now.mass_matrix))[len(horse.trunk_freedom) :].sum(1)
-        swift[horse.motors] = np.maximum(quick, turn * inverse)
         fast = max(1.0, np.abs(s["crank_angle_rate"][:, e]).max())
         for name, found, expected, scale in (
             ("hoof", hoof, now.hoof, 1.0),
             ("force", force, now.hoof_force, push),
             ("trunk_acc", [r[k][e] for k in ("ax", "ay", "pitch_acceleration")], now.trunk_acc, quick),
-            (
-                "crank_angle_acceleration",
-                r["crank_angle_acceleration"][:, e] / swift,
-                now.theta_acc / swift,
-                1.0,
-            ),
+            ("crank_angle_acceleration", r["crank_angle_acceleration"][:, e], now.theta_acc, quick),
             ("swing_angle", r["swing_angle"][:, e], now.phi, 1.0),
             ("swing_angle_rate", r["swing_angle_rate"][:, e], now.phi_rate, fast),
             ("swing_angle_acceleration", r["swing_angle_acceleration"][:, e], now.phi_acc, quick),
