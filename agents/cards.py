@@ -19,10 +19,10 @@ from agents import runs
 from agents.command import parse, run
 from agents.pages import render_template
 from hoof_env.envs.policies import STANDS_FOR
-from hoof_env.envs.shipped import SHIPPED
 from hoof_env.errors import parse_json
 from hoof_env.evaluation.scores import METRICS, cell
 from hoof_env.evaluation.statistics import Interval
+from hoof_env.policies.catalogue import SHIPPED
 from hoof_env.policies.saved import WEIGHTS
 from hoof_env.records import surroundings
 from hoof_env.tasks.registry import TASKS

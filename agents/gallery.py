@@ -26,9 +26,9 @@ from agents.experiments.curves import TUNED, read_curves
 from agents.experiments.stock_page import at
 from docs._manual.results import RETURNS, STILL
 from hoof_env.envs.policies import STANDS_FOR
-from hoof_env.envs.shipped import shipped_returns
 from hoof_env.evaluation.episodes import FINAL_SEEDS, score_vector
 from hoof_env.evaluation.statistics import iqm
+from hoof_env.policies.catalogue import shipped_returns
 
 CUT = (27, 80, 413, 360)
 """Part of a film's frame that shows the animal: left, top, right, bottom [pixels]."""

@@ -41,11 +41,11 @@ from agents.ship import shown_command, write_index
 from hoof_env._output import markdown_table
 from hoof_env.envs.open_loop import check_blind, gait_file, open_loop_record
 from hoof_env.envs.policies import STANDS_FOR
-from hoof_env.envs.shipped import SHIPPED
 from hoof_env.errors import DataFileError, HoofEnvError, ParameterError, check_choice, parse_json
 from hoof_env.evaluation.episodes import FINAL_SEEDS, score_vector
 from hoof_env.evaluation.scores import METRICS
 from hoof_env.evaluation.statistics import estimate, iqm
+from hoof_env.policies.catalogue import SHIPPED
 from hoof_env.policies.find import find_policy, is_model, names_of, read_policy_record
 from hoof_env.policies.record import environment_of
 from hoof_env.policies.saved import ABOUT, FILE, WEIGHTS

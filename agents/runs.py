@@ -32,7 +32,7 @@ from numpy.typing import NDArray
 
 from hoof_env._collector import paused
 from hoof_env._output import check_folder, staged
-from hoof_env.envs.made import make_env as make_env
+from hoof_env.envs.make_env import make_env as make_env
 from hoof_env.errors import OutputError
 from hoof_env.evaluation.versions import PACKAGES as PACKAGES
 from hoof_env.evaluation.versions import versions as versions_of_packages

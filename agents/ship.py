@@ -33,13 +33,13 @@ from agents.export import write_policy
 from agents.pages import draw_learning_curve, training_length
 from hoof_env._output import check_folder, markdown_table, staged
 from hoof_env.envs.policies import STANDS_FOR
-from hoof_env.envs.shipped import SHIPPED
 from hoof_env.errors import DataFileError, OutputError, ParameterError, check_choice, parse_json
 from hoof_env.evaluation.episodes import FINAL_SEEDS as SCORE_SEEDS
 from hoof_env.evaluation.episodes import score_vector
 from hoof_env.evaluation.scores import Score, to_json
 from hoof_env.evaluation.statistics import Interval
 from hoof_env.film import render_episode
+from hoof_env.policies.catalogue import SHIPPED
 from hoof_env.policies.onnx_file import FILE, OnnxPolicy
 from hoof_env.policies.record import about, environment_of, own_id
 from hoof_env.policies.saved import ABOUT, WEIGHTS

@@ -16,14 +16,14 @@ from pathlib import Path
 
 from hoof_env._output import bear_any_output, check_arguments, flush_or_drop
 from hoof_env._version import __version__
+from hoof_env.commands.console import say as _say
+from hoof_env.commands.console import size as _size
+from hoof_env.commands.episode_args import USUAL, Played
 from hoof_env.commands.lab import average, compare
 from hoof_env.commands.leg import lengths
 from hoof_env.commands.manual import manual
 from hoof_env.commands.options import parse
-from hoof_env.commands.played import USUAL, Played
 from hoof_env.commands.policies import demo, evaluate, list_ids
-from hoof_env.commands.said import say as _say
-from hoof_env.commands.said import size as _size
 from hoof_env.errors import HoofEnvError, bounded, printable
 
 

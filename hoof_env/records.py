@@ -21,8 +21,8 @@ from numpy.typing import NDArray
 import hoof_env
 from hoof_env._input import as_path
 from hoof_env._output import check_folder, free_memory, staged
-from hoof_env.envs import made
 from hoof_env.envs.base import LegBase
+from hoof_env.envs.make_env import make_env as make_named_env
 from hoof_env.errors import (
     MissingExtraError,
     OutputError,
@@ -80,7 +80,7 @@ def make_env(env_id: str, arguments: Mapping[str, Any] | None = None) -> gym.Env
             f"render_mode: expected none, as recordings and films need no mode, got "
             f"{arguments['render_mode']!r}"
         )
-    env = made.make_env(env_id, **arguments)
+    env = make_named_env(env_id, **arguments)
     # Raises for environments of other packages, which record no substeps.
     surroundings(env)
     return env

@@ -426,7 +426,10 @@ def files() -> Cases:
 
 def options_of(*arguments: str) -> tuple[str, ...]:
     """Arguments of a command line by the names that the commit has for its options."""
-    from hoof_env.commands.played import Episode
+    try:
+        from hoof_env.commands.episode_args import Episode
+    except ModuleNotFoundError:
+        from hoof_env.commands.played import Episode  # the name before November 2026
 
     if hasattr(Episode, "env_id"):
         return arguments

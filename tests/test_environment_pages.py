@@ -13,9 +13,9 @@ import pytest
 
 from docs._manual import blocks, results, tables
 from docs._manual.__main__ import main
-from hoof_env.envs import shipped
 from hoof_env.envs.vector import HorseLegVectorEnv
 from hoof_env.errors import DataFileError
+from hoof_env.policies import catalogue
 from hoof_env.tasks import horse, leg_starts
 from hoof_env.tasks.horse_gaits import LEGS
 from hoof_env.tasks.observation import groups_of
@@ -96,7 +96,7 @@ def test_a_page_shows_its_film_and_the_returns_of_its_policy(name):
     table = results.returns(name)
     told = dict(zip(table.head, table.rows[0], strict=True))
     others = json.loads((POLICIES / "returns.json").read_text("utf-8"))[f"hoof_env/{name}-v0"]
-    assert told["shipped agent"] == f"{shipped.shipped_returns(f'{policy}-v0')['policy']:.3g}"
+    assert told["shipped agent"] == f"{catalogue.shipped_returns(f'{policy}-v0')['policy']:.3g}"
     assert told["random actions"] == f"{others['random']:.3g}"
     assert any("stock PPO" in title for title in told) == ("stock" in others)
     assert ("no curve" in TEXTS[name]) == ("stock" not in others)
@@ -105,7 +105,7 @@ def test_a_page_shows_its_film_and_the_returns_of_its_policy(name):
 def test_a_policy_without_scores_is_named(tmp_path, monkeypatch):
     (tmp_path / "HorseLeg-v0").mkdir()
     (tmp_path / "HorseLeg-v0" / "score.json").write_text("{}")
-    monkeypatch.setattr(shipped, "SHIPPED", tmp_path)
+    monkeypatch.setattr(catalogue, "SHIPPED", tmp_path)
     results.returns_of.cache_clear()
     with pytest.raises(DataFileError, match=r"score\.json"):
         results.returns("HorseLeg")

@@ -15,12 +15,12 @@ from hoof_env.constants import GRAVITY
 from hoof_env.dynamics.layout import TRUNK_STATE
 from hoof_env.envs.open_loop import GAITS, open_loop_record
 from hoof_env.envs.policies import make_policy, start_of
-from hoof_env.envs.shipped import SHIPPED
 from hoof_env.errors import parse_pairs
 from hoof_env.gait import PARAMETERS, load_gait
 from hoof_env.lab.opensim import MOT_COLUMNS
 from hoof_env.lab.read import read_record
 from hoof_env.leg.geometry import load_geometry
+from hoof_env.policies.catalogue import SHIPPED
 from hoof_env.records import (
     RECORD,
     default_policy,

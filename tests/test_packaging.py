@@ -13,7 +13,7 @@ from pathlib import Path
 import pytest
 
 import hoof_env
-from hoof_env.envs.shipped import summaries
+from hoof_env.policies.catalogue import summaries
 
 ROOT = Path(__file__).resolve().parent.parent
 HEAVY = {"llvmlite", "torch", "pygame", "matplotlib", "tyro", "stable_baselines3", "scipy"}

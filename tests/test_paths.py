@@ -9,7 +9,6 @@ import pytest
 import hoof_env
 from hoof_env import records
 from hoof_env.envs.open_loop import GAITS, load_open_loop, open_loop_record
-from hoof_env.envs.shipped import SHIPPED
 from hoof_env.errors import ParameterError
 from hoof_env.evaluation import scores
 from hoof_env.film import render_episode, write_film
@@ -17,6 +16,7 @@ from hoof_env.lab.average import average, write_table
 from hoof_env.lab.compare import compare
 from hoof_env.lab.picture import draw
 from hoof_env.lab.read import read_record
+from hoof_env.policies.catalogue import SHIPPED
 from hoof_env.policies.onnx_file import OnnxPolicy
 from hoof_env.policies.plain import NumpyPolicy, read_tensors
 from hoof_env.policies.record import read_record as read_run

@@ -12,8 +12,8 @@ from docs._manual.tables import WORDS, body_of, task
 from hoof_env.envs.horse_leg import HorseLegMOEnv
 from hoof_env.envs.manual import MULTI_OBJECTIVE, Table, observed
 from hoof_env.envs.policies import STANDS_FOR
-from hoof_env.envs.shipped import shipped_returns
 from hoof_env.errors import DataFileError
+from hoof_env.policies.catalogue import shipped_returns
 from hoof_env.tasks.registry import TASKS
 
 POLICIES = Path(__file__).parents[2] / "agents" / "policies"

@@ -8,7 +8,7 @@ from typing import Annotated
 
 from tyro.conf import Positional, arg
 
-from hoof_env.commands.said import say, size
+from hoof_env.commands.console import say, size
 from hoof_env.errors import HoofEnvError
 
 

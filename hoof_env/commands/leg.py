@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from hoof_env.commands.said import say
+from hoof_env.commands.console import say
 
 
 def lengths(preset: str | None = None) -> None:

@@ -7,7 +7,7 @@ import shutil
 import textwrap
 
 from hoof_env._output import terminal_table
-from hoof_env.commands.said import say
+from hoof_env.commands.console import say
 
 
 def manual(env_id: str = "hoof_env/HorseLeg-v0") -> None:
@@ -17,7 +17,7 @@ def manual(env_id: str = "hoof_env/HorseLeg-v0") -> None:
         env_id: id of the environment; one of your own may be module:id.
     """
     from hoof_env.envs.manual import leg_of, tables_of, task_of_id
-    from hoof_env.envs.shipped import summaries
+    from hoof_env.policies.catalogue import summaries
 
     tables = tables_of(env_id)
     task = task_of_id(env_id)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from importlib.util import find_spec
 from pathlib import Path
 
-from hoof_env.commands.said import say, size
+from hoof_env.commands.console import say, size
 from hoof_env.errors import ParameterError, brief, parse_pairs
 
 EXTRAS = {
@@ -75,7 +75,7 @@ def list_ids(env_id: str | None = None) -> None:
     Args:
         env_id: only this environment, with the names of its scripted policies.
     """
-    from hoof_env.envs.shipped import good_returns, summaries
+    from hoof_env.policies.catalogue import good_returns, summaries
     from hoof_env.policies.find import names_of, shipped_policy
 
     known = summaries()
@@ -96,7 +96,7 @@ def list_ids(env_id: str | None = None) -> None:
             "next: hoof-env evaluate shipped open-loop run, or hoof-env list --env-id ENV_ID for its policies"
         )
         return
-    from hoof_env.envs.made import make_env
+    from hoof_env.envs.make_env import make_env
 
     with make_env(env_id) as env:
         say(f"    policies: {', '.join(names_of(env))}")

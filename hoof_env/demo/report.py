@@ -8,12 +8,12 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from hoof_env.envs.shipped import shipped_returns
 from hoof_env.errors import MissingExtraError
 from hoof_env.evaluation.scores import METRICS, Score, cell
 from hoof_env.paper.report import format_error, format_number
 from hoof_env.paper.reproduce import GAITS, SOLVERS
 from hoof_env.paper.rows import NOT_DETERMINABLE, OURS, Reproduction
+from hoof_env.policies.catalogue import shipped_returns
 
 OPEN_LOOP = "open-loop"
 TEMPLATE = Path(__file__).with_name("report.html.j2")

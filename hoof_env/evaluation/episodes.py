@@ -14,7 +14,7 @@ from typing import Any
 import gymnasium as gym
 import numpy as np
 
-from hoof_env.envs.made import make_env
+from hoof_env.envs.make_env import make_env
 from hoof_env.envs.vector import HorseLegVectorEnv
 from hoof_env.policies.actor import Actor
 from hoof_env.policies.find import find_policy, load_policy

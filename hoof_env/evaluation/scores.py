@@ -23,7 +23,7 @@ import gymnasium as gym
 from hoof_env._input import as_path
 from hoof_env._output import markdown_table, staged
 from hoof_env._version import __version__
-from hoof_env.envs.made import make_env
+from hoof_env.envs.make_env import make_env
 from hoof_env.errors import DataFileError, ParameterError, count
 from hoof_env.evaluation.episodes import FINAL_SEEDS, play, score_vector
 from hoof_env.evaluation.statistics import (

@@ -17,9 +17,9 @@ import numpy as np
 from hoof_env._input import as_path
 from hoof_env.envs.open_loop import load_open_loop, open_loop_record
 from hoof_env.envs.policies import constant_gait, make_policy, policy_names
-from hoof_env.envs.shipped import SHIPPED
 from hoof_env.errors import DataFileError, MissingExtraError, ParameterError, brief, count
 from hoof_env.gait import PARAMETERS, GaitParameters
+from hoof_env.policies.catalogue import SHIPPED
 from hoof_env.policies.onnx_file import FILE, OnnxPolicy
 from hoof_env.policies.plain import ABOUT, NumpyPolicy
 from hoof_env.policies.record import describe_spaces, own_id, refuse_misfit, same_id

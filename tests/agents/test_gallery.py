@@ -8,7 +8,7 @@ from agents import gallery
 from agents.experiments.curves import COLUMNS, TUNED, read_curves
 from agents.experiments.plans import LEG
 from docs._manual.results import RETURNS, learning
-from hoof_env.envs.shipped import shipped_returns
+from hoof_env.policies.catalogue import shipped_returns
 
 RAIL = "hoof_env/HorseLegRail-v0"
 

@@ -17,9 +17,9 @@ if not os.environ.get("CI"):  # which installs it, so that nothing may be left o
 
 from agents import cards, ship
 from agents.runs import SavedModel, make_env
-from hoof_env.envs.shipped import SHIPPED as DATA
 from hoof_env.errors import DataFileError, ParameterError
 from hoof_env.evaluation.episodes import score_vector
+from hoof_env.policies.catalogue import SHIPPED as DATA
 from hoof_env.policies.onnx_file import OnnxPolicy
 from tests.agents.conftest import train_tiny
 

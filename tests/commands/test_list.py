@@ -7,7 +7,7 @@ import pytest
 
 from hoof_env import cli
 from hoof_env.commands.policies import EXTRAS
-from hoof_env.envs.shipped import SHOWN, shipped_returns
+from hoof_env.policies.catalogue import SHOWN, shipped_returns
 
 
 def test_every_id_has_its_lines_with_the_returns_of_its_policies(capsys):
