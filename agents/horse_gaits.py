@@ -338,8 +338,8 @@ def trunk_series(gait: list[float], speed: float) -> list[list[float]]:
     """Return the motion of the trunk in a gait that keeps a speed [m/s], as `reference.trunk_motion` reads
     it.
 
-    These are height over that of the hips [-], speed over its mean [-] and pitch [rad]: of each the mean, and
-    cosine and sine coefficients of `HARMONICS` harmonics of half a stride.
+    These are height divided by the hips' [-], speed divided by its mean [-] and pitch [rad]: of each the
+    mean, and cosine and sine coefficients of `HARMONICS` harmonics of half a stride.
     """
     course = BatchRollout(speed, 64, episode_seconds=2 * SECONDS)
     envs = course.envs

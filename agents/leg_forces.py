@@ -5,7 +5,7 @@
 
 The suspension is the spring, the damper and the constant force that stand for the animal's other legs. Its
 force follows from the motion of the trunk and the settings of the environment; the test checks it against
-the momentum of all bodies. Forces are over the weight of trunk and leg, positive upward, and count from
+the momentum of all bodies. Forces are divided by the weight of trunk and leg, positive upward, and count from
 `SETTLED` on; the heat of the damper, the work of the drives and depths are of the whole episode.
 Intervals are for the mean over the episodes of one policy and do not cover other trainings.
 """

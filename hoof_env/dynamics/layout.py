@@ -261,14 +261,16 @@ class StrideSums(Layout):
         Row, Quantity("J", "of both drives in the control step; braking is not recovered")
     ]
     normal_impulse: Annotated[
-        Row, Quantity("N s", "normal force integrated over the control step; over `dt` its mean [N]")
+        Row, Quantity("N s", "normal force integrated over the control step; divided by `dt`, its mean [N]")
     ]
     loaded_time: Annotated[Row, Quantity("s", "part of the control step with load on the hoof")]
     stances: Annotated[Row, Quantity("-", "stances that began in the control step")]
     travel: Annotated[
         Row, Quantity("m", "load-weighted backward travel of the hoof along the ground in the control step")
     ]
-    slip: Annotated[Row, Quantity("m", "way that the hoof slid in stance in the control step, to and fro")]
+    slip: Annotated[
+        Row, Quantity("m", "distance that the hoof slid in stance in the control step, in both directions")
+    ]
     braking: Annotated[Row, LIMITED, Quantity("N s", "impulse of the ground backward in the control step")]
     propulsion: Annotated[Row, LIMITED, Quantity("N s", "impulse of the ground forward in the control step")]
 
@@ -289,14 +291,14 @@ class LegSettings(Layout):
     lift_off: Row  # normal force that tells stance from swing [N]
     hoof_stiffness: Annotated[Block, SPRING]  # of the hoof's springs, normal and tangential [N/m]
     hoof_damping: Annotated[Block, SPRING]  # [N s/m]
-    length_scale: Annotated[Block, LIMITED]  # of this leg over that of the table [-]
+    length_scale: Annotated[Block, LIMITED]  # ratio to the length in the table [-]
     mass_scale: Annotated[Block, LIMITED]  # [-]
 
 
 class Contact(Layout):
     """A hoof point on the ground, at the present stage."""
 
-    penetration: Row  # of the ground; with a spring less than that of the leg's point [m]
+    penetration: Row  # of the ground, less than of the leg's point with a spring [m]
     penetration_rate: Row  # [m/s]
     deflection: Annotated[Block, SPRING]  # of the spring at the present stage [m]
     deflection_rate: Annotated[Block, SPRING]  # [m/s]

@@ -86,7 +86,7 @@ def constants_layout(structure: Structure) -> type[LegConstants]:
     mechanism = structure.mechanism
     fields: dict[str, Any] = get_type_hints(LegConstants, include_extras=True)
     fields |= {f"pivot_{name}": Vector for name in mechanism.pivots}  # from O [m]
-    # from the toe, over that of the heel from the toe [-]
+    # from the toe, in lengths from toe to heel [-]
     fields |= {f"sole_{name}": Vector for name in mechanism.sole}
     for step in mechanism.steps:
         kind: Any = Vector

@@ -7,8 +7,8 @@ horse of 349 kg walks with restitution 0.5, midpoint, sim_dt = 1 ms, 24 starts o
 to 2e-4 and 2e-6 of the work from 5 and 20 substeps on; with the third it misses 20 % still with 100, and with
 1 and 2 some starts end as NOT_FINITE.
 
-A servo decays with its gain over the inertia of its crank. With gains of 1e3 to 1e4 N m s/rad a crank in the
-air follows its command in all schemes at twice the limit here; from 2.6 times on some diverge.
+A servo decays at the rate of its gain divided by the inertia of its crank. With gains of 1e3 to 1e4 N m s/rad
+a crank in the air follows its command in all schemes at twice the limit here; from 2.6 times on some diverge.
 """
 
 from __future__ import annotations
@@ -47,7 +47,7 @@ CAUSES = {
     "support": "spring, damper or drag of the trunk",
 }
 """Sentence for each cause that the choice of substeps obeys. "friction" is not one: past its limit a standing
-hoof slides to and fro, but the motion does not diverge."""
+hoof slides back and forth, but the motion does not diverge."""
 
 MAX_NEEDED = 10**12
 """Largest number of substeps of a step that settings may need; beyond it they are refused."""

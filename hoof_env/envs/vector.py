@@ -152,7 +152,7 @@ class HorseLegVectorEnv(LegBase, VectorEnv[NDArray[np.float32], NDArray[np.float
         task, settings: arguments of `HorseLegEnv`.
         autoreset_mode: an `AutoresetMode`, its name or its value: NEXT_STEP, SAME_STEP or DISABLED.
         max_episode_steps: largest number of control steps of an episode, as of Gymnasium's TimeLimit; at most
-            `episode_seconds` over `dt`. None for `episode_seconds` alone.
+            `episode_seconds / dt`. None for `episode_seconds` alone.
         render_mode: "rgb_array"; `render` returns a picture of each environment.
         rendered: number of environments that are drawn, the first ones; pictures of the rest are black.
             None draws all, if they are at most `MAX_DRAWN`.

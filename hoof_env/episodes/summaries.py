@@ -33,10 +33,10 @@ SUMMARY = {
         "steepest rise of the normal force in a stance while its peak grew, mean of all stances",
     ),
     "duty_factor": ("-", "part of the time with load on the hoof, mean of all legs"),
-    "slip_m": ("m", "way that hooves slide in a stance, to and fro, mean of all stances"),
+    "slip_m": ("m", "distance that hooves slide in a stance, in both directions, mean of all stances"),
     "positive_work_j": ("J", "positive work of both drives"),
     "cost_of_transport": ("-", "work per weight and distance; infinite without forward progress"),
-    "weight_share": ("-", "mean normal force over weight: what the leg bore"),
+    "weight_share": ("-", "mean normal force divided by the weight: the share of it that the leg bore"),
     "support_share": (
         "-",
         "the rest, which rail or suspension bore: a mean, for a suspension also pulls",

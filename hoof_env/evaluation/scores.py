@@ -84,8 +84,8 @@ class Score:
 
     @cached_property
     def estimates(self) -> dict[str, Interval]:
-        """Means and intervals by key of `METRICS`, those that the episodes have; the cost of transport is
-        that of all episodes together, as in every table."""
+        """Means and intervals of the `METRICS` that the episodes have, by key; the cost of transport is of
+        all episodes together, as in every table."""
         found = {}
         for key in METRICS:
             if key == "cost_of_transport" and all(name in self.episodes[0] for name in TRANSPORT):

@@ -34,8 +34,8 @@ FIGURES = (
 """Figures in the means that `mean_figures` gives."""
 
 TRANSPORT = ("distance_m", "positive_work_j", "mean_normal_n", "weight_share")
-"""Figures from which the cost of transport over several episodes is computed; the force over the share is the
-weight."""
+"""Figures from which the cost of transport over several episodes is computed; the force divided by
+the share is the weight."""
 
 PUBLISHED = tuple(dict.fromkeys((*FIGURES, *TRANSPORT)))
 """Figures of an episode from which all figures over several are computed."""

@@ -135,7 +135,8 @@ AMBROSIO, THRELFALL, TANH = range(3)
 
 
 def friction_part(speed: Real, law: int, slow: Real, fast: Real) -> Real:
-    """Return the friction coefficient over its kinetic value, mu(|v|) / mu_k [-], 0 to 1; 0 at rest.
+    """Return the ratio of the friction coefficient to its kinetic value, mu(|v|) / mu_k [-], 0 to 1; 0 at
+    rest.
 
     Speeds are |v| and the thresholds of `Ground` [m/s]; `law`, an index into `FRICTION_LAWS`, is the same in
     all lanes. Ambrosio: c_d = 0 below `slow`, 1 above `fast`, linear between. Threlfall: 1 - exp(-3 |v| / v0)

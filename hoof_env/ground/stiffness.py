@@ -6,10 +6,10 @@ slope of its law times F / m: between the threshold speeds, a few millimetres a 
 zero to its full value, which makes it the fastest of the three under a light hoof.
 
 The spring decides on accuracy. tests/ground/test_stiffness.py drops a mass on the contact of Eq. 14 and
-measures the error e of its state after it has left, the larger of the error of the speed over the touch-down
-speed and the error of the place over the deepest penetration, against an adaptive scheme of eighth order.
-For n from 1 to 3, chi from 0 to 3, weights up to 0.3 of the peak force, steps h w of 0.025 to 0.4 and 16
-places of the touch-down within a step, all errors obey one law:
+measures the error e of its state after it has left, the larger of the errors of the speed, relative to the
+touch-down speed, and of the place, relative to the deepest penetration, against an adaptive scheme of eighth
+order. For n from 1 to 3, chi from 0 to 3, weights up to 0.3 of the peak force, steps h w of 0.025 to 0.4 and
+16 places of the touch-down within a step, all errors obey one law:
 
     e < C (h w)^p,   p = min(order, n + 1),
 
@@ -24,7 +24,7 @@ friction needs no sliding speed.
 
 Damping and friction decay: explicit schemes are stable up to h rate = 2 (Euler, midpoint), 2.51 (third order)
 and 2.79 (RK4), and half of that is the limit here. Past its limit friction does not diverge, because its
-force is bounded, but leaves the point sliding to and fro with a speed of up to some 1.5 mu F h / m.
+force is bounded, but leaves the point sliding back and forth with a speed of up to some 1.5 mu F h / m.
 """
 
 from __future__ import annotations

@@ -23,7 +23,7 @@ MIN_STANCE_SECONDS = 0.02
 """Shortest stance, and shortest gap between stances [s]."""
 
 NEAR_BEST_RATIO = 1.1
-"""Largest difference of a shift that counts as near the best, over the least difference."""
+"""Largest ratio of a shift's difference to the least one at which the shift counts as near the best."""
 
 MAX_SHIFTS = 400
 """Largest number of shifts between touchdowns that are tried."""
@@ -36,8 +36,8 @@ MIN_STRIDES = 2
 """Least number of strides in the overlap of records that began at different times."""
 
 CLEAR_SHARE = 1 / 3
-"""Difference of such records over the difference of strides from the next one, below which they have the same
-strides."""
+"""Ratio of the difference of such records to the difference of strides from the next one, below which they
+have the same strides."""
 
 MAX_PERIOD_RATIO = 1.1
 """Largest ratio of stride periods at which stances are paired by their times."""

@@ -54,8 +54,8 @@ class Dyad:
 class BodyPoint:
     """A point of a body, by its coordinates from the body's end `origin`.
 
-    The axis along points from `origin` to the other end `toward`, across to the left of it. A coordinate is
-    the name of a length, a leading "-" reverses it, "" is 0.
+    The axis "along" points from `origin` to the other end, `toward`. The axis "across" points to its left.
+    Each coordinate is the name of a length: a leading "-" reverses it, and "" is 0.
     """
 
     point: str
@@ -98,9 +98,9 @@ class Joint:
 
 @dataclass(frozen=True)
 class Group:
-    """The two rigid parts that meet in a dyad's point; bodies that are welded together are one part.
+    """The two rigid parts that meet in a dyad's point. Bodies that are welded together are one part.
 
-    `one` holds the dyad's first point, `two` its second; both are numbers of bodies.
+    Numbers of the bodies of each part: `one` has the dyad's first point, `two` its second.
     """
 
     dyad: Dyad
@@ -110,15 +110,15 @@ class Group:
 
 @dataclass(frozen=True)
 class Mechanism:
-    """The structure of a leg: a closed linkage with one degree of freedom, that of its crank.
+    """The structure of a leg: a closed linkage whose one degree of freedom is its crank's.
 
     Attributes:
         fixed: points of the leg's frame; the first is the centre of the crank.
         pin: the point at which the crank carries the linkage.
         crank_length: name of the crank's length.
         steps: construction of each further point from points before it.
-        bodies, joints, welds: of Eq. 2 in the order of its rows; a weld holds two bodies, which share a
-            joint, in one orientation.
+        bodies, joints, welds: in the order of the rows of Eq. 2. A weld fixes the relative angle of two
+            bodies that share a joint.
         feet: points that touch the ground, one or two.
     """
 

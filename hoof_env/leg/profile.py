@@ -163,7 +163,7 @@ class LegProfile:
             functions with derivatives and then of the remaining ones. Of a crank that rocks, rows are NaN
             where its links have no place, and within about a degree of each end, because derivatives are
             unbounded there.
-        derivative_error: largest error of a derivative over its largest value, between the nodes [-].
+        derivative_error: largest error of a derivative, relative to its largest value, between the nodes [-].
 
     Raises:
         ParameterError: not a leg, or not a number of cells.
@@ -218,8 +218,8 @@ class LegProfile:
         return bool((np.abs(slope - exact) / np.abs(exact).max(0)).max() >= 2 * DERIVATIVE_ERROR)
 
     def _errors(self) -> NDArray[np.float64]:
-        """Return the largest error of a derivative in each cell over its largest value [-], NaN without a
-        place."""
+        """Return the largest error of a derivative in each cell, relative to its largest value [-]; NaN
+        without a place."""
         theta = (np.arange(self.cells)[:, None] + BETWEEN).ravel() * (2 * np.pi / self.cells)
         slope = self(theta)[1]
         known = np.isfinite(slope[:, 0])

@@ -179,7 +179,7 @@ def names_of(env: gym.Env[Any, Any]) -> list[str]:
 
 
 def default_policy(env: gym.Env[Any, Any]) -> str:
-    """Return the name of the policy that plays if none is named."""
+    """Return the name of the policy to play if none is named."""
     names = policy_names(env)
     return next((name for name in ("reference", "run") if name in names), names[0])
 

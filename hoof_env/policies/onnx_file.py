@@ -91,7 +91,7 @@ class OnnxPolicy(FilePolicy):
         """Read the names and the types of input and output; raise ValueError where they, or the metadata, are
         none of a policy."""
         if not self.record.get("env_id"):
-            raise ValueError("its metadata name no environment; hoof_env.stamp_onnx(path, env) adds them")
+            raise ValueError("its metadata names no environment; hoof_env.stamp_onnx(path, env) adds them")
         inputs = self._session.get_inputs()
         names = [node.name for node in self._session.get_outputs()]
         if len(inputs) != 1 or len(inputs[0].shape) != 2 or inputs[0].type not in NUMBERS:
@@ -174,11 +174,11 @@ def stamp_onnx(path: str | Path, env: gym.Env[Any, Any], **record: str) -> OnnxP
             f" {brief(env)}"
         )
     if not isinstance(path, (str, Path)) or Path(path).suffix.lower() != ".onnx":
-        raise ParameterError(f"path: expected that of a file that ends in .onnx, got {brief(path)}")
+        raise ParameterError(f"path: expected a file name ending in .onnx, got {brief(path)}")
     file = Path(path)
     known = about(env, env.spec.id, arguments_of(env), {})
     if taken := sorted(known.keys() & record):
-        raise ParameterError(f"record: expected entries besides those that are read off env, got {taken}")
+        raise ParameterError(f"record: expected no entry that is read off env, got {taken}")
     for key, value in record.items():
         if not isinstance(value, str):
             raise ParameterError(f'{key}: expected a text, as in seed="3", got {brief(value)}')
@@ -226,8 +226,8 @@ def check_answers(policy: OnnxPolicy, env: gym.Env[Any, Any]) -> None:
         made = env.spec.id if env.spec else repr(env)
         raise DataFileError(
             f"policy {policy.path}: expected a graph that takes the {seen.shape[-1]} observations of {made},"
-            f" got one that takes {policy.size}; make the environment with the id and the arguments of the"
-            " training"
+            f" got one that takes {policy.size}; make the environment with the id and the arguments"
+            " used in training"
         )
     try:
         actions, _ = policy.predict(seen)

@@ -11,7 +11,7 @@ import pygame
 
 from hoof_env.render.colours import Colour
 
-FINE = 2  # resolution of smooth painting over that of the picture
+FINE = 2  # resolution of smooth painting / resolution of the picture
 LEAST_LETTERS = 10  # least size of letters, whatever the size of the picture [pixels]
 
 Position = tuple[float, float]

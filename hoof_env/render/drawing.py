@@ -98,7 +98,7 @@ class Drawing:
         has_heel: False for legs with one foot, which is called toe.
         full_scale: force of an arrow of `ARROW_M` at a leg of a horse's size [N].
         low, high, half_width: the camera's view around its place [m].
-        size, girth: size of trunk and arrows, and of legs, over their usual size [-].
+        size, girth: size of trunk and arrows, and of legs, relative to the usual one [-].
         weights, far, trunk_parts: full scale relative to the weight [-], legs behind the trunk, parts of
             the trunk.
     """

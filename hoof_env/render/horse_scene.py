@@ -28,7 +28,7 @@ WIDE_M = (1.75, 2.25)
 
 SOIL_M = 0.45
 """Visible depth below the ground [m]."""
-ARROW_SHARE = 0.75  # length of a full-scale arrow over that of one leg's scene, at the usual hips [-]
+ARROW_SHARE = 0.75  # length of a full-scale arrow / one leg's scene's, at the usual hips [-]
 
 
 class HorseScene(LegScene):

@@ -19,7 +19,7 @@ USUAL_HIP_M = 1.5
 
 AROUND_M = np.linspace(-1.5, 1.5, 31)  # places about O, whose mean ground is the camera's level [m]
 ARROW_M = 1.3  # length of an arrow of the full scale, drawn in full size [m]
-MIN_FORCE_SHARE = 0.004  # least drawn force over the full scale [-]
+MIN_FORCE_SHARE = 0.004  # least drawn force / full scale [-]
 HOLD_M = 0.1  # height above the trunk of the rail or plate that holds it [m]
 HORN_SHARE = 0.45  # part of the hoof triangle, from the sole up, that is horn; above it is the pastern [-]
 

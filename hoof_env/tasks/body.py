@@ -89,7 +89,7 @@ class Body(Protocol):
         """Make trunk, ground and legs from settings of `parameters.resolved`."""
 
     def scale_of(self, name: str) -> float:
-        """Return the body's own value of a setting over the value of the setting, 1 for most."""
+        """Return the ratio of the body's own value of a setting to the setting's value, 1 for most."""
 
     def commanded_speeds(self, s: Settings) -> tuple[float, float] | None:
         """Return the lowest and highest commanded speed [m/s]; None if no speed is commanded."""

@@ -36,7 +36,7 @@ class Episode(Layout):
 
     # Saved states hold these rows: with another row, or another order, older states are not readable.
     steps: Row  # control steps so far
-    allowance: Row  # impulse over the weight that bearing is still paid for [s]; see `reward.BEARING`
+    allowance: Row  # impulse / weight that bearing is still paid for [s]; see `reward.BEARING`
     x_before: Row  # x of the trunk before this step [m]
     target: Row  # commanded speed [m/s]; infinite without a command
     weight: Row  # weight of trunk and leg [N]

@@ -209,7 +209,7 @@ class Horse:
         )
 
     def scale_of(self, name: str) -> float:
-        """Return the animal's own value of a setting over its value at size 1, see `POWERS`."""
+        """Return the ratio of the animal's own value of a setting to its value at size 1, see `POWERS`."""
         return float(self.size ** POWERS.get(name, 0))
 
     def parts(self, s: ResolvedSettings) -> tuple[Trunk, Ground, tuple[Limb, ...]]:

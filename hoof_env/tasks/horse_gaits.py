@@ -61,7 +61,7 @@ LIMITS = {
     "swing_sin_2": WIDEST["higher"],
     "swing_cos_2": WIDEST["higher"],
 }
-"""Lowest and highest value of each number of a pair: a harmonic of the crank's speed over its mean [-], and
+"""Lowest and highest value of each number of a pair: a harmonic of the crank's speed / its mean [-], and
 offset and two harmonics of the swing [rad]."""
 
 PAIR = tuple(LIMITS)
@@ -251,8 +251,9 @@ def trunk_motion(speeds: Floats, phase: Floats) -> dict[str, Floats]:
     """Return the motion of the trunk of a horse of 475 kg in its reference gaits, from simulation, for speeds
     of the gaits [m/s] and phases of the stride [strides], shape (n,).
 
-    The values are "y" over the height of the hips [-] and its rate "vy" over the rate of the crank [1/rad],
-    "vx" over the speed [-], "pitch" [rad] and "pitch_rate" over the rate of the crank [-], shape (n,) each.
+    The values are "y" divided by the height of the hips [-], its rate "vy" divided by the crank's rate as
+    well [1/rad], "vx" divided by the speed [-], "pitch" [rad], and "pitch_rate" divided by the crank's rate
+    [-], shape (n,) each.
     """
     # Rows are y, vx and pitch; columns the mean, then a cosine and a sine coefficient of each harmonic.
     mixed = np.moveaxis(_mixed(speeds, _reference()[2]), 0, -1)
@@ -268,7 +269,7 @@ def trunk_motion(speeds: Floats, phase: Floats) -> dict[str, Floats]:
 class PairGait(Layout):
     """Numbers of a pair, in the order of `LIMITS`."""
 
-    wave: Vector  # cosine and sine coefficient of the crank's speed over its mean [-]
+    wave: Vector  # cosine and sine coefficient of the crank's speed / its mean [-]
     swing: Annotated[Block, SWING]  # coefficients [rad]
 
 
@@ -294,7 +295,7 @@ class Stride:
     and the inverse is the same with -w.
 
     Args:
-        cosine, sine: coefficients of the crank's speed over its mean, of any shape.
+        cosine, sine: coefficients of the crank's speed divided by its mean, of any shape.
     """
 
     def __init__(self, cosine: Floats, sine: Floats) -> None:

@@ -171,7 +171,7 @@ def landing(step: Outcome, weight: Number) -> Lanes:
 
 
 def work(step: Outcome, weight: Number) -> Lanes:
-    """Return the charge for positive work over weight times commanded distance, times the duration."""
+    """Return the charge for positive work divided by weight and commanded distance, times the duration."""
     asked = maximum(step.commanded_progress, 1e-9)
     return -weight * step.seconds * step.sums.positive_work / (step.weight * asked)
 
@@ -200,15 +200,15 @@ HORSE_TERMS = (
         "peak",
         0.25,
         "-",
-        "minus the increase of each leg's running peak GRF over the weight: the highest so far, at most twice"
-        " the present one",
+        "minus the increase of each leg's running peak GRF divided by the weight: the highest so far, at most"
+        " twice the present one",
         peak,
     ),
     Term(
         "slip",
         35.0,
         "1/s",
-        "minus the distance that all hooves slide in stance over the commanded distance; 1 at most",
+        "minus the distance that all hooves slide in stance, divided by the commanded distance; at most 1",
         slip,
     ),
     Term("landing", 0.25, "-", "minus the number of stances that begin", landing),
@@ -216,7 +216,7 @@ HORSE_TERMS = (
         "work",
         0.4,
         "1/s",
-        "minus the positive work of all drives over weight and commanded distance",
+        "minus the positive work of all drives divided by weight and commanded distance",
         work,
     ),
     Term("pitch", 3.0, "1/(s rad^2)", "minus the square of the trunk's pitch", pitch),

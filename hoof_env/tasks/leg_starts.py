@@ -23,7 +23,7 @@ Floats = NDArray[np.float64]
 
 MIN_HEIGHT = 0.6
 MAX_HEIGHT = 2.0
-"""Heights of the trunk at which an episode fails, over its nominal height [-]."""
+"""Heights of the trunk at which an episode fails, divided by its nominal height [-]."""
 
 START_SPEED = 1.0
 """Highest forward speed at reset [m/s]: learners meet both standing and moving starts."""

@@ -139,7 +139,7 @@ def _in_range(k: int) -> Scale:
 
 
 def _in_rate(k: int) -> Scale:
-    """Return the scale of the rate of the k-th gait parameter, over its bound."""
+    """Return the scale of the rate of the k-th gait parameter, divided by its bound."""
 
     def apply(x: Lanes, scene: ObservationInputs) -> Lanes:
         return x / scene.task.rate_bound[k]

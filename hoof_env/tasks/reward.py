@@ -212,7 +212,7 @@ TERMS = (
         "slip",
         1.0,
         "1/m",
-        "minus the distance that the hoof slides in stance, to and fro",
+        "minus the distance that the hoof slides in stance, in both directions",
         slip,
         objective=ENERGY,
     ),
@@ -221,8 +221,9 @@ TERMS = (
         "support",
         17.0,
         "1/s",
-        f"normal impulse over the weight, less twice what exceeds a mean of {BEARING:g}; times the speed over"
-        f" the commanded one, within +-1 and at most the crank's rate over {STEPPING:g} rad/s",
+        f"normal impulse divided by the weight, less twice what exceeds a mean of {BEARING:g}; times the"
+        " ratio of the speed to the commanded one, within +-1 and at most the crank's rate divided by"
+        f" {STEPPING:g} rad/s",
         support,
         objective=PROGRESS,
     ),

@@ -236,7 +236,7 @@ class Settings:
             "rad/s^2",
             (
                 "rate of the crank's speed at an action of 1; above 0, to $crank_bound; for the published"
-                " leg, and by similarity as 1 over the hip height"
+                " leg, and by similarity in inverse proportion to the hip height"
             ),
             needs=("trunk", ("suspended", "rail", "fixed")),
         ),
@@ -247,7 +247,7 @@ class Settings:
             "rad/s",
             (
                 "rate of the swing's coefficients at an action of 1; above 0, to $swing_bound; for the "
-                "published leg, and by similarity as 1 over the root of the hip height"
+                "published leg, and by similarity in inverse proportion to the root of the hip height"
             ),
             needs=("trunk", ("suspended", "rail", "fixed")),
         ),

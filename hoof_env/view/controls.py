@@ -68,7 +68,7 @@ class Slider(NamedTuple):
         low, high, step, value: as the slider has them; logarithms to base ten where `is_log`.
         is_log: True for a logarithmic slider.
         marks: the paper's values, as positions and texts.
-        scale: number that the page writes over the value of the slider, see `Body.scale_of`.
+        scale: ratio of the number that the page writes to the slider's value, see `Body.scale_of`.
     """
 
     ask: str
@@ -90,7 +90,7 @@ class Shown(NamedTuple):
     Attributes:
         group, name, label: its group on the page, its name, and words for it.
         value: present value.
-        scale: the animal's own value over that, see `Body.scale_of`.
+        scale: ratio of the animal's own value to it, see `Body.scale_of`.
     """
 
     group: str

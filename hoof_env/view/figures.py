@@ -73,7 +73,7 @@ class Trace(NamedTuple):
 
 
 class Scene:
-    """Figure of the scene, whose glyphs the script of the page fills from rows.
+    """Figure that shows the scene; the page's script fills its glyphs from rows.
 
     Args:
         drawing: drawing data.

@@ -28,7 +28,7 @@ class Wire(DataModel):
     """Messages between page and server.
 
     Attributes:
-        news: numbers of the present state, see `packed`.
+        news: what is new since the last state, as numbers; see `packed`.
         told, asked: words to the page, and requests from it.
     """
 
@@ -38,7 +38,7 @@ class Wire(DataModel):
 
 
 def packed(row: NDArray[Any], curves: Columns, steps: Columns, is_anew: bool = False) -> NDArray[np.float64]:
-    """Return news of a page as one list of numbers.
+    """Return what is new since the last state as one list of numbers.
 
     Bokeh sends a header and a part of its own for each column of a source. A horse has forty columns, which
     are news many times a second: one list for all of them costs the server and the browser much less.

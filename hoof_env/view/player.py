@@ -1,4 +1,4 @@
-"""Player of a page: its clock, which runs at any speed, and the news since the last state."""
+"""Player of a page: its clock, which runs at any speed, and what is new since the last state."""
 
 from __future__ import annotations
 

@@ -191,7 +191,7 @@ def start(
         raise ParameterError(f"address: expected an IPv4 address or a name, got {brief(address)}")
     for name in hosts:
         if not (name and name.isprintable()) or any(mark in name for mark in ":/ "):
-            raise ParameterError(f"host: expected a name without scheme and port, got {brief(name)}")
+            raise ParameterError(f"host: expected a host name without scheme or port, got {brief(name)}")
     check_folder(out)
     try_out(setup)
     pages = Pages(setup, out)

@@ -27,7 +27,7 @@ class Worker:
         self._thread.start()
 
     def _run(self) -> None:
-        """Do jobs until the queue has a None."""
+        """Run jobs until the queue yields None."""
         for job in iter(self._jobs.get, None):
             with suppress(Interrupted):
                 job()

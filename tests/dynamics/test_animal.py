@@ -150,7 +150,7 @@ def test_height_is_above_the_ground_below():
 
 
 def test_slip_is_what_the_soles_slide_in_stance():
-    """Motion to and fro adds up; impulses are of the horizontal force."""
+    """Motion back and forth adds up; impulses are of the horizontal force."""
     h = 2e-4
     engine = animal(Limits(), ground=replace(NATURAL, friction=0.1), sim_dt=h, substeps=1)
     engine.reset(WALK, THETA, vx=0.5)

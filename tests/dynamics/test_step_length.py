@@ -177,8 +177,8 @@ def test_stiff_ground_gets_the_substeps_that_it_needs(scheme):
 
 
 def dropped(ratio, stiffness, restitution, step=None):
-    """Peak force over the weight of 135 kg dropped at 1 m/s on a sprung hoof, and the engine; `step` is part
-    of the limit of the sole, None what the engine chooses."""
+    """Peak force divided by the weight of 135 kg dropped at 1 m/s on a sprung hoof, and the engine; `step` is
+    part of the limit of the sole, None what the engine chooses."""
     spring, mass = HoofSpring.with_ratio(4e4, 135.0 / 2, ratio), 135.0
     trunk = Trunk(mass=mass - LEG.mass, share=1.0, stiffness=0.0, damping=0.0, drag=0.0, height=3.0)
     ground = Ground(stiffness=stiffness, restitution=restitution, approach_floor=0.1)

@@ -85,7 +85,7 @@ def test_horses_of_all_sizes_fall_at_the_same_instant(size):
 
 def figures(size, froude, world=None):
     """What 40 horses that go at a Froude number for 8 sqrt(size) seconds show: speed over sqrt(g L), slip of
-    a stance over L, peaks over the weight, stances."""
+    a stance over L, peaks divided by the weight, stances."""
     hips = 1.4 * size
     settings = {**(world or {}), "size": size, "episode_seconds": 30.0}
     settings["target_speed"] = (froude * GRAVITY * hips) ** 0.5

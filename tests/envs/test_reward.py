@@ -61,8 +61,8 @@ def ends_of(values):
 
 
 def borne(impulses):
-    """What bearing is paid for, from the impulse over the weight of each control step [s]: a bucket fills
-    with `BEARING` and holds that of `MAX_STRIDE`; an impulse that finds it empty is taken off."""
+    """What bearing is paid for, from the impulse of each control step divided by the weight [s]: a bucket
+    fills with `BEARING` and holds that of `MAX_STRIDE`; an impulse that finds it empty is taken off."""
     found, bucket = [], BEARING * MAX_STRIDE
     for impulse in impulses:
         bucket = min(bucket + BEARING * DT, BEARING * MAX_STRIDE)
@@ -73,7 +73,7 @@ def borne(impulses):
 
 
 def impulses_of(trace, weight):
-    """Of the control steps, over the weight [s]."""
+    """Of the control steps, divided by the weight [s]."""
     return steps_of(H * trace["normal"]) / weight
 
 
