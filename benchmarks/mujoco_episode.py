@@ -96,7 +96,9 @@ class MujocoEpisode:
         self.gait_rate = np.zeros(4)
         self.filters = engine.filters.to_array()
         self.reach = leg.body.reach(engine, leg.dt)
-        self.lead = float(leg.batch.plan.record["lead"].item())
+        constants = leg.body.constants(engine, leg.dt)
+        self.lead = float(constants["lead"])
+        self.failure_heights = float(constants["lowest"]), float(constants["highest"])
         theta = state["crank_angle"]
         text = geometry.to_mjcf(
             theta=theta, swing=report["swing_angle"], trunk=self.trunk, motor=SERVO, ground=engine.ground
@@ -189,8 +191,8 @@ class MujocoEpisode:
         self.time += self.env.dt
         progress = float(self.data.qpos[self.x]) - before
         height = float(self.data.qpos[self.z])
-        record = self.env.batch.plan.record
-        failed = not record["lowest"].item() < height < record["highest"].item()
+        lowest, highest = self.failure_heights
+        failed = not lowest < height < highest
         return self._reward(progress, sums, failed), failed
 
     def _substep(self, command: Floats, sums: Sums) -> None:
@@ -256,7 +258,7 @@ class MujocoEpisode:
         """Return the sum of all terms of `hoof_env.tasks.reward`."""
         w = self.env.weights
         dt = self.env.dt
-        asked = float(self.env.batch.plan.commands.speeds[0]) * dt
+        asked = float(self.env.commanded_speed) * dt
         allowance = min(self.allowance + BEARING * dt, BEARING * MAX_STRIDE)
         impulse = sums.impulse / self.weight
         borne = min(impulse, allowance)

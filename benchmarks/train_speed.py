@@ -13,9 +13,11 @@ import benchmarks.one_thread  # noqa: F401  # isort: skip
 import argparse
 import time
 from collections.abc import Callable
+from contextlib import ExitStack
 from functools import partial
 from pathlib import Path
 from typing import Any
+from unittest.mock import patch
 
 import numpy as np
 import torch
@@ -28,6 +30,7 @@ from benchmarks.history import RESULTS, write
 from benchmarks.machine import machine, vector_bits
 from benchmarks.rounds import bar_text, describe, interleave, spread
 from hoof_env._output import markdown_table
+from hoof_env.episodes.batch import EpisodeBatch
 from hoof_env.simd.threads import available
 
 ENV_ID = "hoof_env/HorseLeg-v0"
@@ -91,20 +94,17 @@ class Clock:
 
 def where_time_goes(model: Any, rounds: int) -> dict[str, float]:
     """Return the seconds of a rollout and its updates, by part; medians."""
-    env = model.env
-    # Down to the environments themselves, below the wrappers
-    while hasattr(env, "venv"):
-        env = env.venv
-    timed = [(env.envs.batch, "step"), (model.env, "step_async"), (model.env, "step_wait"), (model, "train")]
+    timed = [(EpisodeBatch, "step"), (model.env, "step_async"), (model.env, "step_wait"), (model, "train")]
     clocks = [Clock() for _ in timed]
-    # Clocks stand around methods of objects, not of classes: other models are not timed
-    for clock, (owner, name) in zip(clocks, timed, strict=True):
-        setattr(owner, name, clock.around(getattr(owner, name)))
     rows = []
-    for _ in range(rounds):
-        whole = train(model)
-        kernel, begin, wait, update = (clock.take() for clock in clocks)
-        rows.append((kernel, begin + wait - kernel, whole - begin - wait - update, update))
+    # Clocks stand around methods in this block alone: other models are not timed
+    with ExitStack() as stack:
+        for clock, (owner, name) in zip(clocks, timed, strict=True):
+            stack.enter_context(patch.object(owner, name, clock.around(getattr(owner, name))))
+        for _ in range(rounds):
+            whole = train(model)
+            kernel, begin, wait, update = (clock.take() for clock in clocks)
+            rows.append((kernel, begin + wait - kernel, whole - begin - wait - update, update))
     names = ("kernel", "environment", "play", "updates")
     return dict(zip(names, np.median(rows, 0).tolist(), strict=True))
 

@@ -71,7 +71,7 @@ METRICS = {
     "failed": Metric("failed"),
     "loading_rate_n_s": Metric("loading rate\nkN/s", 1e-3, 1),
 }
-"""Columns of reports: "return", figures of the episode (`hoof_env.episodes.batch.EpisodeBatch.summary`), and
+"""Columns of reports: "return", figures of the episode (`hoof_env.episodes.summaries.SUMMARY`), and
 "stance_peak_n", the mean over its stances of their highest force, 0 without a stance."""
 
 
