@@ -496,7 +496,7 @@ class LegBase:
 
     @property
     def terrain(self) -> Terrain:
-        """Terrain under the legs."""
+        """Terrain under the legs; a vector environment has one for each by `get_attr("terrain")`."""
         return self.batch.engine.terrain
 
     @property

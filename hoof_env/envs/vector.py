@@ -49,7 +49,10 @@ PER_ENV = (
     "action_for",
     "commanded_speed",
 )
-"""Attributes and methods with a value for each environment; the rest have one value for all."""
+"""Attributes and methods with a value for each environment; the rest, but for `OF_PLAN`, have one for all."""
+
+OF_PLAN = {"terrain": "terrain", "weights": "weights", "resolved_settings": "settings"}
+"""Attributes that an environment has from the plan of its present episode, with their names in `Plan`."""
 
 SINGLE_SPACES = {"action_space": "single_action_space", "observation_space": "single_observation_space"}
 """Names of the vector environment for attributes of a single one."""
@@ -465,6 +468,9 @@ class HorseLegVectorEnv(LegBase, VectorEnv[NDArray[np.float32], NDArray[np.float
             return [None] * len(chosen)
         if name == "settings":
             return [self.batch.row_plans.pending_of(env).asked for env in chosen]
+        if name in OF_PLAN:
+            values = [getattr(self.batch.row_plans.of(env), OF_PLAN[name]) for env in chosen]
+            return [dict(value) if isinstance(value, dict) else value for value in values]
         # Of the environments that are asked for; only these keep their substeps.
         if name in ("record", "surroundings"):
             return [getattr(self, name)(env, *args, **kwargs) for env in chosen]

@@ -64,7 +64,7 @@ class Body(Protocol):
         action_form: tag of the meaning of actions, "rates", or of a horse offsets and their spans.
     """
 
-    # Fixed when a body is made: settings that change later (`conditions.CHANGEABLE`) do not affect them.
+    # Fixed when a body is made: settings that change later (`row_plans.CHANGEABLE`) do not affect them.
     kernels: BodyKernels
     geometry: Geometry
     height: float

@@ -125,6 +125,21 @@ def test_a_callback_of_stable_baselines_promotes_rows():
         envs.env_method("change_settings", indices=[1], envs=[2], strength=0.5)
 
 
+@pytest.mark.parametrize("name", ["terrain", "weights", "resolved_settings"])
+def test_what_follows_from_settings_is_each_rows_own(name):
+    """As of a single environment that was made with the row's settings, from its next start on."""
+    level = {"terrain": {"kind": "hills", "seed": 5}, "reward_weights": {"peak": 3.0}}
+    envs = gym.make_vec(LEG, 3, **SHORT).unwrapped
+    envs.reset(seed=0)
+    before = getattr(gym.make(LEG, **SHORT).unwrapped, name)
+    after = getattr(gym.make(LEG, **SHORT, **level).unwrapped, name)
+    assert before != after
+    envs.change_settings(envs=[1], **level)
+    assert envs.get_attr(name) == (before,) * 3
+    envs.reset(options={"reset_mask": np.array([True, True, False])})
+    assert envs.call(name) == (before, after, before)
+
+
 @pytest.mark.parametrize(
     ("words", "kind", "changes"),
     [
