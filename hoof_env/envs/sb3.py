@@ -26,7 +26,8 @@ class RowInfo(dict[str, Any]):
     """Info of one environment after a step.
 
     It is a dictionary of what an episode's end adds. What every step measures is read from the arrays of all
-    environments when it is asked for: as dictionaries it would cost more than the simulation.
+    environments when it is asked for: as dictionaries it would cost more than the simulation. The first call
+    that removes or keeps an entry of them makes it an ordinary dictionary.
 
     Args:
         arrays: infos of the vector environment.
@@ -84,6 +85,33 @@ class RowInfo(dict[str, Any]):
     def copy(self) -> dict[str, Any]:
         """Return an ordinary dictionary with all entries."""
         return {key: self[key] for key in self.keys()}
+
+    def _fill(self) -> RowInfo:
+        """Take all entries into the dictionary itself; return it."""
+        entries = self.copy()
+        self.clear()
+        self.update(entries)
+        return self
+
+    def clear(self) -> None:
+        """Remove all entries."""
+        super().clear()
+        self._arrays = {}
+
+    def __delitem__(self, key: str) -> None:
+        dict.__delitem__(self._fill(), key)
+
+    def pop(self, *args: Any) -> Any:
+        """Remove an entry and return it; see `dict.pop`."""
+        return dict.pop(self._fill(), *args)
+
+    def popitem(self) -> tuple[str, Any]:
+        """Remove the last entry and return it."""
+        return dict.popitem(self._fill())
+
+    def setdefault(self, key: str, default: Any = None) -> Any:
+        """Return an entry, `default` if there is none, and keep it."""
+        return dict.setdefault(self._fill(), key, default)
 
     def __eq__(self, other: object) -> bool:
         return self.copy() == (other.copy() if isinstance(other, RowInfo) else other)

@@ -6,6 +6,8 @@ import gymnasium as gym
 import numpy as np
 import pytest
 from family import FALLS, HORSES, IDS, actions, same
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
 pytest.importorskip("stable_baselines3")
 from stable_baselines3 import PPO
@@ -13,6 +15,7 @@ from stable_baselines3.common.evaluation import evaluate_policy
 from stable_baselines3.common.vec_env import DummyVecEnv, VecMonitor, VecNormalize
 
 from hoof_env import Sb3VecEnv
+from hoof_env.envs.sb3 import RowInfo
 from hoof_env.errors import ParameterError
 
 
@@ -55,6 +58,42 @@ def test_it_says_what_theirs_says(env_id, settings):
             same(ours.reset(), theirs.reset())
     assert len(ends) > (2 if settings is FALLS else 50)
     assert not any(ends) if settings is FALLS else all(ends) or env_id in HORSES
+
+
+CHANGES = {
+    "pop": lambda info, key: info.pop(key, None),
+    "pop without a default": lambda info, key: info.pop(key),
+    "delete": lambda info, key: info.__delitem__(key),
+    "remove the last": lambda info, key: info.popitem(),
+    "set a default": lambda info, key: info.setdefault(key, 7.0),
+    "write": lambda info, key: info.__setitem__(key, 8.0),
+    "merge": lambda info, key: info.__ior__({key: 9.0}) and None,
+    "clear": lambda info, key: info.clear(),
+}
+"""Changes of a dictionary."""
+
+
+@settings(max_examples=200)
+@given(
+    st.lists(st.tuples(st.sampled_from([*CHANGES]), st.sampled_from(["progress", "gait", "end", "level"]))),
+    st.booleans(),
+)
+def test_infos_change_like_dictionaries(changes, has_ended):
+    """Entries of the arrays and of the end of an episode, in any order of changes."""
+    arrays = {"progress": np.arange(3.0), "gait": np.arange(3.0, 6.0), "_gait": np.ones(3, bool)}
+    end = {"end": {"fall": True}} if has_ended else {}
+    info, expected = RowInfo(arrays, 1, end), {"progress": 1.0, "gait": 4.0, **end}
+    for name, key in changes:
+        results = []
+        for one in (info, expected):
+            try:
+                results.append(CHANGES[name](one, key))
+            except KeyError as error:
+                results.append(type(error))
+        assert results[0] == results[1], name
+        assert [*info.items()] == [*expected.items()]
+        assert ("gait" in info, len(info)) == ("gait" in expected, len(expected))
+    assert (arrays["progress"] == np.arange(3.0)).all()
 
 
 def test_what_single_environments_are_asked_is_as_of_a_dummy_vec_env():
