@@ -146,8 +146,9 @@ class LegBase:
     _spec: EnvSpec | None = None
     _as_json: tuple[Settings | None, dict[str, Any], list[str]] = (None, {}, [])
     _phase = "new"
-    """State of the object: "new" before the first reset, "running", and "closed" after `close`; in a single
-    environment also "ended" after an episode, and "warned" after a further step."""
+    """State of the object: "new" before the first reset, "running", "interrupted" after a call that ended
+    half-way, and "closed" after `close`; in a single environment also "ended" after an episode, and
+    "warned" after a further step."""
 
     def _make(
         self,
@@ -366,6 +367,17 @@ class LegBase:
         self._check_open(call)
         if self._phase == "new":
             raise ResetNeeded(f"{call}() was called before reset(): expected reset() first")
+        if self._phase == "interrupted":
+            raise ResetNeeded(
+                f"{call}() was called after a call that was interrupted, as by Ctrl-C, and may be half done:"
+                " expected reset() or set_state(...) first"
+            )
+
+    def _interrupt(self, error: BaseException) -> None:
+        """Refuse calls until the next reset, after an error that ended a step, a reset or a state half-way.
+        Errors of bad input come before anything has happened."""
+        if not isinstance(error, ParameterError):
+            self._phase = "interrupted"
 
     def _check_state(self, state: Any, *parts: str) -> None:
         """Check that `state` is one of `get_state` of an environment with this id and these settings.

@@ -121,18 +121,22 @@ class HorseLegEnv(LegBase, gym.Env[NDArray[np.float32], NDArray[np.float32]]):
         """
         self._check_open("reset")
         checked = self.batch.check_options(options)  # first, so that a refused reset changes nothing
-        super().reset(seed=None if seed is None else count("seed", seed, low=0))
-        self.batch.restart_schedules([] if seed is None else [0])
-        parameters = self.batch.reset([0], [self.np_random], checked)
-        # `change_settings` took effect, perhaps in a reset that Ctrl-C ended: other arrays
-        if self._views[2] is not self.batch.calls.held:
-            self._attach()
-        self._phase = "running"
-        if self._watched:
-            self._watched[0].begin()
-            if self.render_mode == "human":
-                self.render()
-        self._begin()
+        try:
+            super().reset(seed=None if seed is None else count("seed", seed, low=0))
+            self.batch.restart_schedules([] if seed is None else [0])
+            parameters = self.batch.reset([0], [self.np_random], checked)
+            # `change_settings` took effect, perhaps in a reset that Ctrl-C ended: other arrays
+            if self._views[2] is not self.batch.calls.held:
+                self._attach()
+            if self._watched:
+                self._watched[0].begin()
+            self._begin()
+            self._phase = "running"
+        except BaseException as error:
+            self._interrupt(error)
+            raise
+        if self.render_mode == "human":
+            self.render()
         info = copy.deepcopy(self._begun[0]()) | {"measured": self._views[-2]()}
         if parameters:
             info["parameters"] = name_columns([values[0] for values in parameters.values()], [*parameters])
@@ -162,36 +166,40 @@ class HorseLegEnv(LegBase, gym.Env[NDArray[np.float32], NDArray[np.float32]]):
             buffer[:] = action
         except (TypeError, ValueError, BufferError):
             self._read_action(action)
-        # not through the batch, unless kernels are looked into: a call costs as much as a substep
-        happened = self.batch.calls.step(held) if BLOCKS else kernel(held)
-        measured = measure()  # before a push that is due, which changes speeds at once
-        if costs:
-            self.batch.plan.costs.add(self.batch.rows, self.batch.engine)
-        ended = happened != 0 and self._follow(happened)
-        info = self._begun[0]()  # has all keys already, in the order of the reset's info
-        info["gait"] = self._begun[1]()
-        info["measured"] = measured
-        if draws:
-            info["parameters"] = info["parameters"].copy()  # callers may change their info
-        for key, k in paid:
-            info[key] = terms[k]
-        if costs:
-            info |= self._cost_info()
-        failed = truncated = False
-        if ended:
-            info.update(zip(self.batch.terms, terms, strict=True))
-            failed = bool(self.batch.rows.named.ended[0] == FAILED)
-            truncated = not failed
-            if self._phase == "running":
-                self._phase = "ended"
-            info |= ending_of(self.batch, 0)
-            if broken(self.batch.engine.results)[0]:  # the step was taken back: it has no sums
-                info["measured"] = measure()
-                info["measured"][self.batch.measurements.last_step] = 0.0
-        if self._watched:
-            self._watched[0].add()
-            if self.render_mode == "human":
-                self.render()
+        try:
+            # not through the batch, unless kernels are looked into: a call costs as much as a substep
+            happened = self.batch.calls.step(held) if BLOCKS else kernel(held)
+            measured = measure()  # before a push that is due, which changes speeds at once
+            if costs:
+                self.batch.plan.costs.add(self.batch.rows, self.batch.engine)
+            ended = happened != 0 and self._follow(happened)
+            info = self._begun[0]()  # has all keys already, in the order of the reset's info
+            info["gait"] = self._begun[1]()
+            info["measured"] = measured
+            if draws:
+                info["parameters"] = info["parameters"].copy()  # callers may change their info
+            for key, k in paid:
+                info[key] = terms[k]
+            if costs:
+                info |= self._cost_info()
+            failed = truncated = False
+            if ended:
+                info.update(zip(self.batch.terms, terms, strict=True))
+                failed = bool(self.batch.rows.named.ended[0] == FAILED)
+                truncated = not failed
+                if self._phase == "running":
+                    self._phase = "ended"
+                info |= ending_of(self.batch, 0)
+                if broken(self.batch.engine.results)[0]:  # the step was taken back: it has no sums
+                    info["measured"] = measure()
+                    info["measured"][self.batch.measurements.last_step] = 0.0
+            if self._watched:
+                self._watched[0].add()
+        except BaseException as error:
+            self._interrupt(error)
+            raise
+        if self.render_mode == "human":
+            self.render()
         return observe(), rewards[0], failed, truncated, info
 
     def _follow(self, happened: int) -> bool:
@@ -269,16 +277,20 @@ class HorseLegEnv(LegBase, gym.Env[NDArray[np.float32], NDArray[np.float32]]):
         check_single(state)
         self._check_state(state)
         generator = generator_of(state["generator"])
-        set_state(self.batch, state)
-        if "rows" in state:
-            self._take_given()
-            self._attach()
-        self.np_random = generator
-        self._phase = "ended" if self.batch.rows.named.ended[0] else "running"
-        if self._start_and_target() != self._began_with:  # a planner's states are of one episode
-            self._begin()
-        if self._watched:
-            self._watched[0].begin()
+        try:
+            set_state(self.batch, state)
+            if "rows" in state:
+                self._take_given()
+                self._attach()
+            self.np_random = generator
+            if self._start_and_target() != self._began_with:  # a planner's states are of one episode
+                self._begin()
+            if self._watched:
+                self._watched[0].begin()
+            self._phase = "ended" if self.batch.rows.named.ended[0] else "running"
+        except BaseException as error:
+            self._interrupt(error)
+            raise
         return self._checked()
 
     def __getstate__(self) -> dict[str, Any]:

@@ -236,10 +236,14 @@ class HorseLegVectorEnv(LegBase, VectorEnv[NDArray[np.float32], NDArray[np.float
         mask = check_mask(rest.pop("reset_mask", None) if isinstance(rest, dict) else None, self.num_envs)
         # Before the generators are seeded, so that a refused reset changes nothing.
         checked = self.batch.check_options(rest, np.flatnonzero(mask))
-        seeded = self._generators.seed(seed, np.flatnonzero(mask).tolist())
-        self.batch.restart_schedules(seeded)
-        parameters = self._start(np.flatnonzero(mask), checked)
-        self._ended[mask] = False
+        try:
+            seeded = self._generators.seed(seed, np.flatnonzero(mask).tolist())
+            self.batch.restart_schedules(seeded)
+            self._ended[mask] = False
+            parameters = self._start(np.flatnonzero(mask), checked)
+        except BaseException as error:
+            self._interrupt(error)
+            raise
         observations = self._observed()
         observations[~self._started] = 0.0
         infos: dict[str, Any] = infos_of(self.batch)
@@ -279,26 +283,30 @@ class HorseLegVectorEnv(LegBase, VectorEnv[NDArray[np.float32], NDArray[np.float
                 "expected reset(options={'reset_mask': ...})"
             )
         batch.rows.actions[:n] = check_actions(actions, (n, len(self.action_names)))
-        some_ended = batch.step(self._generators.all, again)
-        how = batch.rows.named.ended[:n]
-        terminated = how == FAILED
-        truncated = how == TRUNCATED
-        # NEXT_STEP: these environments start in this call; their step above does not count.
-        if again is not None:
-            terminated[again] = False
-            truncated[again] = False
-            self._start(np.flatnonzero(again), {})
-        done = terminated | truncated
-        infos = infos_of(batch, some_ended)
-        rewards = batch.rows.rewards[:n].copy()
-        if done.any():
-            infos |= endings_of(batch, done)
-        if done.any() and self.autoreset_mode == AutoresetMode.SAME_STEP:
-            infos = self._same_step(infos, done)
-            done = np.zeros(n, bool)
-        else:
-            self._remember()
-        self._ended = done
+        try:
+            some_ended = batch.step(self._generators.all, again)
+            how = batch.rows.named.ended[:n]
+            terminated = how == FAILED
+            truncated = how == TRUNCATED
+            # NEXT_STEP: these environments start in this call; their step above does not count.
+            if again is not None:
+                terminated[again] = False
+                truncated[again] = False
+                self._start(np.flatnonzero(again), {})
+            done = terminated | truncated
+            infos = infos_of(batch, some_ended)
+            rewards = batch.rows.rewards[:n].copy()
+            if done.any():
+                infos |= endings_of(batch, done)
+            if done.any() and self.autoreset_mode == AutoresetMode.SAME_STEP:
+                infos = self._same_step(infos, done)
+                done = np.zeros(n, bool)
+            else:
+                self._remember()
+            self._ended = done
+        except BaseException as error:
+            self._interrupt(error)
+            raise
         return self._observed(), rewards, terminated, truncated, infos
 
     def _same_step(self, final: dict[str, Any], done: NDArray[np.bool_]) -> dict[str, Any]:
@@ -365,13 +373,19 @@ class HorseLegVectorEnv(LegBase, VectorEnv[NDArray[np.float32], NDArray[np.float
         """Start episodes; return the parameters that were set or drawn for them, by name."""
         parameters = self.batch.reset(envs, [self._generators[env] for env in envs], options)
         self._started[envs] = True
-        # Steps are refused until every environment has had a first episode.
-        if self._phase == "new" and self._started.all():
-            self._phase = "running"
         if self._watched:
             for env in self._watched.keys() & set(envs.tolist()):
                 self._watched[env].begin()
+        # Steps are refused until every environment has had a first episode.
+        if self._phase in ("new", "interrupted"):
+            self._phase = "running" if self._started.all() else "new"
         return parameters
+
+    def _interrupt(self, error: BaseException) -> None:
+        super()._interrupt(error)
+        # All environments have to start again, by one reset or by several with masks.
+        if self._phase == "interrupted":
+            self._started[:] = False
 
     def _remember(self) -> None:
         """Add the step to the recordings."""
@@ -538,13 +552,17 @@ class HorseLegVectorEnv(LegBase, VectorEnv[NDArray[np.float32], NDArray[np.float
             raise ParameterError(f"state['generator']: expected a list of {n}, got {states!r:.60}")
         # The last checks: nothing has changed until here.
         generators = [generator_of(values) for values in states]
-        set_state(self.batch, state)
-        if "rows" in state:
-            self._take_given()
-        self._ended = ended
-        self._started = np.ones(n, bool)
-        self._generators.assign(generators)
-        self._phase = "running"
-        for recording in self._watched.values():
-            recording.begin()
+        try:
+            set_state(self.batch, state)
+            if "rows" in state:
+                self._take_given()
+            self._ended = ended
+            self._started = np.ones(n, bool)
+            self._generators.assign(generators)
+            for recording in self._watched.values():
+                recording.begin()
+            self._phase = "running"
+        except BaseException as error:
+            self._interrupt(error)
+            raise
         return self._observed()
