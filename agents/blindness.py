@@ -15,6 +15,7 @@ import numpy as np
 
 from hoof_env.errors import DataFileError, ParameterError
 from hoof_env.evaluation.episodes import make_rows
+from hoof_env.policies.actor import Actor
 
 OTHER_GROUNDS = ((0.05, 10.0), (0.05, 0.2), (0.2, 3.0), (0.2, 0.5), (0.3, 1.5), (0.3, 0.7))
 """Friction of other grounds, and factors of their stiffness, the most unlike first. On the first of them some
@@ -123,19 +124,18 @@ def _episodes(
     """Play an episode for each seed in each world, with the actions of the last; return the returns, shape
     (worlds, n), the rows whose last world was not over before another one, and the actions of each step with
     the rows that were going on in the last world."""
-    start = dict(getattr(policy, "start", None) or {})
-    seen = [world.reset(seed=list(seeds), options=start)[0] for world in worlds]
     count = len(seeds)
+    actor = Actor(policy)
+    actor.begin(count)
+    seen = [world.reset(seed=list(seeds), options=actor.start)[0] for world in worlds]
     totals = np.zeros((len(worlds), count))
     going = np.ones((len(worlds), count), bool)
     whole = np.ones(count, bool)
-    fresh = np.ones(count, bool)
-    state = None
     taken = []
     while going.any():
-        actions, state = policy.predict(seen[-1], state, episode_start=fresh, deterministic=True)
+        # A row that starts again is no longer compared, so the policy need not know of it
+        actions = actor.act(seen[-1])
         taken.append((actions, going[-1].copy()))
-        fresh = np.zeros(count, bool)
         for k, world in enumerate(worlds):
             seen[k], rewards, terminated, truncated, _ = world.step(actions)
             totals[k] += np.where(going[k], rewards, 0.0)

@@ -37,8 +37,10 @@ from agents.command import parse, parse_pairs, run
 from hoof_env.envs.policies import start_of
 from hoof_env.errors import DataFileError, MissingExtraError, OutputError, ParameterError, count
 from hoof_env.gait import GaitParameters
-from hoof_env.policies.find import find_policy, find_saved, is_model
-from hoof_env.policies.record import describe_actions
+from hoof_env.policies.actor import Actor
+from hoof_env.policies.catalogue import SHIPPED
+from hoof_env.policies.find import find_policy, find_saved, is_model, shipped_ids
+from hoof_env.policies.record import describe_actions, own_id
 from hoof_env.policies.saved import ABOUT, STATISTICS, WEIGHTS
 
 MANIFEST = "manifest.json"
@@ -191,12 +193,16 @@ def default_id(env_id: str, policies: Sequence[str]) -> str:
     return f"hoof_env/{plain[0]}/{plain[1]}-v0"
 
 
-def policy_files(name: str) -> list[Path]:
-    """Return the files that a trained policy or a gait is read from; an empty list for a scripted policy."""
-    path = Path(name)
+def policy_files(name: str, env_id: str) -> list[Path]:
+    """Return the files of a trained policy or a gait, none for a scripted policy; "shipped" is that of
+    `env_id`."""
+    if name == "shipped" or name in shipped_ids():
+        path = SHIPPED / own_id(env_id if name == "shipped" else name).rpartition("/")[2]
+    else:
+        path = Path(name)
     if name.endswith(".json"):
         return [path]
-    if not (is_model(name) or path.is_dir()):
+    if not (is_model(str(path)) or path.is_dir()):
         return []
     model = find_saved(path).path
     neighbours = () if model.suffix == ".onnx" else (ABOUT, WEIGHTS, STATISTICS)
@@ -217,27 +223,25 @@ def _collect(minari: Any, env: Any, args: Args, episodes: int, dataset_id: str) 
     from tqdm import tqdm
 
     policies = {name: find_policy(name, env, args.env_id) for name in args.policies}
-    files = {name: {file.name: _sha256(file) for file in policy_files(name)} for name in policies}
+    files = {
+        name: {file.name: _sha256(file) for file in policy_files(name, args.env_id)} for name in policies
+    }
     collector = minari.DataCollector(env)
     returns = {}
     with tqdm(total=len(policies) * episodes, unit=" episodes", leave=False, disable=None) as bar:
         for name, policy in policies.items():
             totals = []
+            actor = Actor(policy, env)
             options = plain_start(policy)
             # One environment for all episodes, so that a seed alone decides how an episode goes
             for k in range(episodes):
                 observation, _ = collector.reset(seed=args.seed + k, options=options)
+                actor.begin()
                 total = 0.0
-                start = np.ones(1, bool)
-                state = None
                 ended = False
                 while not ended:
-                    action, state = policy.predict(
-                        observation, state, episode_start=start, deterministic=True
-                    )
-                    observation, reward, terminated, truncated, _ = collector.step(action)
+                    observation, reward, terminated, truncated, _ = collector.step(actor.act(observation))
                     total += float(np.asarray(reward).sum())
-                    start = np.zeros(1, bool)
                     ended = terminated or truncated
                 totals.append(total)
                 bar.update()

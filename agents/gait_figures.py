@@ -22,7 +22,7 @@ from hoof_env.constants import GRAVITY
 from hoof_env.dynamics.layout import Features, stride_sums
 from hoof_env.dynamics.memory import LIFT_OFF
 from hoof_env.dynamics.observables import stance_figures
-from hoof_env.envs.policies import start_of
+from hoof_env.policies.actor import Actor
 from hoof_env.tasks.horse_gaits import LEGS, PAIRS
 
 Floats = NDArray[np.float64]
@@ -128,22 +128,20 @@ def watch(envs: Any, policy: Any, speed: float, gait: Floats | None = None) -> P
     """Play episodes at one commanded speed [m/s]; `gait`, shape (16,), replaces the reference gait."""
     seeds = [3_000_000 + k for k in range(envs.num_envs)]
     around = {} if gait is None else {"gait": gait}
-    seen, _ = envs.reset(seed=seeds, options={**start_of(policy), "target_speed": speed, **around})
     n = envs.num_envs
+    actor = Actor(policy)
+    actor.begin(n)
+    seen, _ = envs.reset(seed=seeds, options={**actor.start, "target_speed": speed, **around})
     dt = envs.dt
     features = Features(envs.body.harmonics, envs.settings.hoof_stiffness is not None, True)
     sums = {name: np.zeros((4, n)) for name in stride_sums(features)}
-    start = np.ones(n, bool)
     upright = np.ones(n, bool)
-    state = None
     watched: list[list[dict[str, Floats]]] = [[] for _ in range(min(WATCHED, n))]
     settled = round(SETTLED / dt)
     steps = round(SECONDS / dt)
     for k in range(steps):
         # All rows are asked together; a failed one plays on, but is not counted
-        actions, state = policy.predict(seen, state, episode_start=start, deterministic=True)
-        seen, _, failed, _, infos = envs.step(np.asarray(actions, np.float32))
-        start = np.zeros(n, bool)
+        seen, _, failed, _, infos = envs.step(np.asarray(actor.act(seen), np.float32))
         upright = upright & ~failed
         measured = infos["measured"]
         if k == settled - 1:  # the first step that counts begins here

@@ -28,8 +28,10 @@ from agents.gait_figures import SETTLED
 from agents.horse_gaits import speed_of
 from agents.statistics import described
 from hoof_env.constants import GRAVITY
+from hoof_env.envs.policies import start_of
 from hoof_env.errors import count
 from hoof_env.evaluation.episodes import FINAL_SEEDS, make_rows
+from hoof_env.policies.actor import Actor
 from hoof_env.policies.find import find_policy
 from hoof_env.tasks.horse_gaits import LEGS, PAIRS
 
@@ -76,7 +78,7 @@ def play(envs: Any, policy: Any, seeds: Sequence[int], options: Mapping[str, Any
 
     Args:
         envs: vector environment of a horse with a row for each seed.
-        policy: object with Stable-Baselines3's `predict`.
+        policy: what `load_policy` takes without an environment.
         seeds: seeds of the episodes.
         options: reset options of all.
     """
@@ -86,12 +88,12 @@ def play(envs: Any, policy: Any, seeds: Sequence[int], options: Mapping[str, Any
     names = [name for name in infos if name.startswith("reward_")]
     sums = {name: np.zeros(n) for name in ("return", *names, *NET)}
     episodes: list[Episode] = [{} for _ in seeds]
-    start = going = np.ones(n, bool)
-    state = None
+    going = np.ones(n, bool)
+    actor = Actor(policy)
+    actor.begin(n)
     step = 0
     while going.any():
-        actions, state = policy.predict(observation, state, episode_start=start, deterministic=True)
-        observation, rewards, failed, truncated, infos = envs.step(actions)
+        observation, rewards, failed, truncated, infos = envs.step(actor.act(observation))
         step += 1
         sums["return"] += np.where(going, rewards, 0.0)
         for name in names:
@@ -111,7 +113,7 @@ def play(envs: Any, policy: Any, seeds: Sequence[int], options: Mapping[str, Any
             one |= {name: one[name] / counted / kilograms[row] for name in NET}
             episodes[row] = one | {name: summary[name] for name in SUMMARY}
         going = going & ~ended
-        start = failed | truncated
+        actor.restart(failed | truncated)
     return episodes
 
 
@@ -130,7 +132,7 @@ def gain(ours: Sequence[Episode], theirs: Sequence[Episode]) -> dict[str, dict[s
 
 def players(policy: Any, zero: Any, speed: float) -> dict[str, tuple[Any, dict[str, Any]]]:
     """Return policies and their reset options at a speed by name, the zero action first."""
-    own = getattr(policy, "start", None) or {}
+    own = start_of(policy)
     found = {"zero action": (zero, {}), "agent": (policy, dict(own))}
     if speed == max(SPEEDS):
         found[TROT] = (zero, {"gait": TROT})
@@ -164,7 +166,7 @@ def main(argv: list[str] | None = None) -> None:
 
 def figures_of(envs: Any, policy: Any, zero: Any, seeds: Sequence[int]) -> dict[str, Any]:
     """Return the gain by term, the figures by speed and the horizontal forces by Froude number."""
-    ours, theirs = (play(envs, one, seeds, getattr(one, "start", None) or {}) for one in (policy, zero))
+    ours, theirs = (play(envs, one, seeds, start_of(one)) for one in (policy, zero))
     found: dict[str, Any] = {"gain": gain(ours, theirs), "speeds": [], "forces": []}
     tell("gain", found["gain"])
     for speed in SPEEDS:

@@ -29,6 +29,7 @@ from agents.gait_figures import SETTLED
 from agents.statistics import described
 from hoof_env.errors import ParameterError, count
 from hoof_env.evaluation.episodes import FINAL_SEEDS
+from hoof_env.policies.actor import Actor
 from hoof_env.policies.find import find_policy
 
 Floats = NDArray[np.float64]
@@ -86,17 +87,15 @@ def episode_of(env: gym.Env[Any, Any], policy: Any, seed: int) -> tuple[dict[str
     """Play an episode; return its record at every substep, columns of shape (n,), and its summary with its
     return."""
     leg: Any = env.unwrapped
-    observation, info = env.reset(seed=seed, options=getattr(policy, "start", None) or {})
+    actor = Actor(policy, env)
+    observation, info = env.reset(seed=seed, options=actor.start)
     leg.record()  # steps are recorded from here on
     parts = []
     total = 0.0
-    start = np.ones(1, bool)
     ended = False
     while not ended:
-        action, _ = policy.predict(observation, episode_start=start, deterministic=True)
-        observation, reward, failed, truncated, info = env.step(action)
+        observation, reward, failed, truncated, info = env.step(actor.act(observation))
         total += float(reward)
-        start = np.zeros(1, bool)
         ended = failed or truncated
         record = leg.record()
         parts.append({name: np.ravel(record[name]) for name in COLUMNS})

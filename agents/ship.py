@@ -238,9 +238,11 @@ class NoisyPolicy:
         self._policy = policy
         self._generator = np.random.default_rng(0)
 
-    def predict(self, observation: Any, *args: Any, **kwargs: Any) -> tuple[Any, Any]:
-        """Return the policy's actions with noise."""
-        actions, state = self._policy.predict(observation, *args, **kwargs)
+    def predict(
+        self, observation: Any, state: Any = None, episode_start: Any = None, deterministic: bool = True
+    ) -> tuple[Any, Any]:
+        """Return the policy's actions with noise, and its state."""
+        actions, state = self._policy.predict(observation, state, episode_start, deterministic)
         return actions + self._generator.uniform(-1e-6, 1e-6, actions.shape).astype(np.float32), state
 
 

@@ -21,9 +21,9 @@ from agents import runs
 from agents.command import run
 from benchmarks.mujoco_episode import Floats, MujocoEpisode
 from hoof_env._output import check_folder, markdown_table
-from hoof_env.envs.policies import start_of
 from hoof_env.errors import count
 from hoof_env.evaluation.episodes import play
+from hoof_env.policies.actor import Actor
 from hoof_env.policies.find import find_policy
 
 ENV_ID = "hoof_env/HorseLeg-v0"
@@ -61,16 +61,15 @@ def play_there(
         contact: see `MujocoEpisode`.
         frames: list that gets the bars of each control step; None for none.
     """
-    env.reset(seed=seed, options=start_of(policy))
+    actor = Actor(policy, env)
+    env.reset(seed=seed, options=actor.start)
     there = MujocoEpisode(env, contact)
     begin = float(there.data.qpos[there.x])
     value = 0.0
     failed = False
     steps = round(there.env.episode_seconds / there.env.dt)
-    for k in range(steps):
-        observation = there.observe()
-        action, _ = policy.predict(observation, episode_start=np.array([k == 0]), deterministic=True)
-        reward, failed = there.step(np.asarray(action, float))
+    for _ in range(steps):
+        reward, failed = there.step(np.asarray(actor.act(there.observe()), float))
         value += reward
         if frames is not None:
             frames.append(there.bars())
@@ -151,13 +150,13 @@ def film(here: Sequence[Floats], there: Sequence[Floats], path: Path) -> None:
 
 def bars_here(env: Any, policy: Any, seed: int, like: MujocoEpisode) -> list[Floats]:
     """Play an episode in the environment; return the bars of each control step, in the links of `like`."""
-    observation, _ = env.reset(seed=seed, options=start_of(policy))
+    actor = Actor(policy, env)
+    observation, _ = env.reset(seed=seed, options=actor.start)
     engine = env.unwrapped.engine
     frames: list[Floats] = []
     done = False
     while not done:
-        action, _ = policy.predict(observation, episode_start=np.array([not frames]), deterministic=True)
-        observation, _, terminated, truncated, _ = env.step(action)
+        observation, _, terminated, truncated, _ = env.step(actor.act(observation))
         done = terminated or truncated
         for name, joint in (("x", like.x), ("y", like.z), ("swing_angle", like.swing)):
             like.data.qpos[joint] = engine.report[name].item()

@@ -11,7 +11,8 @@ from stable_baselines3 import PPO
 from stable_baselines3.common.monitor import Monitor
 
 from hoof_env.envs.open_loop import load_open_loop
-from hoof_env.envs.policies import Scripted, make_policy, start_of
+from hoof_env.envs.policies import Scripted, make_policy
+from hoof_env.policies.actor import Actor
 
 ENV_ID = "hoof_env/HorseLeg-v0"
 torch.set_num_threads(1)  # more are slower with small networks, many times on a busy machine
@@ -23,15 +24,15 @@ model.save("first_curve.zip")
 def play(policy, episodes=20):
     """Return the mean return of a policy, in episodes with the start that it prescribes."""
     env = gym.make(ENV_ID)
+    actor = Actor(policy, env)
     total = 0.0
     for seed in range(1000, 1000 + episodes):
-        observation, _ = env.reset(seed=seed, options=start_of(policy))
-        begins = True
+        observation, _ = env.reset(seed=seed, options=actor.start)
+        actor.begin()
         ended = False
         while not ended:
-            action, _ = policy.predict(observation, episode_start=np.array([begins]), deterministic=True)
-            observation, reward, failed, through, _ = env.step(action)
-            total, begins, ended = total + reward, False, failed or through
+            observation, reward, failed, through, _ = env.step(actor.act(observation))
+            total, ended = total + reward, failed or through
     return total / episodes
 
 

@@ -16,6 +16,7 @@ minari = pytest.importorskip("minari", reason='needs pip install "hoof-env[minar
 
 from agents import dataset  # noqa: E402
 
+LEG = "hoof_env/HorseLeg-v0"
 TRAINED = "agents/policies/Horse-v0"
 SHORT = ("--env-kwargs", "episode_seconds=0.4", "--episodes", "2")
 
@@ -113,12 +114,19 @@ def test_the_licence_is_the_checkout_s_which_need_not_be_installed(shelf, monkey
 
 
 def test_the_files_of_policies(tmp_path):
-    assert dataset.policy_files("run") == dataset.policy_files("6.28,0.7,-0.2,-0.3") == []
-    assert dataset.policy_files("gait.json") == [Path("gait.json")]
+    assert dataset.policy_files("run", LEG) == dataset.policy_files("6.28,0.7,-0.2,-0.3", LEG) == []
+    assert dataset.policy_files("gait.json", LEG) == [Path("gait.json")]
     for name in ("model.zip", "vecnormalize.pkl", "other.txt"):
         (tmp_path / name).touch()
     (tmp_path / "run.json").write_text('{"env_id": "hoof_env/HorseLeg-v0", "algo": "ppo"}')
-    assert [file.name for file in dataset.policy_files(str(tmp_path))] == ["model.zip", "vecnormalize.pkl"]
+    for name, folder in (("shipped", "HorseLeg-v0"), ("hoof_env/Horse-v0", "Horse-v0")):
+        files = dataset.policy_files(name, LEG)
+        assert [file.name for file in files] == ["policy.json", "policy.safetensors"]
+        assert {file.parent.name for file in files} == {folder}
+    assert [file.name for file in dataset.policy_files(str(tmp_path), LEG)] == [
+        "model.zip",
+        "vecnormalize.pkl",
+    ]
 
 
 def test_default_ids_are_ids():

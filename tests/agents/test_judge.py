@@ -300,7 +300,7 @@ class Toy:
         }  # fmt: skip
 
 
-IDLE = SimpleNamespace(predict=lambda seen, state, **_: (np.zeros((len(seen), 16)), state))
+IDLE = SimpleNamespace(predict=lambda seen, **_: (np.zeros((len(seen), 16)), None))
 
 
 def test_figures_are_of_the_steps_that_count():

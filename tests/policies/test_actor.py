@@ -1,6 +1,8 @@
 """Every door plays a policy in one way: with its memory, its statistics and the mode of its distribution."""
 
+import ast
 import sys
+from pathlib import Path
 from types import ModuleType
 
 import gymnasium as gym
@@ -8,6 +10,8 @@ import numpy as np
 import pytest
 
 import hoof_env
+from agents import dataset, gait_figures, horse_figures, leg_forces
+from agents.blindness import prove
 from hoof_env import records
 from hoof_env.errors import DataFileError, ParameterError
 from hoof_env.evaluation.episodes import make_rows, play, play_rows, score_vector
@@ -24,15 +28,16 @@ class Counting:
     """Policy with a memory, the number of its actions in an episode, which acts at random unless its mode is
     asked for."""
 
-    def __init__(self):
+    def __init__(self, width=4):
         self.calls = []
+        self.width = width
 
     def predict(self, observation, state=None, episode_start=None, deterministic=False):
         rows = np.shape(observation)[:-1]
         count = np.zeros(rows or (1,), int) if state is None else state
         count = np.where(episode_start, 0, count)
         self.calls.append((count.copy(), np.array(episode_start), deterministic))
-        actions = np.tile(0.05 * (count.reshape(rows)[..., None] % 7), 4).astype(np.float32)
+        actions = np.tile(0.05 * (count.reshape(rows)[..., None] % 7), self.width).astype(np.float32)
         if not deterministic:
             actions = np.full_like(actions, np.nan)
         return actions, count + 1
@@ -118,6 +123,43 @@ def test_the_live_page():
     assert counts(policy) == 2 * EPISODE
 
 
+def test_figures_of_one_leg(env):
+    policy = Counting()
+    leg_forces.episode_of(env, policy, 0)
+    assert counts(policy) == EPISODE
+
+
+def test_figures_of_a_horse(monkeypatch):
+    envs = make_rows("hoof_env/Horse-v0", 2, **SHORT)
+    policy = Counting(16)
+    horse_figures.play(envs, policy, [0, 1], {})
+    assert counts(policy) == [[step] * 2 for step in range(STEPS)]
+    monkeypatch.setattr(gait_figures, "SECONDS", 0.1)
+    monkeypatch.setattr(gait_figures, "SETTLED", 0.04)
+    policy = Counting(16)
+    gait_figures.watch(envs, policy, 2.0)
+    assert counts(policy) == [[step] * 2 for step in range(STEPS // 2)]
+
+
+def test_proofs_of_blindness():
+    policy = Counting()
+    proof = prove(policy, ID, [0, 1], SHORT)
+    # Played in the real world, and then in the other one
+    assert counts(policy) == 2 * [[step] * 2 for step in range(STEPS)]
+    assert proof.difference == proof.actions == 0
+
+
+def test_data_sets(monkeypatch, tmp_path):
+    minari = pytest.importorskip("minari")
+    monkeypatch.setenv("MINARI_DATASETS_PATH", str(tmp_path))
+    args = dataset.Args(("mine",), env_kwargs=("episode_seconds=0.2",))
+    policy = Counting()
+    monkeypatch.setattr(dataset, "find_policy", lambda *_: policy)
+    with gym.make(ID, **SHORT) as env:
+        dataset._collect(minari, env, args, 2, "legs/test-v0")
+    assert counts(policy) == 2 * EPISODE
+
+
 def act(observations):
     return np.full((len(observations), 4), 0.25)
 
@@ -164,6 +206,29 @@ def test_a_policy_that_returns_actions_alone_is_told(env):
     policy = type("Alone", (), {"predict": lambda *_, **__: np.zeros(4)})()
     with pytest.raises(ParameterError, match=r"Alone: expected .* actions and a state.* got array"):
         play(env, policy, [0])
+
+
+ASKS = {
+    "hoof_env/policies/actor.py": "plays",
+    "hoof_env/policies/saved.py": "hands on what a model of Stable-Baselines3 returns",
+    "hoof_env/policies/onnx_file.py": "tries a new file with drawn observations",
+    "agents/export.py": "compares two policies over drawn observations",
+    "agents/ship.py": "hands on what a policy returns, with noise",
+}
+"""Files that ask a policy for actions, and what for."""
+
+
+def test_nothing_else_asks_a_policy_for_actions():
+    root = Path(__file__).parents[2]
+    asks = set()
+    for room in ("hoof_env", "agents", "benchmarks", "examples"):
+        for path in (root / room).rglob("*.py"):
+            calls = [
+                node for node in ast.walk(ast.parse(path.read_text("utf-8"))) if isinstance(node, ast.Call)
+            ]
+            if any(isinstance(call.func, ast.Attribute) and call.func.attr == "predict" for call in calls):
+                asks.add(path.relative_to(root).as_posix())
+    assert asks == set(ASKS)
 
 
 @pytest.mark.parametrize("policy", [3, object(), Counting])
