@@ -42,7 +42,11 @@ SUMMARY = {
         "the rest, which rail or suspension bore: a mean, for a suspension also pulls",
     ),
     "failed": ("-", "0 or 1"),
-    "success": ("-", f"1 if it lasted, at {SUCCESS_SPEED} of the commanded speed or more, if there is one"),
+    "success": (
+        "-",
+        f"1 if it lasted, at {SUCCESS_SPEED} of the commanded speed or more, if there is one;"
+        " `target_speed` counts as commanded",
+    ),
 }
 """Figures of an episode by name: unit and meaning, as the manual has them. `summaries_of` computes them. A
 horse's mean force and sum of peaks are sums over its legs, its duty factor is the mean of its legs."""

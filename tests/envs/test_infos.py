@@ -3,16 +3,20 @@
 from __future__ import annotations
 
 import copy
+import json
 import pickle
 
 import gymnasium as gym
 import numpy as np
 import pytest
+import yaml
 from family import FALLS, IDS, actions, same, together
 from gymnasium.vector import AsyncVectorEnv, SyncVectorEnv
 
 from hoof_env.episodes.infos import NamedArray, measured_names, name_columns, row_of
+from hoof_env.episodes.summaries import SUMMARY
 from hoof_env.errors import ParameterError
+from hoof_env.evaluation.episodes import play
 from hoof_env.gait import PARAMETERS
 from hoof_env.tasks.one_leg import OneLeg
 from hoof_env.tasks.reward import TERMS as TABLE
@@ -45,6 +49,30 @@ def test_reset_and_step_have_the_same_keys_of_numpys_numbers(env_id, settings):
         "end",
         "is_success",
     }
+
+
+@pytest.mark.parametrize("env_id", IDS)
+def test_what_an_ended_episode_says_can_be_written_as_yaml_and_json(env_id):
+    """As loggers do with an info, which know Python's numbers only."""
+    env = gym.make(env_id, episode_seconds=0.06)
+    env.reset(seed=0)
+    *_, info = [env.step(taken)[4] for taken in actions(0, 3, env_id=env_id)]
+    summary = info["episode_summary"]
+    for told in (summary, info["end"], info["is_success"], env.unwrapped.episode_summary()):
+        same(yaml.safe_load(yaml.safe_dump(told)), told)
+        assert json.loads(json.dumps(told)) == told
+    assert set(summary) == set(SUMMARY)
+
+
+@pytest.mark.parametrize("target", [1.0, 3.0])
+def test_a_target_speed_counts_as_commanded(target):
+    """Success of the run, which goes at 2.2 m/s, and falls for no target."""
+    env = gym.make(LEG, target_speed=target, episode_seconds=4.0)
+    (episode,) = play(env, "run", [0])
+    assert 1.8 < episode["speed_m_s"] < 2.6
+    assert episode["failed"] == 0
+    assert episode["success"] == (target == 1.0)
+    assert "`target_speed`" in SUMMARY["success"][1]
 
 
 @pytest.mark.parametrize("kind", [SyncVectorEnv, AsyncVectorEnv])
