@@ -1,6 +1,7 @@
 """Trained policies as plain data, played by NumPy alone.
 
-    policy.json         algorithm, kind of policy, its arguments, both spaces, statistics of the observations
+    policy.json         algorithm, kind of policy, its arguments, both spaces, statistics of the observations,
+                        and the SHA-256 of all that
     policy.safetensors  the weights, in the format of the library safetensors: the length of a JSON header,
                         the header, and the numbers of all tensors
 
@@ -9,6 +10,8 @@
 
 from __future__ import annotations
 
+import hashlib
+import json
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
@@ -25,6 +28,7 @@ from hoof_env.policies.record import read_record
 WEIGHTS = "policy.safetensors"
 ABOUT = "policy.json"
 FORMAT = 1  # version of the layout of policy.json
+DIGEST = "sha256"  # entry of policy.json
 
 Floats = NDArray[np.float64]
 ACTIVATIONS: Mapping[str, Callable[[Floats], Floats]] = {
@@ -62,6 +66,7 @@ class NumpyPolicy(FilePolicy):
             about = parse_json(read_text(path / ABOUT))
             if not is_known(about):
                 raise ValueError(f"a policy that NumPy does not play: {about.get('algo')} {about['policy']}")
+            check_digest(about, path / WEIGHTS)
             self.observation_space = built_box(**about["observation_space"])
             self.action_space = built_box(**about["action_space"])
             arguments = about["normalize"]
@@ -104,6 +109,37 @@ def is_known(about: Mapping[str, Any]) -> bool:
     kind = arguments.get("activation_fn", {"torch.nn": "Tanh"})
     is_kind = (about.get("format"), about.get("algo"), about.get("policy")) == (FORMAT, "ppo", "MlpPolicy")
     return is_kind and set(arguments) <= set(KNOWN) and kind.get("torch.nn") in ACTIVATIONS
+
+
+def digest_of(about: Mapping[str, Any], weights: bytes) -> str:
+    """Return the SHA-256 of a policy, hexadecimal.
+
+    Args:
+        about: content of policy.json, of which `DIGEST` does not count.
+        weights: content of policy.safetensors.
+    """
+    rest = json.dumps({name: value for name, value in about.items() if name != DIGEST}, sort_keys=True)
+    return hashlib.sha256(rest.encode() + weights).hexdigest()
+
+
+def check_digest(about: Mapping[str, Any], weights: Path) -> None:
+    """Check that a policy is as it was written, because one flipped bit may give other weights that can be
+    read. Policies of earlier commits have no digest to check.
+
+    Args:
+        about: content of policy.json.
+        weights: path of policy.safetensors.
+
+    Raises:
+        OSError: the weights cannot be read.
+        ValueError: a file is damaged or changed.
+    """
+    check_regular(weights)
+    if DIGEST in about and about[DIGEST] != digest_of(about, weights.read_bytes()):
+        raise ValueError(
+            f"one of them is not as it was written, by {DIGEST} in {ABOUT}: take a copy that is whole; after"
+            " a change of your own, remove that entry"
+        )
 
 
 def read_tensors(path: Path | str) -> dict[str, Floats]:

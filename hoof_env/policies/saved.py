@@ -37,7 +37,7 @@ from hoof_env.errors import (
 from hoof_env.policies.normalisation import STATISTICS as STATISTICS
 from hoof_env.policies.normalisation import normaliser_of
 from hoof_env.policies.plain import ABOUT as ABOUT
-from hoof_env.policies.plain import FORMAT, Normalizer, built_box
+from hoof_env.policies.plain import DIGEST, FORMAT, Normalizer, built_box, check_digest, digest_of
 from hoof_env.policies.plain import WEIGHTS as WEIGHTS
 from hoof_env.policies.record import check_record as check_record
 from hoof_env.policies.record import describe as describe
@@ -232,7 +232,8 @@ def save_policy(model: Any, folder: Path | str) -> bool:
             "action_space": _plain_box(model.action_space),
             "normalize": normalize,
         }
-        text = json.dumps(about, indent=1, allow_nan=False) + "\n"
+        # As it is read back, for the digest
+        about = json.loads(json.dumps(about, allow_nan=False))
     except (TypeError, ValueError, AttributeError, StopIteration):
         return False
     # Cloned, so that a tensor that two names share is written twice: the format has no references.
@@ -240,8 +241,10 @@ def save_policy(model: Any, folder: Path | str) -> bool:
         key: value.detach().cpu().clone().contiguous() for key, value in model.policy.state_dict().items()
     }
     # Not by `save_file`, which makes a file that only its owner can read.
-    (folder / WEIGHTS).write_bytes(save(weights))
-    (folder / ABOUT).write_text(text, encoding="utf-8")
+    content = save(weights)
+    about[DIGEST] = digest_of(about, content)
+    (folder / WEIGHTS).write_bytes(content)
+    (folder / ABOUT).write_text(json.dumps(about, indent=1) + "\n", encoding="utf-8")
     return True
 
 
@@ -254,6 +257,7 @@ def read_plain(folder: Path | str) -> TrainedPolicy:
     about = parse_json(read_text(folder / ABOUT))
     if about["format"] != FORMAT:
         raise ValueError(f"format {about['format']!r}, expected {FORMAT}")
+    check_digest(about, folder / WEIGHTS)
     # Without set-up, which needs an environment and makes a replay buffer; only the policy is built.
     model = algorithm_class(about["algo"])(about["policy"], None, device="cpu", _init_setup_model=False)
     model.observation_space = built_box(**about["observation_space"])

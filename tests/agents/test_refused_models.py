@@ -21,6 +21,7 @@ from hoof_env.errors import DataFileError, HoofEnvError, OutputError, ParameterE
 from hoof_env.evaluation import scores
 from hoof_env.policies.find import find_policy
 from hoof_env.policies.onnx_file import OnnxPolicy
+from hoof_env.policies.plain import DIGEST
 from hoof_env.policies.saved import ABOUT, WEIGHTS
 from tests.agents.conftest import ENV_ID, KWARGS, change, save_untrained
 
@@ -40,7 +41,19 @@ def record(**values):
 
 
 def about(**values):
-    return lambda folder: change(folder / ABOUT, **values)
+    """Entries of a policy.json whose digest does not tell of them."""
+
+    def write(folder):
+        change(folder / ABOUT, **values)
+        forget_the_digest(folder)
+
+    return write
+
+
+def forget_the_digest(folder):
+    content = json.loads((folder / ABOUT).read_text())
+    del content[DIGEST]
+    (folder / ABOUT).write_text(json.dumps(content))
 
 
 def alone(content):
@@ -71,6 +84,7 @@ def not_finite(folder):
     weights = load_file(folder / WEIGHTS)
     weights["log_std"][0] = torch.nan
     save_file(weights, folder / WEIGHTS)
+    forget_the_digest(folder)
 
 
 def half_the_weights(folder):
@@ -80,7 +94,14 @@ def half_the_weights(folder):
 def no_deviation(folder):
     """Variances below 0, of the right number."""
     normals = json.loads((folder / ABOUT).read_text())["normalize"]
-    change(folder / ABOUT, normalize={**normals, "var": [-1.0] * len(normals["var"])})
+    about(normalize={**normals, "var": [-1.0] * len(normals["var"])})(folder)
+
+
+def other_weights(folder):
+    """Of the same shapes."""
+    weights = load_file(folder / WEIGHTS)
+    weights["log_std"][0] += 1.0
+    save_file(weights, folder / WEIGHTS)
 
 
 RUNS = [
@@ -117,6 +138,10 @@ RUNS = [
     ),
     (no_deviation, r"policy\.json"),
     (not_finite, "not finite"),
+    *(
+        (damage, "not as it was written.*remove that entry")
+        for damage in (other_weights, lambda folder: change(folder / ABOUT, policy_kwargs={}))
+    ),
     (half_the_weights, r"policy\.json"),
     *((cut(part), r"model\.zip: expected a model saved by Stable-Baselines3") for part in (0.0, 0.5, 0.99)),
 ]  # fmt: skip

@@ -203,14 +203,15 @@ def test_a_damaged_checkpoint_is_named_and_an_earlier_one_serves(stopped, tmp_pa
     shutil.copytree(stopped, folder)
     last, earlier = checkpoints(folder)
     for file in last.iterdir():
-        # One flipped bit, with which a pickle may well be readable.
-        content = bytearray(file.read_bytes())
-        content[len(content) // 2] ^= 1
-        file.write_bytes(content)
-        with pytest.raises(DataFileError, match=rf"checkpoints/{last.name}: "):
-            train(arguments("sac", folder, resume=True))
-        content[len(content) // 2] ^= 1
-        file.write_bytes(content)
+        whole = file.read_bytes()
+        # One flipped bit in a header, in numbers and at the end, with which a pickle may well be readable.
+        for place in (9, len(whole) // 2, len(whole) - 2):
+            content = bytearray(whole)
+            content[place] ^= 1
+            file.write_bytes(content)
+            with pytest.raises(DataFileError, match=rf"checkpoints/{last.name}: "):
+                train(arguments("sac", folder, resume=True))
+        file.write_bytes(whole)
     (last / REPLAY).unlink()
     with pytest.raises(DataFileError, match=rf"checkpoints/{last.name}: .*{REPLAY}"):
         train(arguments("sac", folder, resume=True))

@@ -11,6 +11,8 @@ import torch
 from stable_baselines3 import PPO
 
 from agents.runs import STATISTICS, SavedModel
+from hoof_env.errors import DataFileError
+from hoof_env.policies.plain import NumpyPolicy
 from hoof_env.policies.saved import ABOUT, WEIGHTS
 from tests.agents.conftest import ENV_ID, change, save_untrained
 
@@ -92,6 +94,42 @@ def test_all_files_have_the_same_mode_and_nothing_is_unpickled(env, tmp_path):
     policy.predict(env.reset(seed=0)[0])
     (tmp_path / "model.zip").unlink()
     assert SavedModel.find(tmp_path).load(env, ENV_ID).predict(env.reset(seed=0)[0])
+
+
+@pytest.mark.parametrize("place", ["weights", "header", "metadata"])
+def test_a_flipped_bit_is_refused_or_changes_nothing(place, env, tmp_path):
+    """In the numbers of the weights, in the header that says where they are, or in policy.json."""
+    model = save_untrained(tmp_path, env)
+    observations = np.random.default_rng(1).normal(size=(5, *env.observation_space.shape)).astype(np.float32)
+    wanted = NumpyPolicy(tmp_path).predict(observations)[0]
+    np.testing.assert_allclose(
+        model.predict(model.get_vec_normalize_env().normalize_obs(observations), deterministic=True)[0],
+        wanted,
+        atol=1e-6,
+    )
+    path = tmp_path / (ABOUT if place == "metadata" else WEIGHTS)
+    whole = path.read_bytes()
+    numbers = 8 + int.from_bytes(whole[:8], "little")
+    begin, end = {"weights": (numbers, len(whole)), "header": (0, numbers), "metadata": (0, len(whole))}[
+        place
+    ]
+    generator = np.random.default_rng(0)
+    refused = 0
+    for _ in range(300):
+        content = bytearray(whole)
+        content[generator.integers(begin, end)] ^= 1 << int(generator.integers(8))
+        path.write_bytes(content)
+        try:
+            found = NumpyPolicy(tmp_path).predict(observations)[0]
+        except DataFileError:
+            refused += 1
+            if refused < 20:
+                with pytest.raises(DataFileError):
+                    SavedModel.find(tmp_path).load(env, ENV_ID)
+        else:
+            np.testing.assert_array_equal(found, wanted)
+    # Of policy.json the name of the digest may be hit, and then nothing is checked, and nothing damaged
+    assert refused == 300 if place != "metadata" else refused > 280
 
 
 def test_arguments_that_are_not_plain_leave_only_the_zip(env, tmp_path):
