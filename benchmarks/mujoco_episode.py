@@ -261,9 +261,9 @@ class MujocoEpisode:
         asked = float(self.env.commanded_speed) * dt
         allowance = min(self.allowance + BEARING * dt, BEARING * MAX_STRIDE)
         impulse = sums.impulse / self.weight
-        borne = min(impulse, allowance)
-        self.allowance = allowance - borne
-        borne -= impulse - borne
+        within = min(impulse, allowance)
+        self.allowance = allowance - within
+        credited = within - (impulse - within)
         pace = min(float(np.clip(progress / asked, -1.0, 1.0)), self.theta_rate / STEPPING)
         return (
             w["progress"] * min(progress, asked)
@@ -272,7 +272,7 @@ class MujocoEpisode:
             - 1e-6 * w["loading"] * sums.loading
             - 1e-3 * w["energy"] * sums.work
             - w["slip"] * sums.slip
-            + w["support"] * min(pace * borne, abs(pace) * borne)
+            + w["support"] * min(pace * credited, abs(pace) * credited)
             - (w["failure"] * (self.env.episode_seconds - self.time) if failed else 0.0)
         )
 

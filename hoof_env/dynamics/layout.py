@@ -219,7 +219,7 @@ class Strides(Layout):
     stance_began: Row  # crank angle there [rad]
     stance_peak: Row  # highest resultant force of this stance [N]
     steepest_rise: Row  # of the normal force while this stance's peak grew [N/s]
-    load: Row  # normal force on the hoof [N]
+    normal_force: Row  # on the hoof [N]
     running_peak: Row  # of the resultant force, at most twice that force [N]
 
 
@@ -265,7 +265,7 @@ class StrideSums(Layout):
     ]
     loaded_time: Annotated[Row, Quantity("s", "part of the control step with load on the hoof")]
     stances: Annotated[Row, Quantity("-", "stances that began in the control step")]
-    travel: Annotated[
+    backward_travel: Annotated[
         Row, Quantity("m", "load-weighted backward travel of the hoof along the ground in the control step")
     ]
     slip: Annotated[

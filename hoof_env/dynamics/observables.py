@@ -185,11 +185,11 @@ def count_stride(trunk: TrunkRows, leg: LegRows, form: EngineLayout, h: Lanes | 
     leg.strides.stance_open = where(loaded, 1.0, 0.0)
     leg.strides.stance_began = where(begins > 0.0, leg.state.crank_angle, leg.strides.stance_began)
     leg.strides.stance_peak = higher
-    rise = where(higher > peak, (load - leg.strides.load) * (1.0 / h), 0.0)
+    rise = where(higher > peak, (load - leg.strides.normal_force) * (1.0 / h), 0.0)
     steepest = where(goes_on, leg.strides.steepest_rise, 0.0)
     steeper = where(loaded, maximum(steepest, rise), 0.0)
     leg.strides.steepest_rise = steeper
-    leg.strides.load = load
+    leg.strides.normal_force = load
     leg.sums.loading_rate_increase = leg.sums.loading_rate_increase + (steeper - steepest)
     leg.sums.stances = leg.sums.stances + begins
     leg.sums.peak_grf_increase = leg.sums.peak_grf_increase + (higher - peak)
@@ -204,7 +204,7 @@ def count_stride(trunk: TrunkRows, leg: LegRows, form: EngineLayout, h: Lanes | 
     leg.sums.loaded_time = leg.sums.loaded_time + where(down, h, 0.0)
     per_load = h / where(down, load, 1.0)  # 1 avoids a division by 0; the result is not used there
     slid = leg.toe.normal * leg.toe.slide + leg.heel.normal * leg.heel.slide
-    leg.sums.travel = leg.sums.travel - where(down, slid * per_load, 0.0)
+    leg.sums.backward_travel = leg.sums.backward_travel - where(down, slid * per_load, 0.0)
     rubbed = leg.toe.normal * absolute(leg.toe.slide)
     rubbed = rubbed + leg.heel.normal * absolute(leg.heel.slide)
     # in stance alone: a sole without mass flies back as it is unloaded, which is not slip of the hoof
@@ -223,7 +223,7 @@ class StanceCounter:
     began: float = 0.0  # crank angle where the last stance opened [rad]
     peak: float = 0.0  # highest resultant force of the open stance [N], 0 between stances
     steepest: float = 0.0  # rise of the normal force while that peak grew [N/s]
-    load: float = 0.0  # normal force of the last substep [N]
+    normal_force: float = 0.0  # of the last substep [N]
     running: float = 0.0  # running peak [N]
     count: int = 0  # number of stances that have opened
 
@@ -246,9 +246,9 @@ class StanceCounter:
             self.count = self.count + 1
         self.is_open = loaded
         self.peak = max(before, force) if loaded else 0.0
-        rise = (normal - self.load) * (1.0 / h) if self.peak > before else 0.0
+        rise = (normal - self.normal_force) * (1.0 / h) if self.peak > before else 0.0
         self.steepest = max(steepest, rise) if loaded else 0.0
-        self.load = normal
+        self.normal_force = normal
         running = min(self.running, 2 * force)
         self.running = max(running, force)
         return self.peak - before, max(force - running, 0.0), self.steepest - steepest

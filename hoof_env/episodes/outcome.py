@@ -11,14 +11,14 @@ from hoof_env.tasks.episode import FAILED, TRUNCATED, Episode, Memories
 from hoof_env.tasks.reward import BEARING, MAX_STRIDE, Outcome
 
 
-def bear(episode: Episode, impulse: Lanes, seconds: Number) -> Lanes:
-    """Return the part of an impulse, divided by the weight, for which bearing is rewarded [s]: all within the
+def credit_bearing(episode: Episode, impulse: Lanes, seconds: Number) -> Lanes:
+    """Return the part of an impulse, divided by the weight, that is credited as bearing [s]: all within the
     allowance, less the part beyond it. The allowance grows with time, and the impulse uses it up; see
     `reward.BEARING`."""
     allowance = minimum(episode.allowance + BEARING * seconds, BEARING * MAX_STRIDE)
-    borne = minimum(impulse, allowance)
-    episode.allowance = allowance - borne
-    return borne - (impulse - borne)
+    within = minimum(impulse, allowance)
+    episode.allowance = allowance - within
+    return within - (impulse - within)
 
 
 def sum_up(first_leg: LegMemory, layouts: Memories, works: Mask, sums: StrideSums) -> None:
@@ -50,16 +50,16 @@ def find_outcome(
     progress = x - episode.x_before
     # A fixed trunk does not travel: what counts is how far hooves in stance slide backward.
     if task.is_fixed:
-        progress = leg.sums.travel
+        progress = leg.sums.backward_travel
     episode.x_before = x
     seconds = where(works, task.dt, 0.0)
-    borne = bear(episode, sums.normal_impulse / episode.weight, seconds)
+    credited = credit_bearing(episode, sums.normal_impulse / episode.weight, seconds)
     return Outcome(
         seconds=seconds,
         progress=where(works, progress, 0.0),
         commanded_progress=rounded(task.dt * episode.target),
         sums=sums,
-        borne=borne,
+        credited=credited,
         failed=where((trunk.result == 0.0) & (y > task.lowest) & (y < task.highest), 0.0, 1.0),
         episode_seconds=task.episode_seconds,
         weight=episode.weight,

@@ -33,7 +33,7 @@ ACCOUNT = np.dtype(
         ("began", "f8"),
         ("peak", "f8"),
         ("steepest", "f8"),
-        ("load", "f8"),
+        ("normal_force", "f8"),
         ("running", "f8"),
         ("count", "i8"),
         ("impulse", "f8"),
@@ -295,7 +295,8 @@ class PaperEngine(TrunkEngine):
         memory.limbs[0, :, env] = [last[name] for name in LEG_STATE]
         memory.limb_report[0, :, env] = [last[name] for name in LEG_REPORT]
         account = self._accounts[env]
-        memory.strides[0, :, env] = account[["open", "began", "peak", "steepest", "load", "running"]].item()
+        of_stance = ["open", "began", "peak", "steepest", "normal_force", "running"]
+        memory.strides[0, :, env] = account[of_stance].item()
 
     def _sum(self, env: int, trace: Records) -> dict[str, float]:
         """Return the `layout.StrideSums` of a control step by name, and update the account of the episode.
@@ -315,7 +316,7 @@ class PaperEngine(TrunkEngine):
         rubbing = rubbing + trace["heel_normal"] * np.abs(trace["heel_slide"])
         powers = trace["crank_power"], trace["hip_power"]
         columns = trace["crank_angle"], normal, force, sliding, rubbing, *powers
-        growth = higher = steeper = work = travel = slip = 0.0
+        growth = higher = steeper = work = backward_travel = slip = 0.0
         # Substep by substep, in the order in which the engine adds.
         rows = zip(*(values.tolist() for values in columns), strict=True)
         for theta, n, f, slid, rubbed, crank, hip in rows:
@@ -327,7 +328,7 @@ class PaperEngine(TrunkEngine):
             impulse += h * n
             if n > 0.0:
                 loaded += h
-                travel -= h * slid / n
+                backward_travel -= h * slid / n
             # Sliding counts in stance only, not under the small forces of landing and lift-off.
             if n > threshold:
                 slip += h * rubbed / n
@@ -341,6 +342,6 @@ class PaperEngine(TrunkEngine):
             "normal_impulse": impulse - impulse_before,
             "loaded_time": loaded - loaded_before,
             "stances": since.count - stances,
-            "travel": travel,
+            "backward_travel": backward_travel,
             "slip": slip,
         }

@@ -33,7 +33,7 @@ class Outcome(NamedTuple):
         commanded_progress: forward travel at the commanded speed; infinite without one [m].
         sums: `dynamics.layout.StrideSums` of the step, `sums.slip` and so on; sums over all legs, of peaks
             the highest.
-        borne: impulse divided by the weight, for which bearing is rewarded [s]; see `BEARING`.
+        credited: impulse divided by the weight that is credited as bearing [s]; see `BEARING`.
         failed: 1 where the episode ends by failure, else 0.
         episode_seconds: duration of a whole episode [s].
         weight: weight of trunk and legs [N].
@@ -46,7 +46,7 @@ class Outcome(NamedTuple):
     progress: Lanes
     commanded_progress: Lanes
     sums: StrideSums
-    borne: Lanes
+    credited: Lanes
     failed: Lanes
     episode_seconds: Lanes
     weight: Lanes
@@ -115,7 +115,7 @@ def support(step: Outcome, weight: Number) -> Lanes:
     # Without a commanded speed the ratio above is 0: then only the crank counts.
     pace = minimum(where(commanded < np.inf, pace, 1.0), step.leg.state.crank_angle_rate * (1.0 / STEPPING))
     # The minimum, because two negative factors would reward too much bearing in backward motion.
-    return weight * minimum(pace * step.borne, absolute(pace) * step.borne)
+    return weight * minimum(pace * step.credited, absolute(pace) * step.credited)
 
 
 OBJECTIVES = ("progress", "peak force", "energy")

@@ -171,7 +171,7 @@ def test_slip_is_what_the_soles_slide_in_stance():
         pushes += h * np.array([np.maximum(-push, 0), np.maximum(push, 0)])
     assert slip.min() > 0.01
     assert total["slip"][:, 0] == pytest.approx(slip)
-    assert total["travel"][:, 0] == pytest.approx(travel)
+    assert total["backward_travel"][:, 0] == pytest.approx(travel)
     assert [total["braking"][:, 0], total["propulsion"][:, 0]] == [pytest.approx(p) for p in pushes]
     figures = stance_figures(total, 0.3, np.full((4, 1), 0.25))
     assert set(figures) >= {"peak", "mean", "duty", "stances_per_turn", "slip", "braking", "propulsion"}

@@ -121,7 +121,7 @@ def test_strides_are_those_of_the_record(kind, legs):
     assert total["normal_impulse"] == pytest.approx(1e-3 * load.sum(0), rel=1e-12)
     assert total["loaded_time"] == pytest.approx(1e-3 * down.sum(0))
     slid = (toe * record["toe_slide"] + heel * record["heel_slide"]) / np.where(down, load, np.inf)
-    assert total["travel"] == pytest.approx(-1e-3 * slid.sum(0), rel=1e-10)
+    assert total["backward_travel"] == pytest.approx(-1e-3 * slid.sum(0), rel=1e-10)
     for leg in range(legs):
         history = load[:, leg], record["crank_angle"][:, leg], force[:, leg]
         peaks, rates = peaks_and_rates(*history, 0.05 * made.weight / legs)

@@ -38,7 +38,7 @@ def dimensionless(env, measured):
     units = {"x": size, "y": size, "vx": size**0.5, "pitch": 1.0, "pitch_rate": size**-0.5}
     for leg in LEGS:
         units |= {f"{leg}_crank_angle": 1.0, f"{leg}_crank_speed": size**-0.5, f"{leg}_swing_sin": 1.0}
-        units |= {f"{leg}_load": size**3, f"{leg}_command_crank_speed": size**-0.5}
+        units |= {f"{leg}_normal_force": size**3, f"{leg}_command_crank_speed": size**-0.5}
     found = [measured[name] / unit for name, unit in units.items()]
     return np.array(found)
 

@@ -214,8 +214,9 @@ def test_the_row_of_an_environment():
 
 
 def test_named_numbers_print_their_names_with_their_values():
-    row = name_columns([6.5, -0.25, np.nan], ("crank_speed", "swing_sin", "load"))
-    assert repr(row) == str(row) == f"{row}" == "NamedArray(crank_speed=6.5, swing_sin=-0.25, load=nan)"
+    row = name_columns([6.5, -0.25, np.nan], ("crank_speed", "swing_sin", "normal_force"))
+    expected = "NamedArray(crank_speed=6.5, swing_sin=-0.25, normal_force=nan)"
+    assert repr(row) == str(row) == f"{row}" == expected
     two = name_columns([[1.0, 2.0], [3.0, 4.0]], ("x", "y"))
     assert repr(two) == "NamedArray(\n  x=[1., 3.],\n  y=[2., 4.]\n)"
     assert repr(two["x"]) == repr(np.array([1.0, 3.0]))

@@ -24,7 +24,8 @@ POWERS = {
     "x": 1.0, "y": 1.0, "vx": 0.5, "vy": 0.5, "crank_angle": 0.0, "crank_speed": -0.5,
     "crank_speed_rate": -1.0,
     "swing_offset": 0.0, "swing_sin": 0.0, "swing_cos": 0.0, "swing_offset_rate": -0.5,
-    "swing_sin_rate": -0.5, "swing_cos_rate": -0.5, "toe_penetration": 1.0, "load": 3.0, "running_peak": 3.0,
+    "swing_sin_rate": -0.5, "swing_cos_rate": -0.5, "toe_penetration": 1.0, "normal_force": 3.0,
+    "running_peak": 3.0,
 }  # fmt: skip
 """Of the size, with which quantities of similar motions go."""
 
