@@ -4,7 +4,7 @@ wrong time and for assignments without effect."""
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import gymnasium as gym
 import numpy as np
@@ -16,9 +16,7 @@ from numpy.typing import ArrayLike, NDArray
 from hoof_env._display import html_table, line_of
 from hoof_env.dynamics.engine import TrunkEngine
 from hoof_env.dynamics.memory import env_indices as which_of
-from hoof_env.envs.drawn_recording import DrawnRecording
 from hoof_env.episodes.batch import EpisodeBatch
-from hoof_env.episodes.recording import Recording, commands_of_step, surroundings_of
 from hoof_env.episodes.row_plans import CHANGEABLE
 from hoof_env.episodes.states import state_of
 from hoof_env.episodes.summaries import summaries_of
@@ -26,7 +24,6 @@ from hoof_env.errors import FixedSettingError, ParameterError, check_choice, che
 from hoof_env.gait import GaitParameters
 from hoof_env.ground.terrain import Terrain
 from hoof_env.leg.geometry import Geometry
-from hoof_env.record.surroundings import Surroundings
 from hoof_env.render.size import check_side
 from hoof_env.tasks.body import Body
 from hoof_env.tasks.registry import Task, task_of
@@ -40,6 +37,11 @@ from hoof_env.tasks.settings import (
     json_value,
     to_json,
 )
+
+if TYPE_CHECKING:
+    from hoof_env.envs.drawn_recording import DrawnRecording
+    from hoof_env.episodes.recording import Recording
+    from hoof_env.record.surroundings import Surroundings
 
 
 def fixed_setting(name: str) -> FixedSettingError:
@@ -336,6 +338,8 @@ class LegBase:
 
     def surroundings(self, env: int = 0) -> Surroundings:
         """Return what is around an environment: ground, trunk, hips, weight, and the kind of its picture."""
+        from hoof_env.episodes.recording import surroundings_of
+
         return surroundings_of(self.batch, env)
 
     def commands_between(
@@ -347,6 +351,8 @@ class LegBase:
         Args:
             before, after: memory of the engine before and after the step; see `TrunkEngine.column`.
         """
+        from hoof_env.episodes.recording import commands_of_step
+
         return commands_of_step(self.batch, before, after)
 
     def _check_open(self, call: str) -> None:
@@ -359,8 +365,15 @@ class LegBase:
         there is no episode yet."""
         self._check_started("record")
         if env not in self._watched:
-            self._watched[env] = DrawnRecording(self.batch, env)
+            self._watch(env)
         return self._watched[env]
+
+    def _watch(self, env: int) -> None:
+        """Switch the recording of an environment on, from which its pictures are drawn."""
+        # Most environments are neither recorded nor drawn.
+        from hoof_env.envs.drawn_recording import DrawnRecording
+
+        self._watched[env] = DrawnRecording(self.batch, env, self._size)
 
     def _check_started(self, call: str) -> None:
         """Raise `ResetNeeded` before the first reset, too."""

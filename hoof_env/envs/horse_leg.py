@@ -16,7 +16,6 @@ from numpy.typing import NDArray
 from hoof_env.dynamics.parts import broken
 from hoof_env.envs.arguments import EnvArguments, takes
 from hoof_env.envs.base import LegBase, array_of
-from hoof_env.envs.drawn_recording import DrawnRecording
 from hoof_env.envs.generators import generator_of, state_of
 from hoof_env.episodes.infos import name_columns
 from hoof_env.episodes.states import check_single, set_state
@@ -63,7 +62,9 @@ class HorseLegEnv(LegBase, gym.Env[NDArray[np.float32], NDArray[np.float32]]):
         spaces_of = self._make(task, settings, 1, render_mode, (width, height))
         self.observation_space, self.action_space = spaces_of
         self._began_with = b"", 0.0
-        self._watched = {0: DrawnRecording(self.batch, 0, self._size)} if render_mode else {}
+        self._watched = {}
+        if render_mode:
+            self._watch(0)
         self._attach()
 
     def _attach(self) -> None:

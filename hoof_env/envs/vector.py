@@ -20,7 +20,6 @@ from numpy.typing import NDArray
 
 from hoof_env.envs.arguments import VectorArguments, takes
 from hoof_env.envs.base import LegBase, array_of, fixed_setting, longer_limit
-from hoof_env.envs.drawn_recording import DrawnRecording
 from hoof_env.envs.generators import Generators, generator_of
 from hoof_env.episodes.infos import name_columns
 from hoof_env.episodes.states import set_state, spread_state
@@ -206,7 +205,9 @@ class HorseLegVectorEnv(LegBase, VectorEnv[NDArray[np.float32], NDArray[np.float
         self.metadata["autoreset_mode"] = self.autoreset_mode
         self.spec = None
         self.drawn = check_drawn(rendered, self.num_envs, self.render_mode)
-        self._watched = {env: DrawnRecording(self.batch, env, self._size) for env in range(self.drawn)}
+        self._watched = {}
+        for env in range(self.drawn):
+            self._watch(env)
         self._attributes: dict[str, dict[int, Any]] = {}
         self._generators = Generators(self.num_envs)
         self._ended = np.zeros(self.num_envs, bool)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 from dataclasses import dataclass
 from functools import cached_property, partial
 from typing import Any, Protocol
@@ -25,8 +25,6 @@ from hoof_env.episodes.scene import Slots
 from hoof_env.episodes.strength import Strength
 from hoof_env.errors import check_choice, check_number
 from hoof_env.ground.terrain import Terrain
-from hoof_env.paper_solver.episodes import PaperEngine, Scheme, check_settings
-from hoof_env.paper_solver.integrators import INTEGRATORS
 from hoof_env.tasks.body import Body
 from hoof_env.tasks.episode import ACTIONS, episode_layout, task_type
 from hoof_env.tasks.observation import check_groups, groups_of
@@ -194,6 +192,8 @@ def make_plan(
     given = {} if s.randomize is None else check_parameters("randomize", s.randomize, s)
     terrain = make_terrain(s.terrain)
     if s.solver == "paper":
+        from hoof_env.paper_solver.episodes import check_settings
+
         check_settings(s)
     body = task.body(s)
     check_drift(terrain, s.terrain, s.trunk, body.height)
@@ -250,7 +250,12 @@ def _check_choices(s: ResolvedSettings) -> None:
     Raises:
         ParameterError: a value is unknown or out of range.
     """
-    check_choice("integrator", s.integrator, INTEGRATORS if s.solver == "paper" else SCHEMES)
+    schemes: Collection[str] = SCHEMES
+    if s.solver == "paper":
+        from hoof_env.paper_solver.integrators import INTEGRATORS
+
+        schemes = INTEGRATORS
+    check_choice("integrator", s.integrator, schemes)
     check_choice("drive", s.drive, ("prescribed", "motor"))
     for name in ("baumgarte_alpha", "baumgarte_beta"):
         check_number(name, getattr(s, name), low=0.0, high=MAX_BAUMGARTE)
@@ -272,6 +277,8 @@ def _make_engine(
     make: Callable[..., TrunkEngine] = TrunkEngine
     integrator = s.integrator
     if s.solver == "paper":
+        from hoof_env.paper_solver.episodes import PaperEngine, Scheme
+
         scheme = Scheme(s.sim_dt, s.baumgarte_alpha, s.baumgarte_beta, s.integrator)
         make = partial(PaperEngine, scheme)
         integrator = "midpoint"  # of `TrunkEngine`, which takes no step then

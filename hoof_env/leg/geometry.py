@@ -10,7 +10,7 @@ from collections.abc import Mapping
 from dataclasses import MISSING, dataclass, field, fields, replace
 from pathlib import Path
 from types import MappingProxyType
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -36,9 +36,11 @@ from hoof_env.leg.checks import (
 from hoof_env.leg.kinematics import FrameMotion, Pose, pose
 from hoof_env.leg.mechanism import Mechanism
 from hoof_env.leg.mechanism_list import PAPER
-from hoof_env.leg.mjcf import GroundLike, MotorLike, TrunkLike, leg_to_mjcf
 from hoof_env.leg.mobility import check_motion
 from hoof_env.leg.presets import DEFAULT_PRESET, Preset, preset_error_type, preset_label, read_preset
+
+if TYPE_CHECKING:
+    from hoof_env.leg.mjcf import GroundLike, MotorLike, TrunkLike
 
 LINEAR_DENSITY = 1.0
 """Default mass per length of a link [kg/m]. The paper prints no masses. One kilogram a metre gives the
@@ -220,6 +222,8 @@ class Geometry:
             ParameterError: an invalid number, type or suffix, or no leg at this `theta`.
             OutputError: the file cannot be written.
         """
+        from hoof_env.leg.mjcf import leg_to_mjcf
+
         return leg_to_mjcf(self, path, (theta, swing), trunk, motor, ground, timestep)
 
     def to_dict(self) -> dict[str, Any]:
