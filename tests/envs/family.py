@@ -11,7 +11,7 @@ from gymnasium.vector import AutoresetMode, SyncVectorEnv
 
 from hoof_env.errors import ParameterError
 from hoof_env.tasks.registry import TASKS
-from hoof_env.tasks.settings import Settings, check_effect
+from hoof_env.tasks.settings import NEEDED, PER_EPISODE, Settings, check_effect
 
 HORSE = "hoof_env/Horse-v0"
 ROUGH = "hoof_env/HorseRough-v0"
@@ -29,14 +29,21 @@ LEGS = sorted(
 IDS = [*LEGS, *HORSES]
 """All ids of one environment class."""
 
-OTHER = {
+LARGER = {
+    name: default + 1 if isinstance(default, int) else 1.25 * default
+    for name, default in vars(Settings()).items()
+    if isinstance(default, (int, float)) and default
+}
+"""Other values of settings whose default is a number."""
+
+OTHER = {name: LARGER[name] for name in (*PER_EPISODE, *NEEDED) if name in LARGER} | {
     "trunk_mass": 120.0, "trunk_share": 0.5, "trunk_stiffness": 6000.0, "trunk_damping": 900.0,
     "trunk_drag": 60.0, "stiffness": 4e4, "restitution": 0.9, "approach_floor": 2.0, "friction": 0.1,
     "friction_slow": 0.04, "friction_fast": 0.2, "motor_gain": 30.0, "motor_torque": 100.0,
     "motor_inertia": 2.0, "target_seconds": (0.02, 0.1), "exponent": 1.25, "size": 1.2, "harmonics": 1,
     "filters": "slow", "crank_rate": 5.0, "swing_rate": 0.3,
 }  # fmt: skip
-"""Values of settings that are not the defaults."""
+"""Values other than the defaults of settings that an episode may change or that need another setting."""
 
 FALLS = {"trunk_share": 1.0, "trunk_stiffness": 0.0, "trunk_damping": 0.0}
 """A suspended trunk that nothing else holds up: episodes end by failure."""

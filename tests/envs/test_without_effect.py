@@ -73,9 +73,8 @@ def test_refused_is_what_changes_no_bit(context):
 
 
 def test_all_are_tried():
-    papers_own = {"baumgarte_alpha", "baumgarte_beta"}
     pushes = {"push_impulse", "push_seconds", "pushes"}  # tried in `test_disturbances`
-    assert set(PER_EPISODE) | set(NEEDED) <= set(OTHER) | papers_own | pushes
+    assert set(PER_EPISODE) | set(NEEDED) <= set(OTHER) | pushes
     assert all(getattr(Settings(), name) != value for name, value in OTHER.items())
 
 
