@@ -30,9 +30,9 @@ IDS = [*LEGS, *HORSES]
 """All ids of one environment class."""
 
 LARGER = {
-    name: default + 1 if isinstance(default, int) else 1.25 * default
+    name: default + 1 if isinstance(default, int) else 1.25 * default or 1.0
     for name, default in vars(Settings()).items()
-    if isinstance(default, (int, float)) and default
+    if isinstance(default, (int, float))
 }
 """Other values of settings whose default is a number."""
 

@@ -9,7 +9,7 @@ from hoof_env.errors import ParameterError
 from hoof_env.tasks.reward import OBJECTIVES, Term
 from hoof_env.tasks.reward import TERMS as REWARD
 
-TERMS = {
+TERMS = {term.key: 0.0 for term in REWARD} | {
     "reward_progress": 0.5,
     "reward_peak": -0.2,
     "reward_energy": -0.1,
