@@ -1,4 +1,4 @@
-"""Values that are missing in columns of forces: blank cells, `NaN` and the like.
+"""Values that are missing in columns of forces: blank cells, `NaN` and the like, and marks as -9999.
 
 Programs write no force where a limb is in the air. Such values are taken as 0; under load a value is unknown,
 and an option says what to take.
@@ -28,6 +28,12 @@ UNLOADED_SHARE = 0.05
 EDGE_SHARE = 0.4
 """Share of the highest force up to which a sample may be the first or the last of a stance, in files that
 lack most of swing: a force rises by much from sample to sample."""
+
+MARKS = tuple(10.0**digits - 1 for digits in range(3, 10))
+"""Sizes of numbers that programs write for a missing value: 999, 9999 and so on."""
+
+MIN_MARK_STEP = 0.5
+"""Least step between a mark and a sample beside it, as a share of the mark; forces have smaller ones."""
 
 
 def fill(path: Path, table: Table, sources: dict[str, list[Source]], how: str) -> list[str]:
@@ -63,7 +69,9 @@ def fill(path: Path, table: Table, sources: dict[str, list[Source]], how: str) -
                 gaps.fill(name, air)
             # Other axes serve for warnings alone.
             for name in set(part.axes.values()) & set(table.columns) - {*upward, *forward}:
-                table.columns[name] = np.nan_to_num(table.columns[name], posinf=np.inf, neginf=-np.inf)
+                values = table.columns[name]
+                gone = np.isnan(values) | np.isin(values, _marks_of(values))
+                table.columns[name] = np.where(gone, 0.0, values)
     return notes + gaps.notes
 
 
@@ -96,6 +104,11 @@ class _Gaps:
             air: samples in which the limb bears no load; None finds them in the column.
         """
         values = self._table.columns[name]
+        if marks := _marks_of(values):
+            marked = np.isin(values, marks)
+            words = " or ".join(f"{mark:.9g}" for mark in marks)
+            self._say(name, f"{int(marked.sum())} of {len(values)} values are {words}, taken as missing")
+            self._table.columns[name] = values = np.where(marked, np.nan, values)
         gone = np.isnan(values)
         if gone.all():
             raise DataFileError(
@@ -134,6 +147,18 @@ class _Gaps:
 
     def _say(self, name: str, text: str) -> None:
         self._said.setdefault(text, []).append(name)
+
+
+def _marks_of(values: Floats) -> list[float]:
+    """Return the numbers in a column, shape (n,), that stand for missing values: sizes of `MARKS`, far from
+    the samples beside them wherever they occur."""
+    found = []
+    for mark in {float(value) for value in values[np.isin(np.abs(values), MARKS)]}:
+        marked = values == mark
+        steps = np.abs(np.diff(values))[marked[1:] != marked[:-1]]
+        if not marked.all() and not (steps < MIN_MARK_STEP * abs(mark)).any():
+            found.append(mark)
+    return sorted(found)
 
 
 def _swing(sizes: Floats, gone: Mask) -> Mask:

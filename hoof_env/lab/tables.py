@@ -36,6 +36,12 @@ from hoof_env.lab.text import (
     width_of,
 )
 
+THOUSANDS = re.compile(r"[+-]?[1-9]\d{0,2},\d{3}")
+"""Pattern of a number whose comma may be a decimal sign or one between thousands."""
+
+WHOLE = re.compile(r"[+-]?[1-9]\d{0,2}")
+"""Pattern of a whole number below 1000."""
+
 OWN_COLUMNS = ("toe_normal", "cop_x", "crank_angle", "command_crank_speed")
 """Ends of names of columns that together only the tables of this package have."""
 
@@ -287,6 +293,8 @@ def _numbers(rows: list[Row], at: int, decimal_comma: bool, points: bool) -> NDA
     Raises:
         ValueError: a cell is not a number; the message names its line.
     """
+    if decimal_comma and not points:
+        _check_commas(rows, at)
     values = np.empty(len(rows))
     for n, (k, cells) in enumerate(rows):
         try:
@@ -298,6 +306,19 @@ def _numbers(rows: list[Row], at: int, decimal_comma: bool, points: bool) -> NDA
             mixed = " beside numbers with decimal points" if points and "," in cells[at] else ""
             raise ValueError(f"line {k}: expected numbers, got {cells[at]!r}{mixed}") from None
     return values
+
+
+def _check_commas(rows: list[Row], at: int) -> None:
+    """Raise `ValueError` if the commas of a column seem to lie between thousands: 980 beside 1,020. Programs
+    with a decimal comma write 980,000, or 1,02."""
+    commas = [(k, cells[at].strip()) for k, cells in rows if "," in cells[at]]
+    whole = any(WHOLE.fullmatch(cells[at].strip()) for _, cells in rows)
+    if commas and whole and all(THOUSANDS.fullmatch(cell) for _, cell in commas):
+        k, cell = commas[0]
+        raise ValueError(
+            f"line {k}: expected numbers, got {cell!r} beside whole numbers without a comma; if it lies"
+            " between thousands, write the numbers without it"
+        )
 
 
 def _read_parquet(path: Path) -> Table:

@@ -38,6 +38,9 @@ UNIT_WORDS = frozenset(
 MISSING = frozenset(("", "nan", "na", "n/a", "#n/a", "nat", "null", "none", "-", "--", ".", "missing"))
 """Words of cells without a number, in small letters."""
 
+NAN_PATTERN = re.compile(r"[+-]?(1\.#(qnan|snan|ind)0*|nan(\(\w*\))?)")
+"""Pattern of NaN as C libraries print it, in small letters: -1.#IND and -nan(ind) of Windows."""
+
 SEPARATORS = ("\t", ";", ",", None)
 """Separators of cells; None stands for blanks."""
 
@@ -95,7 +98,8 @@ def number(cell: str, decimal_comma: bool = True) -> float:
 
 def is_missing(cell: str) -> bool:
     """Return True if a cell says that there is no number."""
-    return cell.strip().casefold() in MISSING
+    word = cell.strip().casefold()
+    return word in MISSING or NAN_PATTERN.fullmatch(word) is not None
 
 
 def is_number(cell: str, decimal_comma: bool = True) -> bool:

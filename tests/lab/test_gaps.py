@@ -6,11 +6,12 @@ import numpy as np
 import pytest
 
 from hoof_env import cli
+from hoof_env.errors import DataFileError
 from hoof_env.lab.read import read_record
 from tests.lab.made import BOTH, FORWARD, ROWS, TIME, UP
 
 SWING = UP == 0
-WORDS = ("", "nan", "NaN", "NA", "n/a", "#N/A", "null", "-", ".")
+WORDS = ("", "nan", "NaN", "NA", "n/a", "#N/A", "null", "-", ".", "-nan(ind)", "1.#QNAN", "-1.#IND00")
 
 
 def lacking(path, gone, word="", columns=(1, 2), between=","):
@@ -35,6 +36,36 @@ def test_swing_without_values_is_without_force(word, between, tmp_path):
         f"left_force_y, left_force_x: {SWING.sum()} of 300 values are missing in swing, the first in line 2"
     )
     assert found.notes[0].startswith(words)
+
+
+@pytest.mark.parametrize("mark", ["-9999", "-999.000", "99999", "999", "-9.999e3"])
+def test_marks_of_missing_values_are_said(mark, tmp_path):
+    """In swing, where a peak would be one of 9999 N, or all of the limb would be turned."""
+    found = read_record(lacking(tmp_path / "x.csv", SWING, mark))
+    np.testing.assert_allclose(found.limbs["left"], BOTH, atol=1e-5)
+    words = f"left_force_y, left_force_x: {SWING.sum()} of 300 values are {float(mark):.9g}, taken as missing"
+    assert words in found.notes
+    gone = np.zeros(300, bool)
+    gone[60:63] = True
+    path = lacking(tmp_path / "y.csv", gone, "-9999")
+    with pytest.raises(DataFileError, match=r"left_force_y: .* line 62, under load .*--gaps-a=line"):
+        read_record(path)
+    np.testing.assert_allclose(read_record(path, gaps="line").limbs["left"], BOTH, atol=8.0)
+
+
+def test_forces_of_the_size_of_a_mark_are_forces(tmp_path):
+    """Whole numbers go through 999 N in small steps, or stay there."""
+    up = np.round(1100 * np.clip(np.sin(2 * np.pi * TIME), 0, None))
+    at = np.flatnonzero(up > 900)
+    up[at[0]] = up[at[-1]] = 999
+    for values in (up, np.minimum(up, 999.0)):
+        rows = np.column_stack([TIME, FORWARD, values])
+        head = "time [s],left_force_x [N],left_force_y [N]"
+        np.savetxt(tmp_path / "x.csv", rows, "%.6g", ",", header=head, comments="")
+        found = read_record(tmp_path / "x.csv")
+        np.testing.assert_allclose(found.limbs["left"][:, 1], values)
+        assert 999 in values
+        assert not [note for note in found.notes if "missing" in note]
 
 
 def test_short_gaps_in_swing_are_without_force(tmp_path):

@@ -113,6 +113,8 @@ FILES = [
      "line 52: expected numbers"),
     ("both.txt", "time\tleft_force_y [N]\n0.1\t1,234\n0.2\t987.5\n", {}, DataFileError,
      "'1,234' beside numbers with decimal"),
+    ("thousands.txt", "time\tleft_force_y [N]\n0,1\t980\n0,2\t1,020\n0,3\t990\n", {}, DataFileError,
+     "line 3: expected numbers, got '1,020' beside whole numbers .*thousands"),
     ("zeros.csv", NAMED + "0,\0,1\n", {}, DataFileError, "found bytes 0 in line 2; save .*UTF-8"),
     ("nexus.csv", NEXUS, {"mapping": {"force_y": "Fz"}, "rate": 100}, DataFileError,
      r"names in line 4: .*got 'Fz' 2 times; choose Fz#1 \(Plate 1\), Fz#2 \(Plate 2\)"),
