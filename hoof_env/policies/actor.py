@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import inspect
 from typing import Any
 
 import gymnasium as gym
@@ -35,11 +36,13 @@ class Actor:
 
     Raises:
         HoofEnvError: as in `load_policy`.
+        ParameterError: its `predict` takes other arguments.
     """
 
     def __init__(self, policy: Any, env: gym.Env[Any, Any] | None = None, seed: int = 0) -> None:
         self.policy = load_policy(policy, env, seed)
         self.start = start_of(self.policy)
+        _check_signature(self.policy)
         self.begin()
 
     def begin(self, rows: int = 1) -> None:
@@ -65,3 +68,19 @@ class Actor:
     def restart(self, rows: NDArray[np.bool_]) -> None:
         """Say which rows, shape (n,), begin a new episode with their next observation."""
         self._begins = np.array(rows, bool)
+
+
+def _check_signature(policy: Any) -> None:
+    """Raise `ParameterError` unless a policy's `predict` can be called as `Actor` calls it."""
+    try:
+        signature = inspect.signature(policy.predict)
+    # Functions of compiled modules have none
+    except (TypeError, ValueError):
+        return
+    try:
+        signature.bind(None, episode_start=None, deterministic=True)
+    except TypeError as error:
+        raise ParameterError(
+            f"policy {type(policy).__name__}: expected predict(observation, state=None, episode_start=None,"
+            f" deterministic=True), as that of Stable-Baselines3; got predict{signature} ({error})"
+        ) from None

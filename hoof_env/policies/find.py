@@ -15,6 +15,7 @@ import gymnasium as gym
 import numpy as np
 
 from hoof_env._input import as_path
+from hoof_env.envs.base import array_of
 from hoof_env.envs.open_loop import load_open_loop, open_loop_record
 from hoof_env.envs.policies import constant_gait, make_policy, policy_names
 from hoof_env.errors import DataFileError, MissingExtraError, ParameterError, brief, count
@@ -102,17 +103,23 @@ class Function:
         # A copy, which the function may change
         rows = np.array(observation, ndmin=2)
         try:
-            actions = np.asarray(self.act(rows), np.float32)
+            returned = self.act(rows)
         # The function is the user's, and may fail in any way.
         except Exception as error:
             raise ParameterError(
                 f"policy {self.name}: expected a function of observations, shape {rows.shape}, that returns"
                 f" actions; {_place(error)}"
             ) from error
+        wanted = f"policy {self.name}: expected finite actions of shape {(len(rows), self.actions)}"
+        try:
+            actions = array_of("actions", returned).astype(np.float32)
+        except (ParameterError, TypeError, ValueError) as error:
+            # Only of a tensor does the reason say more than what was returned.
+            reason = f" ({error})" if hasattr(returned, "dtype") else ""
+            raise ParameterError(f"{wanted}, got {brief(returned)}{reason}") from None
         if actions.shape != (len(rows), self.actions) or not np.isfinite(actions).all():
             raise ParameterError(
-                f"policy {self.name}: expected finite actions of shape {(len(rows), self.actions)} for"
-                f" observations of shape {rows.shape}, got shape {actions.shape} and"
+                f"{wanted} for observations of shape {rows.shape}, got shape {actions.shape} and"
                 f" {np.sum(~np.isfinite(actions))} that are not finite"
             )
         return actions.reshape(*np.shape(observation)[:-1], self.actions), state

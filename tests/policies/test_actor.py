@@ -231,6 +231,32 @@ def test_nothing_else_asks_a_policy_for_actions():
     assert asks == set(ASKS)
 
 
+@pytest.mark.parametrize(
+    "predict", [lambda self, seen: (np.zeros(4), None), lambda self, seen, state=None: (np.zeros(4), None)]
+)
+def test_a_predict_of_other_arguments_is_told(predict, env):
+    policy = type("Bare", (), {"predict": predict})()
+    with pytest.raises(ParameterError, match=r"Bare: expected predict\(.*episode_start.* got predict\(seen"):
+        play(env, policy, [0])
+
+
+def test_a_memory_of_any_kind_is_carried(env):
+    """Tuples as those of recurrent policies, and dictionaries."""
+
+    class Summing:
+        def predict(self, seen, state=None, episode_start=None, deterministic=True):
+            (count,) = state["counts"] if state else (np.zeros(1),)
+            count = np.where(episode_start, 0.0, count) + 1
+            return np.full(4, 0.02 * count.item(), np.float32), {"counts": (count,)}
+
+    class Clock:
+        def predict(self, seen, state=None, episode_start=None, deterministic=True):
+            self.step = 1 if episode_start else self.step + 1
+            return np.full(4, 0.02 * self.step, np.float32), None
+
+    assert play(env, Summing(), [0, 1]) == play(env, Clock(), [0, 1])
+
+
 @pytest.mark.parametrize("policy", [3, object(), Counting])
 def test_what_is_no_policy_is_refused_by_all(policy, env):
     for door in (play, lambda env, policy, _: records.record_episode(env, policy)):

@@ -140,7 +140,9 @@ def test_what_is_no_environment_is_refused(env):
     [
         ("return 1 / 0", r"ZeroDivisionError in mine\.py, line 3: division by zero"),
         ("return rows.missing", r"AttributeError in mine\.py, line 3: .*'missing'"),
-        ("return ['a'] * len(rows)", "ValueError in .*could not convert string"),
+        ("return ['a'] * len(rows)", r"expected finite actions of shape \(1, 4\), got \['a'\]"),
+        ("return rows[:, :4], None", r"expected finite actions of shape \(1, 4\), got \(array\(.*, None\)"),
+        ("return {'action': rows[:, :4]}", r"expected finite actions .*, got \{'action': array"),
         ("return rows[:, :3]", r"expected finite actions of shape \(1, 4\) .* got shape \(1, 3\)"),
         ("return rows[:, :4] * np.nan", "4 that are not finite"),
     ],
