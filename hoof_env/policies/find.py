@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import sys
 import traceback
+import warnings
 from collections.abc import Callable
 from dataclasses import dataclass
 from importlib import import_module
@@ -21,6 +22,7 @@ from hoof_env.envs.policies import constant_gait, make_policy, policy_names
 from hoof_env.errors import DataFileError, MissingExtraError, ParameterError, brief, count
 from hoof_env.gait import PARAMETERS, GaitParameters
 from hoof_env.policies.catalogue import SHIPPED
+from hoof_env.policies.normalisation import MISSING, has_missing_statistics
 from hoof_env.policies.onnx_file import FILE, OnnxPolicy
 from hoof_env.policies.plain import ABOUT, NumpyPolicy
 from hoof_env.policies.record import describe_spaces, own_id, refuse_misfit, same_id
@@ -162,7 +164,7 @@ def find_function(name: str, env: gym.Env[Any, Any]) -> Any:
 
 def policy_of(policy: Any, env: gym.Env[Any, Any] | None) -> Any:
     """Return a policy that is an object with `predict`: a model of Stable-Baselines3 with the normalisation
-    of its environment, and any other one as it is.
+    of its environment, and any other one as it is. A warning says if a model lacks that of its training.
 
     Raises:
         DataFileError: a model of other spaces.
@@ -172,6 +174,12 @@ def policy_of(policy: Any, env: gym.Env[Any, Any] | None) -> Any:
     if env is not None:
         refuse_misfit(Path(type(policy).__name__), describe_spaces(policy), describe_spaces(env))
     statistics = policy.get_vec_normalize_env()
+    if has_missing_statistics(policy):
+        name = type(policy).__name__
+        warnings.warn(
+            f"policy {name}: {MISSING}; {name}.load(path, env=VecNormalize.load(statistics, many)) has them",
+            stacklevel=4,
+        )
     is_normalised = statistics is not None and statistics.norm_obs
     return TrainedPolicy(policy, statistics.normalize_obs if is_normalised else None)
 

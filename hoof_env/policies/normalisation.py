@@ -15,6 +15,12 @@ STATISTICS = "vecnormalize.pkl"
 NAMES = (STATISTICS, "vec_normalize.pkl")
 """Names of a file of statistics: those of rl_zoo3 and agents.train, and of huggingface_sb3."""
 
+MISSING = (
+    "trained under VecNormalize, whose statistics are missing: unless only rewards were normalised, its"
+    " actions here mean nothing"
+)
+"""What is wrong with a model without its statistics."""
+
 
 def own_places(model: Path) -> list[Path]:
     """Return the places of statistics that belong to one model file alone."""
@@ -44,6 +50,13 @@ def find_statistics(model: Path) -> Path | None:
     return own[0] if own else shared[0] if is_clear else None
 
 
+def has_missing_statistics(model: Any) -> bool:
+    """Return True if a model of Stable-Baselines3 was trained under `VecNormalize` and has none."""
+    # It keeps the last observations before normalisation, which are None without it.
+    raw = getattr(model, "_last_original_obs", None)
+    return raw is not None and model.get_vec_normalize_env() is None
+
+
 def normaliser_of(model: Any, path: Path, env: Any) -> Callable[[Any], Any] | None:
     """Return the function that normalises observations of a model that was read from a .zip, None where they
     are taken as they are; warn where statistics are missing, or lie beside a model that has none. Reading
@@ -58,20 +71,18 @@ def normaliser_of(model: Any, path: Path, env: Any) -> Callable[[Any], Any] | No
         DataFileError: the statistics cannot be read, or are of other observations.
     """
     file = find_statistics(path)
-    # Stable-Baselines3 keeps the last observations before normalisation, which are None without it.
-    raw = getattr(model, "_last_original_obs", None)
+    lacks = has_missing_statistics(model)
     is_trained = model.num_timesteps > 0
-    if raw is None and is_trained and file in shared_places(path) and file not in own_places(path):
+    if not lacks and is_trained and file in shared_places(path) and file not in own_places(path):
         _warn(path, f"played without {file}, for its training normalised nothing")
         return None
     if file is not None:
         return _read(file, model, env)
-    if raw is not None:
+    if lacks:
         found = ", ".join(str(place) for place in shared_places(path) if place.is_file()) or "none"
         _warn(
             path,
-            "trained under VecNormalize, whose statistics are missing: unless only rewards were normalised,"
-            f" its actions here mean nothing; expected {path.with_name(STATISTICS)}, found {found}",
+            f"{MISSING}; expected {path.with_name(STATISTICS)}, found {found}",
         )
     return None
 

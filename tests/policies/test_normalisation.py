@@ -117,6 +117,22 @@ def test_statistics_that_are_missing_are_told(normalised, env, tmp_path):
         words_of(lambda: evaluate([str(tmp_path / "leg.zip")], ID, published=True))
 
 
+@pytest.mark.parametrize("around", [None, DummyVecEnv([lambda: gym.make(ID)])], ids=["none", "plain"])
+def test_a_model_that_is_an_object_without_its_statistics_is_told(around, normalised, env, tmp_path):
+    """As `load` gives it, unless the statistics are around its environment."""
+    model, many, _ = normalised
+    model.save(tmp_path / "leg.zip")
+    many.save(str(tmp_path / "statistics.pkl"))
+    bare = type(model).load(tmp_path / "leg.zip", env=around, device="cpu")
+    _, (said,) = words_of(lambda: hoof_env.load_policy(bare, env))
+    assert f"{type(model).__name__}: trained under VecNormalize, whose statistics are missing" in said
+    with_them = VecNormalize.load(str(tmp_path / "statistics.pkl"), DummyVecEnv([lambda: gym.make(ID)]))
+    whole = type(model).load(tmp_path / "leg.zip", env=with_them, device="cpu")
+    policy, said = words_of(lambda: hoof_env.load_policy(whole, env))
+    assert not said
+    assert is_played(policy, model, many, env)
+
+
 def test_a_model_that_was_never_normalised_has_none(env, tmp_path):
     model, _ = trained(tmp_path)
     model.save(tmp_path / "plain.zip")
