@@ -584,7 +584,9 @@ def as_plain(name: str, value: Any) -> Any:
     if value is None or type(value) in (bool, int, float, str):
         return value
     if isinstance(value, (np.generic, np.ndarray)) and value.dtype != object:
-        return as_plain(name, value.tolist())
+        # Python has no numbers of more than double precision.
+        doubles = {"f": np.float64, "c": np.complex128}.get(value.dtype.kind)
+        return as_plain(name, (value if doubles is None else value.astype(doubles)).tolist())
     if isinstance(value, Enum):
         return as_plain(name, value.value)
     if isinstance(value, PurePath):

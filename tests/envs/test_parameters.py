@@ -163,6 +163,7 @@ def test_numbers_of_a_sweep_and_paths_are_plain_in_settings_and_in_the_saved_spe
     hoof_env.load_geometry("identified").save(str(preset), gaits=gaits, ground={})
     given = {
         "trunk_mass": np.int64(60), "friction": np.float32(0.5), "episode_seconds": np.int32(4),
+        "trunk_share": np.longdouble(0.25),
         "preset": preset, "target_speed": np.array([1.0, 2.0]), "restitution": np.float64(0.25),
         "observation": np.array(["crank", "gait"]), "reward_weights": {"peak": np.float64(2.0)},
         "randomize": {"trunk_drag": (np.float32(1.0), np.int8(3))},
