@@ -6,7 +6,7 @@
 #   TORCH_INDEX=URL     where Linux takes PyTorch from; empty for pip's own index, which has the CUDA build
 
 .DEFAULT_GOAL := help
-.PHONY: help setup setup-demo demo test test-slow test-peers test-oldest test-lab test-ecosystem bench baselines docs test-site test-links lint clean
+.PHONY: help setup setup-demo demo test test-slow test-peers test-oldest test-lab test-jax test-ecosystem bench baselines docs test-site test-links lint clean
 
 PY := .venv/bin/python
 PYTHONS := $(or $(PYTHON),$(PY) python3 python3.14 python3.13 python3.12 python3.11)
@@ -23,6 +23,7 @@ help:
 	@echo 'make test-peers  the engine against MuJoCo and Exudyn, which it installs'
 	@echo 'make test-oldest the wheel on the oldest dependencies that pyproject.toml names, some minutes'
 	@echo 'make test-lab    force records and datasets with OpenSim, ezc3d and Minari, in an environment under .lab/'
+	@echo 'make test-jax    what runs inside jax.jit, in an environment under .jax/; ARGS="-k smoke": a minute'
 	@echo 'make test-ecosystem  every RL library on every id, in environments under .ecosystem/: 6 GB, one to two hours'
 	@echo 'make bench       how fast engine and environments are beside MuJoCo, Exudyn and EnvPool'
 	@echo 'make baselines   the agents of agents/plans/full.yml, hours; ARGS="--plan nightly": a small part, minutes'
@@ -77,6 +78,13 @@ test-lab: setup
 	@.lab/bin/python -c 'import ezc3d, matplotlib, minari, onnxruntime, opensim, pyarrow'
 	@.lab/bin/python -m pytest -q $(ARGS) tests/lab tests/agents/test_dataset.py
 
+# jaxlib is 85 MB to load and 350 MB installed: no part of .venv.
+test-jax: setup
+	@$(PY) -m uv venv -q --allow-existing -p $(PY) .jax
+	@$(PY) -m uv pip install -q --python .jax/bin/python -c constraints.txt -e '.[jax,dev]'
+	@.jax/bin/python -c 'import jax'
+	@.jax/bin/python -m pytest -q $(ARGS) tests/inside_jax 'tests/test_docs.py::test_examples_run_from_top_to_bottom[docs/jax.md]'
+
 test-ecosystem: setup
 	@$(PY) -m tests.ecosystem.run $(ARGS)
 
@@ -108,5 +116,5 @@ lint: setup
 	  echo 'mypy, without agents: there is no PyTorch' && $(PY) -m mypy $(UNTYPED) hoof_env; fi
 
 clean:
-	@rm -rf .venv .ecosystem .oldest .lab dist build .pytest_cache .mypy_cache .ruff_cache .hypothesis
+	@rm -rf .venv .ecosystem .oldest .lab .jax dist build .pytest_cache .mypy_cache .ruff_cache .hypothesis
 	@find . -name __pycache__ -type d -prune -exec rm -rf {} +

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import copy
 from collections.abc import Iterable, Mapping, Sequence
-from typing import Any, ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import gymnasium as gym
 import numpy as np
@@ -28,6 +28,9 @@ from hoof_env.errors import ParameterError, count
 from hoof_env.render.size import USUAL_SIZE
 from hoof_env.tasks.episode import FAILED, TRUNCATED
 from hoof_env.tasks.settings import SETTINGS
+
+if TYPE_CHECKING:
+    from hoof_env.envs.xla import XlaSteps
 
 Floats = NDArray[np.float64]
 
@@ -212,6 +215,7 @@ class HorseLegVectorEnv(LegBase, VectorEnv[NDArray[np.float32], NDArray[np.float
         self._generators = Generators(self.num_envs)
         self._ended = np.zeros(self.num_envs, bool)
         self._started = np.zeros(self.num_envs, bool)
+        self._xla: XlaSteps | None = None
 
     # Gymnasium
 
@@ -268,62 +272,82 @@ class HorseLegVectorEnv(LegBase, VectorEnv[NDArray[np.float32], NDArray[np.float
             ParameterError: actions of a wrong shape or type, or not finite.
             ResetNeeded: `reset` was not called, or, with autoreset disabled, an episode has ended.
         """
+        self.check_step()
+        batch, n = self.batch, self.num_envs
+        batch.rows.actions[:n] = self.check_actions(actions)
+        try:
+            some_ended, terminated, truncated = self.finish_step(batch.run_kernels())
+            done = terminated | truncated
+            infos = infos_of(batch, some_ended)
+            rewards = batch.rows.rewards[:n].copy()
+            if done.any():
+                infos |= endings_of(batch, done)
+            is_same_step = self.autoreset_mode == AutoresetMode.SAME_STEP and done.any()
+            # Objects, as Gymnasium gives final observations: None for the other environments.
+            last = np.full(n, None, dtype=object) if is_same_step else None
+            if last is not None:
+                for env in np.flatnonzero(done):
+                    last[env] = batch.rows.observations[env].copy()
+            self.restart_ended(done)
+            if last is not None:
+                infos = self._same_step(infos, last, done)
+        except BaseException as error:
+            self._interrupt(error)
+            raise
+        return self._observed(), rewards, terminated, truncated, infos
+
+    def check_step(self) -> None:
+        """Raise `ResetNeeded` if a step would be wrong now."""
         if self._phase == "new" and self._started.any():
             missing = np.flatnonzero(~self._started).tolist()
             raise ResetNeeded(
                 f"step() was called while environments {missing} have no episode yet: expected reset()"
             )
         self._check_started("step")
-        batch = self.batch
-        n = self.num_envs
-        before = self._ended
-        again = before if before.any() else None
-        if again is not None and self.autoreset_mode == AutoresetMode.DISABLED:
+        if self.has_ended and self.autoreset_mode == AutoresetMode.DISABLED:
             raise ResetNeeded(
-                f"step() was called although episodes {np.flatnonzero(again).tolist()} ended: "
+                f"step() was called although episodes {np.flatnonzero(self._ended).tolist()} ended: "
                 "expected reset(options={'reset_mask': ...})"
             )
-        batch.rows.actions[:n] = check_actions(actions, (n, len(self.action_names)))
-        try:
-            some_ended = batch.step(self._generators.all, again)
-            how = batch.rows.named.ended[:n]
-            terminated = how == FAILED
-            truncated = how == TRUNCATED
-            # NEXT_STEP: these environments start in this call; their step above does not count.
-            if again is not None:
-                terminated[again] = False
-                truncated[again] = False
-                self._start(np.flatnonzero(again), {})
-            done = terminated | truncated
-            infos = infos_of(batch, some_ended)
-            rewards = batch.rows.rewards[:n].copy()
-            if done.any():
-                infos |= endings_of(batch, done)
-            if done.any() and self.autoreset_mode == AutoresetMode.SAME_STEP:
-                infos = self._same_step(infos, done)
-                done = np.zeros(n, bool)
-            else:
-                self._remember()
-            self._ended = done
-        except BaseException as error:
-            self._interrupt(error)
-            raise
-        return self._observed(), rewards, terminated, truncated, infos
 
-    def _same_step(self, final: dict[str, Any], done: NDArray[np.bool_]) -> dict[str, Any]:
-        """Start ended episodes again at once. Return the infos of the starts, with the last observations and
-        infos as "final_obs" and "final_info".
+    def check_actions(self, actions: Any) -> NDArray[np.float32]:
+        """Convert actions to float32; see `check_actions`."""
+        return check_actions(actions, (self.num_envs, len(self.action_names)))
+
+    def finish_step(self, happened: int) -> tuple[bool, NDArray[np.bool_], NDArray[np.bool_]]:
+        """Finish a step after its kernels, which returned the code `happened`. In mode NEXT_STEP environments
+        that ended before start now; their step does not count. Return whether any episode ended, terminated
+        and truncated."""
+        again = self._ended if self.has_ended else None
+        some_ended = self.batch.end_step(happened, self._generators.all, again)
+        how = self.batch.rows.named.ended[: self.num_envs]
+        terminated = how == FAILED
+        truncated = how == TRUNCATED
+        if again is not None:
+            terminated[again] = False
+            truncated[again] = False
+            self._start(np.flatnonzero(again), {})
+        return some_ended, terminated, truncated
+
+    def restart_ended(self, done: NDArray[np.bool_]) -> None:
+        """End a step in which some episodes ended: they start again at once in mode SAME_STEP."""
+        self._remember()
+        if self.autoreset_mode == AutoresetMode.SAME_STEP and done.any():
+            self._start(np.flatnonzero(done), {})
+            done = np.zeros(self.num_envs, bool)
+        self._ended = done
+
+    def _same_step(
+        self, final: dict[str, Any], last: NDArray[Any], done: NDArray[np.bool_]
+    ) -> dict[str, Any]:
+        """Return the infos of the starts after ended episodes, with the last observations and infos as
+        "final_obs" and "final_info".
 
         Args:
             final: infos of the step.
+            last: last observations, as objects, shape (num_envs,).
             done: True for environments that ended an episode, shape (num_envs,).
         """
-        # Objects, as Gymnasium gives final observations: None for the other environments.
-        last = np.full(self.num_envs, None, dtype=object)
-        for env in np.flatnonzero(done):
-            last[env] = self.batch.rows.observations[env].copy()
-        self._remember()
-        self._start(np.flatnonzero(done), {})
         infos: dict[str, Any] = infos_of(self.batch)
         infos |= {key: copy.deepcopy(value) for key, value in final.items() if key not in infos}
         final |= {
@@ -348,8 +372,43 @@ class HorseLegVectorEnv(LegBase, VectorEnv[NDArray[np.float32], NDArray[np.float
     def close_extras(self, **kwargs: Any) -> None:
         """Close the renderers; `VectorEnv.close` calls this."""
         self._phase = "closed"
+        if self._xla is not None:
+            self._xla.look()
         for recording in self._watched.values():
             recording.close()
+
+    # XLA
+
+    def xla(self) -> Any:
+        """Return `handle, recv, send, step`, an `envs.xla.Functions`, like EnvPool's `xla`: steps inside
+        `jax.jit` and `lax.scan`, with the bits of `step`; see docs/jax.md.
+
+        Raises:
+            MissingExtraError: jax is not installed, or is too old.
+        """
+        from hoof_env.envs.xla import XlaSteps, loaded_jax
+
+        self._check_open("xla")
+        loaded_jax()
+        if self._xla is None:
+            self._xla = XlaSteps(self)
+        return self._xla.functions()
+
+    @property
+    def has_ended(self) -> bool:
+        """True if an episode has ended whose environment has not started again."""
+        return bool(self._ended.any())
+
+    @property
+    def is_plain(self) -> bool:
+        """True if a step is one call of a kernel, unless something happens in it."""
+        return not self._watched and self.batch.is_plain
+
+    def _check_open(self, call: str) -> None:
+        # What is called next may change what XLA's steps have to do.
+        if self._xla is not None:
+            self._xla.look()
+        super()._check_open(call)
 
     # Values of each environment
 

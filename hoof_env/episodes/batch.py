@@ -379,18 +379,37 @@ class EpisodeBatch:
         Raises:
             ParameterError: an action is not finite; no environment was advanced then.
         """
-        if self.row_plans.differ:
-            everywhere = np.arange(self.num_envs)
-            codes = self.under_each(everywhere, lambda group: self._step(), for_kernels=True)
-            happened = int(np.bitwise_or.reduce(codes))
-        else:
-            happened = self._step()
+        return self.end_step(self.run_kernels(), generators, idle)
+
+    def end_step(self, happened: int, generators: Generators, idle: NDArray[np.bool_] | None = None) -> bool:
+        """Do what follows `run_kernels` in a `step`."""
         if self.plan.costs.limits:
             self.plan.costs.add(self.rows, self.engine)
         # A step between two episodes does not count.
         if idle is not None:
             self.rows.named.steps[: self.num_envs][idle] -= 1.0
         return self.finish_step(happened, generators, idle)
+
+    def run_kernels(self) -> int:
+        """Run the kernels of a `step` under `rows.actions`; return the code; see `step.NOT_A_NUMBER`."""
+        if self.row_plans.differ:
+            everywhere = np.arange(self.num_envs)
+            codes = self.under_each(everywhere, lambda group: self._step(), for_kernels=True)
+            return int(np.bitwise_or.reduce(codes))
+        return self._step()
+
+    @property
+    def is_plain(self) -> bool:
+        """True if a step under the present plans is one call of `direct_step`, and nothing follows it while
+        the code is 0 and nothing `has_pushed`."""
+        checks = self.plan.observed.has_user_entries or self.rows.mapped is not None
+        is_alone = self.engine.in_kernels and self.engine.num_threads == 1
+        return is_alone and not (self.row_plans.differ or self.plan.costs.limits or checks)
+
+    @property
+    def has_pushed(self) -> bool:
+        """True if a trunk was pushed since the last step."""
+        return self.is_push_unseen or bool(self.unpushed)
 
     def _step(self) -> int:
         """Run the kernel on all rows, shared among threads; return its code; see `step.NOT_A_NUMBER`."""
@@ -401,7 +420,7 @@ class EpisodeBatch:
     def finish_step(
         self, happened: int, generators: Generators, idle: NDArray[np.bool_] | None = None
     ) -> bool:
-        """Finish a `step` after its kernel, which returned the code `happened`."""
+        """Finish a `step` after its kernels, which returned the code `happened`, and after its costs."""
         if happened == NOT_A_NUMBER:
             raise ParameterError("action: expected finite numbers, got some that are not")
         self._check_mapped()

@@ -1,0 +1,117 @@
+"""Speed of vector steps inside `jax.jit`, by `envs.xla()` and by `io_callback`, beside a Python loop.
+
+    python -m benchmarks.jax_speed
+
+A linear policy acts; the processor time of a vector step, the least of several rounds that alternate, in one
+process. Wall-clock time is printed, too: on a busy machine it says little. Needs the extra `jax`.
+"""
+
+from __future__ import annotations
+
+import os
+import time
+from collections.abc import Callable
+from typing import Any
+
+os.environ.setdefault("XLA_FLAGS", "--xla_cpu_multi_thread_eigen=false")
+
+import gymnasium as gym
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jax.experimental import io_callback
+
+import hoof_env  # noqa: F401 - registers the environments
+
+ID = "hoof_env/HorseLeg-v0"
+COUNTS = 16, 128, 1024
+STEPS = 200
+ROUNDS = 9
+
+
+def new_envs(count: int) -> Any:
+    """Return environments at the start of episodes."""
+    envs: Any = gym.make_vec(ID, num_envs=count).unwrapped
+    envs.reset(seed=0)
+    return envs
+
+
+def python_loop(count: int, weights: Any) -> Callable[[], None]:
+    """Return a loop of steps in Python."""
+    envs = new_envs(count)
+    observations = envs.reset(seed=0)[0]
+
+    def run() -> None:
+        nonlocal observations
+        for _ in range(STEPS):
+            observations, *_ = envs.step(np.tanh(observations @ weights))
+
+    return run
+
+
+def inside_jit(count: int, weights: Any) -> Callable[[], None]:
+    """Return a scan over `envs.xla()`."""
+    envs = new_envs(count)
+    handle, recv, _, step = envs.xla()
+
+    def body(carry: Any, _: Any) -> Any:
+        handle, observations = carry
+        handle, states = step(handle, jnp.tanh(observations @ weights))
+        return (handle, states.observations), (states.rewards, states.terminated | states.truncated)
+
+    roll = jax.jit(lambda carry: jax.lax.scan(body, carry, length=STEPS)[0])
+    handle, states = recv(handle)
+    carry = handle, states.observations
+
+    def run() -> None:
+        nonlocal carry
+        carry = jax.block_until_ready(roll(carry))
+
+    return run
+
+
+def by_callback(count: int, weights: Any) -> Callable[[], None]:
+    """Return a scan over a call of `step` by `io_callback`."""
+    envs = new_envs(count)
+    first = jnp.asarray(envs.reset(seed=0)[0])
+    kinds = jax.ShapeDtypeStruct(first.shape, jnp.float32), jax.ShapeDtypeStruct((count,), jnp.float32)
+
+    def host(actions: Any) -> Any:
+        observations, rewards, *_ = envs.step(np.asarray(actions))
+        return observations, rewards.astype(np.float32)
+
+    def body(observations: Any, _: Any) -> Any:
+        return io_callback(host, kinds, jnp.tanh(observations @ weights), ordered=True)
+
+    roll = jax.jit(lambda observations: jax.lax.scan(body, observations, length=STEPS)[0])
+    observations = first
+
+    def run() -> None:
+        nonlocal observations
+        observations = jax.block_until_ready(roll(observations))
+
+    return run
+
+
+def main() -> None:
+    """Print the table."""
+    print(f"jax {jax.__version__}, {ID}, microseconds of processor (of wall clock) a vector step")
+    print("| rows | Python loop | `envs.xla()` | `io_callback` | loop / xla |\n|---|---|---|---|---|")
+    for count in COUNTS:
+        envs = new_envs(count)
+        shape = envs.single_observation_space.shape[0], envs.single_action_space.shape[0]
+        weights = (np.random.default_rng(0).normal(size=shape) * 0.3).astype(np.float32)
+        runs = [make(count, weights) for make in (python_loop, inside_jit, by_callback)]
+        times = np.zeros((ROUNDS + 1, len(runs), 2))
+        for each in times:
+            for k, run in enumerate(runs):
+                start = time.process_time(), time.perf_counter()
+                run()
+                each[k] = time.process_time() - start[0], time.perf_counter() - start[1]
+        least = times[1:].min(axis=0) / STEPS * 1e6
+        cells = [f"{cpu:.0f} ({wall:.0f})" for cpu, wall in least]
+        print(f"| {count:,} | {' | '.join(cells)} | {least[0, 0] / least[1, 0]:.1f} |", flush=True)
+
+
+if __name__ == "__main__":
+    main()
