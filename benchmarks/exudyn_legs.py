@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 
 from benchmarks.common import ALL, Outside, Record, Start
 from hoof_env.constants import GRAVITY
-from hoof_env.dynamics.parts import TRUNKS, Limb, Motor, Trunk
+from hoof_env.dynamics.parts import FREEDOMS, Limb, Motor, Trunk
 from hoof_env.leg.link_tree import LinkTree
 from hoof_env.leg.mechanism import FRAME
 from hoof_env.leg.mechanism_list import PAPER
@@ -146,7 +146,7 @@ class ExudynLegs:
         trunk = self.trunk
         for axis in range(3):
             at = self._coordinate(self._trunk, axis)
-            if axis >= TRUNKS.index(trunk.kind):  # each kind leaves free one more of x, y and pitch
+            if axis >= FREEDOMS[trunk.kind]:  # each kind leaves free one more of x, y and pitch
                 self._hold(self._still, at)
             elif axis == 0:
                 self._spring(at, 0.0, trunk.drag, 0.0)

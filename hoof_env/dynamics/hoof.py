@@ -169,10 +169,10 @@ def spring_contact(
     """Compute the forces on a point of a compliant hoof. Its sole has no mass: spring and damper carry the
     force of the ground.
 
-    The leg's point is `depth` in the ground, the sole s less. With b = chi S / v0 + c of the ground, S + b
-    (depth' - s') = k s + d s' gives s'. Where the ground would have to pull, the spring returns freely. Along
-    the ground u is the displacement of the leg ahead of the sole: k u + d u' is friction, and u' is the leg's
-    speed while the sole sticks.
+    The leg's point is `depth` in the ground, the sole deeper by the spring's length less s. With b =
+    chi S / v0 + c of the ground, S + b (depth' - s') = k s + d s' gives s'. Where the ground would have
+    to pull, the spring returns freely. Along the ground u is the displacement of the leg ahead of the sole:
+    k u + d u' is friction, and u' is the leg's speed while the sole sticks.
     """
     laws = trunk.settings
     stiffness = leg.settings.hoof_stiffness
@@ -182,7 +182,7 @@ def spring_contact(
     speed = point.slide
     depth_rate = point.penetration_rate
     elastic = rounded(stiffness[0] * deflection)
-    penetration = point.penetration - deflection
+    penetration = point.penetration + leg.settings.hoof_length - deflection
     free_return_rate = rounded(-elastic * leg.inverse_damping[0])  # of an unloaded spring
     zero = 0.0 * absolute(penetration)
     inverse_speed = memory.inverse_approach_speed

@@ -24,6 +24,7 @@ of a start, because its square must stay finite."""
 # sizes of the blocks that depend on `Features`, with the sizes for `PLAIN` as defaults
 GAIT = Size("gait", 4)
 SPRING = Size("spring", 0)
+SPRUNG = Size("sprung", 0)
 LIMITED = Size("limited", 0)
 LIMITS = Size("limits", 0)
 
@@ -59,10 +60,11 @@ class Features(NamedTuple):
 
     def of(self, layout: type[AnyLayout]) -> type[AnyLayout]:
         """Return a layout of this module in the sizes of engines with these features."""
-        # springs: normal and tangential; limits: lowest and highest pitch and height, and the clearance
+        # spring: normal and tangential; limits: lowest and highest pitch and height, and the clearance
         sized: type[AnyLayout] = layout.sized(
             gait=self.gait_size,
             spring=2 * self.has_springs,
+            sprung=int(self.has_springs),
             limited=int(self.has_limits),
             limits=5 * self.has_limits,
         )
@@ -291,6 +293,7 @@ class LegSettings(Layout):
     lift_off: Row  # normal force that tells stance from swing [N]
     hoof_stiffness: Annotated[Block, SPRING]  # of the hoof's springs, normal and tangential [N/m]
     hoof_damping: Annotated[Block, SPRING]  # [N s/m]
+    hoof_length: Annotated[Row, SPRUNG]  # of the springs at rest, from the leg's point to the sole [m]
     length_scale: Annotated[Block, LIMITED]  # ratio to the length in the table [-]
     mass_scale: Annotated[Block, LIMITED]  # [-]
 

@@ -23,7 +23,7 @@ from typing import TypeVar
 from hoof_env.dynamics.hoof import ground_forces
 from hoof_env.dynamics.layout import MAX_STATE, LegRows, Moving, TrunkRows
 from hoof_env.dynamics.model import Model
-from hoof_env.dynamics.parts import FIXED, FREE, RAIL, SUSPENDED
+from hoof_env.dynamics.parts import FIXED, FREE, RAIL, UPRIGHT
 from hoof_env.gait import COS, OFFSET, SIN, SPEED
 from hoof_env.leg.profile import Functions, Slopes, locate, look_up
 from hoof_env.simd import (
@@ -405,7 +405,7 @@ def accelerate_trunk(trunk: TrunkRows, kind: int) -> None:
     if kind == RAIL:
         acc = vector(load.real / xx, 0.0)
         trunk.rates.force = vector(trunk.rates.force.real, 0.0)  # the rail takes the rest
-    elif kind == SUSPENDED:
+    elif kind == UPRIGHT:
         per = 1.0 / (xx * yy - xy * xy)
         acc = per * vector(yy * load.real - xy * load.imag, xx * load.imag - xy * load.real)
     else:

@@ -27,9 +27,9 @@ from hoof_env.dynamics.leg_constants import PAPER_STRUCTURE, leg_constants, stru
 from hoof_env.dynamics.model import MODEL
 from hoof_env.dynamics.parts import (
     FREE,
+    FREEDOMS,
     RAIL,
-    SUSPENDED,
-    TRUNKS,
+    UPRIGHT,
     Limb,
     Limits,
     Mechanics,
@@ -168,7 +168,7 @@ def new_model(
     record = model[0]
     record["legs"] = len(scene.limbs)
     record["cells"] = cells
-    record["kind"] = TRUNKS.index(scene.trunk.kind)
+    record["kind"] = FREEDOMS[scene.trunk.kind]
     record["eighths"] = round(ground.exponent * EXPONENT_UNIT)
     record["friction_law"] = FRICTION_LAWS.index(ground.friction_law)
     record["is_interpolated"] = ground.approach == "interpolated"
@@ -346,7 +346,7 @@ def _limb_settings(
         return values
     stiffness = _numbered("hoof_stiffness", (spring.stiffness, spring.tangential_stiffness))
     damping = _numbered("hoof_damping", (spring.damping, spring.tangential_damping))
-    return values | stiffness | damping
+    return values | stiffness | damping | {"hoof_length": spring.length}
 
 
 def _numbered(name: str, values: Sequence[float | None]) -> dict[str, Any]:
@@ -457,10 +457,10 @@ def start(
                 f"crank_angle: the links of leg {i} cannot be assembled at some of {angle[i]} rad"
             )
     at = {name: spread(name, value, (n,), MAX_STATE) for name, value in trunk.items()}
-    kind = TRUNKS.index(scene.trunk.kind)
+    kind = FREEDOMS[scene.trunk.kind]
     movable = {
-        "vx": (RAIL, SUSPENDED, FREE),
-        "vy": (SUSPENDED, FREE),
+        "vx": (RAIL, UPRIGHT, FREE),
+        "vy": (UPRIGHT, FREE),
         "pitch": (FREE,),
         "pitch_rate": (FREE,),
     }

@@ -15,7 +15,7 @@ MODEL = np.dtype(
     [
         ("legs", "i8"),  # number of legs
         ("cells", "f8"),  # number of cells of a leg's table
-        ("kind", "i8"),  # of the trunk, position in `parts.TRUNKS`
+        ("kind", "i8"),  # of the trunk, its `parts.FREEDOMS`
         ("eighths", "i8"),  # contact exponent times 8
         ("friction_law", "i8"),  # position in `laws.FRICTION_LAWS`
         ("is_interpolated", "?"),  # the approach speed; see `Ground`

@@ -8,9 +8,10 @@ crank. In both the swing is a function of the crank angle and of the gait parame
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from enum import IntEnum
+from types import MappingProxyType
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -22,12 +23,16 @@ from hoof_env.ground.terrain import Terrain
 from hoof_env.leg.geometry import Geometry
 from hoof_env.leg.profile import LegProfile
 
-TRUNKS = ("fixed", "rail", "suspended", "free")
-"""Kinds of trunk; the kernels take the position in this tuple."""
+FREEDOMS: Mapping[str, int] = MappingProxyType({"fixed": 0, "rail": 1, "suspended": 2, "boom": 2, "free": 3})
+"""Number of the coordinates x, y and pitch, in this order, in which each kind of trunk moves; kernels take
+it."""
 
-FIXED, RAIL, SUSPENDED, FREE = range(4)
+FIXED, RAIL, UPRIGHT, FREE = range(4)
 
-ONE_LEG = TRUNKS[:FREE]
+TRUNKS = tuple(FREEDOMS)
+"""Kinds of trunk."""
+
+ONE_LEG = TRUNKS[:-1]
 """Kinds of trunk of the environments of one leg, which could not balance a free trunk."""
 
 
@@ -37,8 +42,9 @@ class Trunk:
 
     "fixed": O stays in place. "rail": O slides along x at fixed height. "suspended": O moves along x and y;
     the leg must bear `share` of the weight of trunk and leg, the rest of the animal carries the remainder
-    and adds a vertical spring and damper towards `height`. These three do not pitch. "free": the trunk moves
-    along x and y and pitches, under its weight, its drag and its legs.
+    and adds a vertical spring and damper towards `height`. "boom": O moves along x and y, and the leg bears
+    the whole weight. These four do not pitch. "free": the trunk moves along x and y and pitches, under its
+    weight, its drag and its legs.
 
     Attributes:
         kind: one of `TRUNKS`.
@@ -134,9 +140,14 @@ class HoofSpring:
     sticks, because friction needs no sliding speed. The thresholds of the ground's friction law are not
     used.
 
+    A spring with a length stands for the pastern: at rest the sole is so far below the leg's point, against
+    the ground's normal, and the point stays above the ground while the spring is compressed by less. The sole
+    turns with the ground and not with the leg, and the force of the ground passes through the leg's point.
+
     Attributes:
         stiffness, damping: along the normal [N/m, N s/m].
         tangential_stiffness, tangential_damping: along the tangent; None for the value along the normal.
+        length: distance of the sole from the leg's point at rest [m]; with 0 the point itself sinks.
 
     Raises:
         ParameterError: a value is not positive and finite: without damping the speed of a massless sole is
@@ -147,6 +158,7 @@ class HoofSpring:
     damping: float
     tangential_stiffness: float | None = None
     tangential_damping: float | None = None
+    length: float = 0.0
 
     def __post_init__(self) -> None:
         for name in ("stiffness", "damping"):
@@ -158,6 +170,7 @@ class HoofSpring:
             check_number(f"hoof_spring.tangential_{name}", tangential, low=0, high=1e12, exclusive_low=True)
             # the dataclass is frozen: `__post_init__` cannot assign
             object.__setattr__(self, f"tangential_{name}", tangential)
+        check_number("hoof_spring.length", self.length, low=0, high=1e3)
 
     @classmethod
     def with_ratio(cls, stiffness: float, mass: float, ratio: float = 0.1) -> HoofSpring:

@@ -21,7 +21,7 @@ from functools import cached_property
 import numpy as np
 
 from hoof_env.constants import GRAVITY
-from hoof_env.dynamics.parts import HoofSpring, Limb, Mechanics, Motor
+from hoof_env.dynamics.parts import FREEDOMS, HoofSpring, Limb, Mechanics, Motor
 from hoof_env.errors import Floats, ParameterError
 from hoof_env.ground.contact import Ground
 from hoof_env.ground.stiffness import MAX_ANGLE, SCHEME_LIMITS, ContactRates, contact_rates, spring_rates
@@ -203,7 +203,7 @@ class StepLength:
         trunk = self.mechanics.trunk
         across = "y" if axis == "x" else "x"
         mobility = np.zeros((2, len(value["toe_x"])))
-        if axis in {"fixed": "", "rail": "x", "suspended": "xy", "free": "xy"}[trunk.kind]:
+        if axis in "xy"[: FREEDOMS[trunk.kind]]:
             mobility += 1 / trunk.mass
         for k, point in enumerate(("toe", "heel")):
             if trunk.kind == "free":

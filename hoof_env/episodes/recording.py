@@ -37,6 +37,7 @@ def surroundings_of(batch: EpisodeBatch, env: int = 0) -> Surroundings:
         LIFT_OFF * weight / batch.plan.legs,
         batch.plan.body.hips,
         batch.plan.body.picture,
+        batch.plan.settings.hoof_length,
     )
 
 
@@ -152,7 +153,9 @@ class Recording:
         them saves the time to run them again."""
         here = surroundings_of(self.batch, self.env)
         known = self._record(k) if record is None else record
-        return columns_of(known, here.hips, here.terrain, commands=self.commands(k))
+        return columns_of(
+            known, here.hips, here.terrain, commands=self.commands(k), hoof_length=here.hoof_length
+        )
 
     def close(self) -> None:
         """Release the engine; the next record makes another one."""

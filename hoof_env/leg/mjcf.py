@@ -60,7 +60,13 @@ MAX_ANGLE = 1e3
 LIGHT = 1e-6
 """Placeholder mass [kg] and inertia [kg m^2] of the massless swing frame; MuJoCo requires positive values."""
 
-SLIDES = {"fixed": (), "rail": ("x",), "suspended": ("x", "z"), "free": ("x", "z", "pitch")}
+SLIDES = {
+    "fixed": (),
+    "rail": ("x",),
+    "suspended": ("x", "z"),
+    "boom": ("x", "z"),
+    "free": ("x", "z", "pitch"),
+}
 """Coordinates that each kind of trunk has."""
 
 

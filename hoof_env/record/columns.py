@@ -28,6 +28,7 @@ def columns_of(
     terrain: Terrain | None = None,
     *,
     commands: NDArray[np.float64] | None = None,
+    hoof_length: float = 0.0,
 ) -> Columns:
     """Return the columns of a body from the engine's record of one environment: `OF_TRUNK`, and for each leg
     the columns of `columns_of_engine` with the leg's prefix.
@@ -38,11 +39,12 @@ def columns_of(
         terrain: the engine's terrain; level if None.
         commands: commanded gait parameters, shape (n, legs, parameters), or (1, legs, parameters) for all
             instants; None if unknown.
+        hoof_length: length of the hooves' springs [m]; see `columns_of_engine`.
     """
     columns: Columns = {name: np.atleast_1d(record[name][..., 0]).astype(float) for name in OF_TRUNK}
     for i, (prefix, hip) in enumerate(hips.items()):
         wanted = None if commands is None else commands[:, i, :4]
-        own = columns_of_engine(record, terrain, command=wanted, leg=i, hip=hip)
+        own = columns_of_engine(record, terrain, command=wanted, leg=i, hip=hip, hoof_length=hoof_length)
         columns |= {f"{prefix}{name}": values for name, values in own.items()}
     return columns
 
@@ -70,6 +72,7 @@ def columns_of_engine(
     command: ArrayLike | None = None,
     leg: int = 0,
     hip: tuple[float, float] = (0.0, 0.0),
+    hoof_length: float = 0.0,
 ) -> Columns:
     """Return the columns of a leg from the engine's record of one environment.
 
@@ -79,6 +82,8 @@ def columns_of_engine(
         command: commanded gait parameters, shape (4,) or (n, 4); None if unknown.
         leg: index of the leg.
         hip: its crank centre O relative to the trunk's place [m].
+        hoof_length: length of the hooves' springs [m]; toe and heel are the soles' then, and the forces act
+            along lines through the leg's hoof points; see `dynamics.parts.HoofSpring`.
     """
     ground = Terrain.flat() if terrain is None else terrain
     of_trunk = {name: np.atleast_1d(record[name][..., 0]).astype(float) for name in OF_TRUNK}
@@ -97,10 +102,17 @@ def columns_of_engine(
         **{name: of_leg[name] for name in PARAMETERS[1:]},
         **{f"command_{name}": wanted[:, k].copy() for k, name in enumerate(PARAMETERS)},
     }
+    borne_at = []
     for point in POINTS:
         x, y, normal, friction = (of_leg[f"{point}_{name}"] for name in ("x", "y", "normal", "friction"))
         height, across = ground_at(ground, x)
         force = (normal - 1j * friction) * across  # the tangent is the normal turned clockwise
+        borne_at.append(x + 1j * y)
+        if hoof_length:
+            deflection = np.atleast_1d(record[f"{point}_deflection_normal"][..., leg, 0])
+            sole = borne_at[-1] - across * (hoof_length - deflection)
+            x, y = sole.real, sole.imag
+            height, _ = ground_at(ground, x)
         columns |= {
             f"{point}_x": x,
             f"{point}_y": y,
@@ -110,7 +122,7 @@ def columns_of_engine(
             f"{point}_force_x": force.real,
             f"{point}_force_y": force.imag,
         }
-    return columns | _together(columns)
+    return columns | _together(columns, borne_at)
 
 
 _LEG = (
@@ -137,10 +149,10 @@ def ground_at(terrain: Terrain, x: NDArray[np.float64]) -> tuple[NDArray[np.floa
 
 
 @np.errstate(invalid="ignore", over="ignore")  # rows that are not finite are left out later
-def _together(columns: Columns) -> Columns:
+def _together(columns: Columns, at: Sequence[NDArray[np.complex128]]) -> Columns:
     """Return the force on the hoof and its centre of pressure: of all points about which the two forces have
-    no moment, the nearest to the mean of both hoof points, weighted by their normal forces."""
-    at = [columns[f"{point}_x"] + 1j * columns[f"{point}_y"] for point in POINTS]
+    no moment, the nearest to the mean of both hoof points, weighted by their normal forces. The forces act on
+    the leg `at` two points; where its soles are below them, the centre is at the height of the soles."""
     forces = [columns[f"{point}_force_x"] + 1j * columns[f"{point}_force_y"] for point in POINTS]
     normals = [columns[f"{point}_normal"] for point in POINTS]
     force = forces[0] + forces[1]
@@ -152,4 +164,9 @@ def _together(columns: Columns) -> Columns:
     moment = sum((np.conj(z - mean) * f).imag for z, f in zip(at, forces, strict=True))
     # a force F moved by d turns with Im(conj(d) F); d = -i moment F / |F|^2 has exactly `moment`
     cop = np.where(loaded, mean - 1j * moment * force / size**2, 0.0)
+    soles = [columns[f"{point}_x"] + 1j * columns[f"{point}_y"] for point in POINTS]
+    if not all(np.array_equal(sole, point, equal_nan=True) for sole, point in zip(soles, at, strict=True)):
+        height = sum(n * sole.imag for n, sole in zip(normals, soles, strict=True)) / load
+        along = np.where(loaded, force / np.where(loaded, force.imag, 1.0), 0.0)
+        cop = cop + along * (height - cop.imag)
     return {"force_x": force.real, "force_y": force.imag, "cop_x": cop.real, "cop_y": cop.imag}

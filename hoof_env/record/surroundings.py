@@ -26,6 +26,8 @@ class Surroundings(NamedTuple):
         lift_off_n: threshold of the normal force on a hoof between stance and swing [N].
         hips: crank centres by the prefixes of the legs.
         picture: kind of the body's picture, a key of `render.picture.PICTURES`.
+        hoof_length: distance of the soles below the legs' hoof points at rest [m]; see
+            `dynamics.parts.HoofSpring`.
     """
 
     geometry: Geometry
@@ -35,3 +37,4 @@ class Surroundings(NamedTuple):
     lift_off_n: float = 0.0
     hips: Hips = ONE_HIP
     picture: str = "leg"
+    hoof_length: float = 0.0

@@ -21,6 +21,7 @@ from hoof_env.render.outline import (
     BODY,
     EAR,
     FAR,
+    HOLD_M,
     HORN_SHARE,
     HORSE_HIP_M,
     MIN_FORCE_SHARE,
@@ -134,7 +135,7 @@ class Drawing:
 
     def _measure(self) -> None:
         """Set the sizes and the camera's view."""
-        hip = self._geometry.hip_height
+        hip = self._geometry.hip_height + self._setting.hoof_length
         self.size = self.girth = min(1.0, hip / USUAL_HIP_M)
         out, up = reach(self._geometry)
         out += max(abs(x) for x, _ in self._setting.hips.values())
@@ -183,13 +184,13 @@ class Drawing:
         points = [self._leg.points(leg) for leg in now.legs]
         for group in self._groups.values():
             if group:
-                parts += self._legs([points[i] for i in group])
+                parts += self._legs([points[i] for i in group], [now.legs[i] for i in group])
         trunk, support = self._trunk(now)
         for outline in (trunk, support, self._arrows(now.legs)):
             parts += [outline.real.ravel(), outline.imag.ravel()]
         return np.concatenate(parts)
 
-    def _legs(self, points: list[Points]) -> list[Floats]:
+    def _legs(self, points: list[Points], legs: Sequence[Instant]) -> list[Floats]:
         """Return the numbers of some legs: flesh, hooves, links and joints."""
         whole = np.stack(points)
         n = len(points)
@@ -204,6 +205,9 @@ class Drawing:
         )
         ankle = whole[:, self._ankle]
         sole, back = (whole[:, corner] for corner in self._corners)
+        if self._setting.hoof_length:
+            sole = np.array([complex(leg.toe_x, leg.toe_y) for leg in legs])
+            back = np.array([complex(leg.heel_x, leg.heel_y) for leg in legs])
         pastern = np.stack([ankle, sole, back, ankle], axis=1)
         horn = np.stack(
             [sole, back, back + HORN_SHARE * (ankle - back), sole + HORN_SHARE * (ankle - sole)], axis=1
@@ -228,6 +232,8 @@ class Drawing:
         coil = top + (sky - top) * np.where(COIL < 1, COIL * 0.08 * self.size, 1.0)
         if self._setting.trunk == "suspended":
             coil[2:-2] += 0.06 * self.size * np.resize([1, -1], len(COIL) - 4)
+        elif self._setting.trunk == "boom":  # its end, which comes towards the viewer
+            coil = middle + HOLD_M * self.size * np.exp(2j * np.pi * np.linspace(0.0, 1.0, len(COIL)))
         else:  # a rail or a plate
             coil = top + 0.1j * self.size + np.linspace(-9.0, 9.0, len(COIL))
         return barrel, coil

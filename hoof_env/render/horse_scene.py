@@ -15,7 +15,7 @@ import pygame
 
 from hoof_env.ground.terrain import Terrain
 from hoof_env.leg.geometry import Geometry
-from hoof_env.record.instant import BodyInstant
+from hoof_env.record.instant import BodyInstant, Instant
 from hoof_env.render.brush import FINE, Brush, arrow, bar
 from hoof_env.render.colours import COAT, COAT_EDGE, CRANK, FORCE, GREY, HEEL, TOE
 from hoof_env.render.ground import GroundPainter
@@ -67,18 +67,22 @@ class HorseScene(LegScene):
         self._ground.draw(canvas, self._soles(now.legs), self.corner)
         for i, leg in enumerate(now.legs):
             if i in FAR:
-                self._draw_far_leg(canvas, self.points_of(leg))
+                self._draw_far_leg(canvas, leg)
         self._draw_body(canvas, now)
         for i, leg in enumerate(now.legs):
             if i not in FAR:
-                self._draw_leg(canvas, self.points_of(leg), lettered=False)
+                self._draw_near_leg(canvas, leg)
         for leg in now.legs:
             self._draw_forces(canvas, leg, full_scale, self._share, is_told=False)
         canvas.blit(self._key(full_scale), (0, 0), special_flags=pygame.BLEND_PREMULTIPLIED)
 
-    def _draw_far_leg(self, canvas: Any, pixels: dict[str, complex]) -> None:
+    def _draw_near_leg(self, canvas: Any, leg: Instant) -> None:
+        pixels = self.points_of(leg)
+        self._draw_leg(canvas, pixels, self._feet(pixels, leg), lettered=False)
+
+    def _draw_far_leg(self, canvas: Any, leg: Instant) -> None:
         far = pygame.Surface(self._size, pygame.SRCALPHA, 32)
-        self._draw_leg(far, pixels, lettered=False)
+        self._draw_near_leg(far, leg)
         far.fill((255, 255, 255, round(255 * FAR_COAT)), special_flags=pygame.BLEND_RGBA_MULT)
         far.fill((round(255 * FAR_COAT),) * 3 + (255,), special_flags=pygame.BLEND_RGBA_MULT)
         canvas.blit(far, (0, 0), special_flags=pygame.BLEND_PREMULTIPLIED)

@@ -80,7 +80,8 @@ class Picture(Protocol):
 class LegPicture:
     """Picture of a leg under the bar of a trunk, with gait and force of one hoof.
 
-    A suspended trunk hangs on a spring, one on a rail has wheels, a fixed one is bolted.
+    A suspended trunk hangs on a spring, one on a boom shows the boom's end, one on a rail has wheels, and a
+    fixed one is bolted.
     """
 
     trunks: tuple[str, ...] = ONE_LEG
@@ -91,7 +92,9 @@ class LegPicture:
         from hoof_env.render.scene import LegScene
 
         unit = unit_of(here.lift_off_n)
-        return LegScene(brush, here.geometry, here.terrain, size, right, here.trunk, unit, here.hips)
+        return LegScene(
+            brush, here.geometry, here.terrain, size, right, here.trunk, unit, here.hips, here.hoof_length
+        )
 
     def panel(self, brush: Brush, box: tuple[int, int, int, int], here: Surroundings) -> Panel:
         """Make the panel; see `Picture`."""
@@ -100,7 +103,7 @@ class LegPicture:
 
         if len(here.hips) > 1:
             raise ParameterError(f"picture: expected 'legs' for {len(here.hips)} legs, got 'leg'")
-        weight = here.weight_n if here.trunk == "suspended" else 0.0
+        weight = here.weight_n if here.trunk in ("suspended", "boom") else 0.0
         return LegPanel(brush, box, weight, here.lift_off_n, limits_of(here.geometry))
 
     def drawing(self, here: Surroundings, numbers: int) -> Drawing:

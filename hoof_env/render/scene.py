@@ -68,6 +68,7 @@ class LegScene:
     """
 
     small = 1.0
+    _hoof_length = 0.0
     _unit, _newtons, _digits = KILONEWTONS
 
     def __init__(
@@ -80,17 +81,20 @@ class LegScene:
         trunk: str,
         forces: Unit = KILONEWTONS,
         hips: Hips = ONE_HIP,
+        hoof_length: float = 0.0,
     ) -> None:
         self._unit, self._newtons, self._digits = forces
         self._brush = brush
         self._geometry = geometry
+        self._hoof_length = hoof_length
         self._size = size
         self.small = min(1.0, geometry.hip_height / USUAL_HIP_M)
         out, up = reach(geometry)
         out += max(abs(x) for x, _ in hips.values())
         spare = (HEIGHT_SLACK_M + MARGIN_M) * self.small
-        soil = max(out + spare - geometry.hip_height, SOIL_M * self.small)
-        sky = geometry.hip_height + up + spare
+        hip = geometry.hip_height + hoof_length
+        soil = max(out + spare - hip, SOIL_M * self.small)
+        sky = hip + up + spare
         self._centre = (size[0] - right) / 2
         self._scale = min(size[1] / (soil + sky), self._centre / (out + MARGIN_M * self.small))
         self._level = size[1] - soil * self._scale  # of the ground [pixels] at the camera's usual height
@@ -137,10 +141,10 @@ class LegScene:
         self._trunk.draw_support(canvas, hip)
         self._ground.draw(canvas, self._soles(now.legs), self.corner)
         self._trunk.draw(canvas, hip, now.pitch)
-        for path, pixels in zip(self._paths, each, strict=True):
-            self._draw_path(canvas, path, pixels)
-        for pixels in each:
-            self._draw_leg(canvas, pixels)
+        for path, pixels, leg in zip(self._paths, each, now.legs, strict=True):
+            self._draw_path(canvas, path, self._feet(pixels, leg))
+        for pixels, leg in zip(each, now.legs, strict=True):
+            self._draw_leg(canvas, pixels, self._feet(pixels, leg))
         for leg in now.legs:
             self._draw_forces(canvas, leg, full_scale)
         canvas.blit(self._key(full_scale), (0, 0), special_flags=pygame.BLEND_PREMULTIPLIED)
@@ -152,7 +156,7 @@ class LegScene:
 
     def look_at(self, now: BodyInstant) -> list[dict[str, complex]]:
         """Point the camera at an instant; return for each leg where its named points lie [pixels]."""
-        usual = self._geometry.hip_height
+        usual = self._geometry.hip_height + self._hoof_length
         hip = complex(now.x, now.y)
         level = float(self._ground.height(hip.real + self.small * AROUND_M).mean())
         high = hip.imag - level
@@ -166,6 +170,15 @@ class LegScene:
         points = self._pixels(self._leg.points(now)).tolist()
         return dict(zip(self._geometry.mechanism.points, points, strict=True))
 
+    def _feet(self, pixels: dict[str, complex], now: Instant) -> dict[str, complex]:
+        """Return the place of toe and heel by name [pixels]: of the soles, where springs hold them below the
+        leg."""
+        feet = self._geometry.corners
+        if not self._hoof_length:
+            return {name: pixels[name] for name in feet}
+        soles = (complex(now.toe_x, now.toe_y), complex(now.heel_x, now.heel_y))
+        return {name: complex(self._pixels(sole)) for name, sole in zip(feet, soles, strict=False)}
+
     def _pixels(self, z: Any) -> Any:
         """Convert positions in the world, complex [m], to pixels of the picture, complex with y down."""
         return np.conj(z - self._camera) * self._scale + complex(self._centre, self._level)
@@ -176,7 +189,10 @@ class LegScene:
         ramp.set_at((0, 1), SKY_BOTTOM)
         return pygame.transform.smoothscale(ramp, self._size)
 
-    def _draw_leg(self, canvas: Any, pixels: dict[str, complex], lettered: bool = True) -> None:
+    def _draw_leg(
+        self, canvas: Any, pixels: dict[str, complex], soles: dict[str, complex], lettered: bool = True
+    ) -> None:
+        """Draw a leg with its points and its soles at some `pixels`."""
         metre = self._girth * self._scale * FINE  # on the fine surface
         crank = self._geometry.crank_length / self._girth
         edge = 1.5 * FINE
@@ -195,9 +211,10 @@ class LegScene:
                     bar(fine, colour, at[a], at[b], radius_a * metre + grow, radius_b * metre + grow)
             for plate in hoof:
                 ankle = next(name for name in plate if name not in feet)
-                horn = [place(pixels[n] + HORN_SHARE * (pixels[ankle] - pixels[n])) for n in feet]
-                pygame.draw.polygon(fine, PASTERN, [at[ankle], *(at[n] for n in reversed(feet))])
-                pygame.draw.polygon(fine, HOOF, [*(at[n] for n in reversed(feet)), *horn])
+                horn = [place(soles[n] + HORN_SHARE * (pixels[ankle] - soles[n])) for n in feet]
+                sole = [place(soles[n]) for n in reversed(feet)]
+                pygame.draw.polygon(fine, PASTERN, [at[ankle], *sole])
+                pygame.draw.polygon(fine, HOOF, [*sole, *horn])
             pygame.draw.circle(fine, CRANK, at[fixed[0]], crank * metre, round(1.3 * FINE))
             for pivot in fixed[1:]:
                 bar(fine, PLATE, at[fixed[0]], at[pivot], 0.02 * metre, 0.02 * metre)
@@ -218,7 +235,7 @@ class LegScene:
 
         turn = self._geometry.crank_length * self._scale * (1 + 1j)
         hip = pixels[fixed[0]]
-        box = [*pixels.values(), hip - turn, hip + turn]
+        box = [*pixels.values(), *soles.values(), hip - turn, hip + turn]
         self._brush.smooth(canvas, box, 0.16 * self._girth * self._scale + 2, paint)
         for pivot in fixed if lettered else ():
             side, shift = ("midbottom", -0.05j) if pivot == fixed[0] else ("midleft", 0.06)
@@ -226,13 +243,13 @@ class LegScene:
             self._brush.write(canvas, pivot, (letter.real, letter.imag), 18, INK, side)
 
     def _draw_path(
-        self, canvas: Any, path: Sequence[tuple[float, complex, complex]], pixels: dict[str, complex]
+        self, canvas: Any, path: Sequence[tuple[float, complex, complex]], feet: dict[str, complex]
     ) -> None:
         """Draw the path of one leg's toe and heel up to where they are."""
         if len(path) < 2:
             return
         times, *paths = zip(*path, strict=True)
-        points_now = [pixels[point] for point in reversed(self._geometry.corners)]
+        points_now = [feet[point] for point in reversed(self._geometry.corners)]
         for colour, places, end in zip((HEEL, TOE), paths, points_now, strict=True):
             if colour == HEEL and self._geometry.heel is None:
                 continue

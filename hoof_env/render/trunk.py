@@ -1,4 +1,4 @@
-"""The trunk of one leg and its support: a spring, a rail or a plate."""
+"""The trunk of one leg and its support: a spring, a boom, a rail or a plate."""
 
 from __future__ import annotations
 
@@ -41,6 +41,8 @@ class TrunkPainter:
         top = hip - 1j * self._above
         if self._kind == "suspended":
             self._draw_spring(canvas, top)
+        elif self._kind == "boom":
+            self._draw_boom(canvas, hip)
         else:
             self._draw_rail_or_plate(canvas, top)
 
@@ -53,6 +55,12 @@ class TrunkPainter:
             pygame.draw.lines(fine, GREY, False, [place(z) for z in coil.tolist()], width)
 
         self._brush.smooth(canvas, coil, 3, paint)
+
+    def _draw_boom(self, canvas: Any, hip: complex) -> None:
+        """Draw the end of a boom that comes towards the viewer, which keeps the trunk from pitching."""
+        centre = hip - 0.5j * (self._above - self._below)
+        for colour, share in ((GREY, 1.0), (COAT, 0.7), (GREY, 0.35)):
+            self._brush.disc(canvas, colour, (centre.real, centre.imag), share * HOLD_M * self._metre)
 
     def _draw_rail_or_plate(self, canvas: Any, top: complex) -> None:
         """Draw a rail across the picture and wheels under it, or a hatched plate and two bolts."""

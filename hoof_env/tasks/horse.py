@@ -25,7 +25,7 @@ from numpy.typing import NDArray
 
 from hoof_env.constants import GRAVITY
 from hoof_env.dynamics.engine import TrunkEngine
-from hoof_env.dynamics.parts import FREE, TRUNKS, Drive, HoofSpring, Limb, Limits, Motor, Trunk
+from hoof_env.dynamics.parts import Drive, HoofSpring, Limb, Limits, Motor, Trunk
 from hoof_env.errors import ParameterError, brief, check_choice, check_number, count
 from hoof_env.gait import PARAMETERS, QUICK, WIDEST, FilterSettings
 from hoof_env.ground.contact import Ground
@@ -183,7 +183,7 @@ class Horse:
         s = settings
         self.size = checked_size(s.size)
         self.speed_scale = math.sqrt(self.size)
-        if s.trunk != TRUNKS[FREE]:
+        if s.trunk != "free":
             raise ParameterError(f'trunk: expected "free" for a horse, got {brief(s.trunk)}')
         self.geometry = _leg_of(s.preset, self.size)
         self.height = HIP_HEIGHT * self.size

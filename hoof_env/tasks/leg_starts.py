@@ -109,11 +109,12 @@ def draw_starts(
     gaits: Mapping[str, GaitParameters],
     terrain: Terrain,
     own_gait: GaitParameters | None = None,
+    hoof_length: float = 0.0,
 ) -> Start:
     """Draw random starts, one for each generator. Options set values (see `check_options`).
 
-    No episode starts with a hoof inside the ground: a suspended trunk starts higher instead, and under any
-    other trunk the crank angle is drawn again.
+    No episode starts with a hoof inside the ground: a trunk that moves up and down starts higher instead, and
+    under any other trunk the crank angle is drawn again.
 
     Args:
         options: checked reset options.
@@ -124,6 +125,7 @@ def draw_starts(
         terrain: the episode starts anywhere on it except near its ends; at 0 if it is level, short, or a
             single slope, which would leave the height at which a trunk is suspended.
         own_gait: gait of all starts; None for one between walk and run.
+        hoof_length: distance of the soles below the leg's hoof points [m].
     """
     n = len(generators)
     # Always three numbers, so that an option does not change the remaining draws.
@@ -141,7 +143,9 @@ def draw_starts(
     if terrain != FLAT:
         x = start_anywhere(terrain, x, options, generators)
         ground = highest(terrain, x, REACH)
-    if trunk.kind == "suspended":
+    # Ground as high as this touches a hoof point's sole.
+    ground = ground + hoof_length
+    if trunk.kind in ("suspended", "boom"):
         if "height" not in options:
             height = np.maximum(height, ground - hoof_height(profile, chosen, theta))
     elif "crank_angle" not in options:
@@ -243,7 +247,7 @@ def _check_trunk(options: Mapping[str, float], trunk: Trunk) -> None:
     """
     height = options.get("height", trunk.height)
     speed = options.get("speed", 0.0)
-    if trunk.kind != "suspended" and height != trunk.height:
+    if trunk.kind not in ("suspended", "boom") and height != trunk.height:
         raise ParameterError(
             f"options['height']: a {trunk.kind} trunk is at {trunk.height:g} m, got {height:g} m"
         )

@@ -219,7 +219,7 @@ class OneLeg:
         self.gait = None if s.gait is None else self.gaits[check_choice("gait", s.gait, self.gaits)]
         self._spring = hoof_spring(s)
         self.rates = check_rates(s, self.speed_scale)
-        nominal = self.geometry.hip_height
+        nominal = self.geometry.hip_height + (self._spring.length if self._spring else 0.0)
         height = nominal if s.hip_height is None else s.hip_height
         self.height = check_number("hip_height", height, low=MIN_HEIGHT * nominal, high=MAX_HEIGHT * nominal)
 
@@ -303,7 +303,14 @@ class OneLeg:
     ) -> Start:
         """Draw starts of episodes; see `leg_starts.draw_starts`."""
         return draw_starts(
-            options, generators, engine.profiles[0], engine.trunk, self.gaits, engine.terrain, self.gait
+            options,
+            generators,
+            engine.profiles[0],
+            engine.trunk,
+            self.gaits,
+            engine.terrain,
+            self.gait,
+            self._spring.length if self._spring else 0.0,
         )
 
     def complete_start(self, start: Start, targets: Floats, options: Any, engine: TrunkEngine) -> None:

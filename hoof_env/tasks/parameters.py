@@ -4,6 +4,7 @@ parameters that are drawn for each episode."""
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 from functools import lru_cache
 from typing import Any, NamedTuple
 
@@ -126,6 +127,10 @@ def drive_of(s: Settings) -> Drive:
     return Motor(s.motor_gain, s.motor_torque, s.motor_inertia, 1.0)
 
 
+MAX_HOOF_LENGTH = 1.0
+"""Largest length of a hoof's spring [m]."""
+
+
 def hoof_spring(settings: Settings) -> HoofSpring | None:
     """Make the spring at toe and heel, or None for a rigid hoof. The default damping is a tenth of critical
     damping under the trunk mass of the settings, even if a reset draws another mass.
@@ -140,10 +145,11 @@ def hoof_spring(settings: Settings) -> HoofSpring | None:
             raise ParameterError(f"hoof_damping: expected a hoof_stiffness with it, got {brief(damping)}")
         return None
     check_number("hoof_stiffness", stiffness, low=0, exclusive_low=True)
+    length = check_number("hoof_length", settings.hoof_length, low=0, high=MAX_HOOF_LENGTH)
     if damping is None:
-        return HoofSpring.with_ratio(stiffness, settings.trunk_mass)
+        return replace(HoofSpring.with_ratio(stiffness, settings.trunk_mass), length=length)
     check_number("hoof_damping", damping, low=0, exclusive_low=True)
-    return HoofSpring(stiffness, damping)
+    return HoofSpring(stiffness, damping, length=length)
 
 
 def check_parameters(name: str, given: Any, settings: Settings) -> dict[str, float | tuple[float, float]]:

@@ -86,7 +86,10 @@ class Settings:
             ),
         ),
     ] = None
-    trunk: Annotated[str, About("", "$trunks; a fixed one stays where it is")] = "suspended"
+    trunk: Annotated[
+        str,
+        About("", "$trunks; a fixed one stays where it is, and on a boom the leg bears the whole weight"),
+    ] = "suspended"
     hip_height: Annotated[
         float | None,
         About(
@@ -141,7 +144,7 @@ class Settings:
             "N s/m",
             "resistance to forward motion",
             per_episode=True,
-            needs=("trunk", ("suspended", "rail")),
+            needs=("trunk", ("suspended", "boom", "rail")),
         ),
     ] = 20.0
     # Ground and hoof
@@ -217,6 +220,15 @@ class Settings:
             ),
         ),
     ] = None
+    hoof_length: Annotated[
+        float,
+        About(
+            "m",
+            "of that spring at rest, from the leg's hoof point down to the sole; with 0 the hoof point sinks"
+            " into the ground as the spring yields",
+            needs=("hoof_stiffness", GIVEN),
+        ),
+    ] = 0.0
     terrain: Annotated[
         Terrain | Mapping[str, Any] | None,
         About(
@@ -238,7 +250,7 @@ class Settings:
                 "rate of the crank's speed at an action of 1; above 0, to $crank_bound; for the published"
                 " leg, and by similarity in inverse proportion to the hip height"
             ),
-            needs=("trunk", ("suspended", "rail", "fixed")),
+            needs=("trunk", ("suspended", "boom", "rail", "fixed")),
         ),
     ] = 18.0
     swing_rate: Annotated[
@@ -249,7 +261,7 @@ class Settings:
                 "rate of the swing's coefficients at an action of 1; above 0, to $swing_bound; for the "
                 "published leg, and by similarity in inverse proportion to the root of the hip height"
             ),
-            needs=("trunk", ("suspended", "rail", "fixed")),
+            needs=("trunk", ("suspended", "boom", "rail", "fixed")),
         ),
     ] = 1.2
     drive: Annotated[
@@ -435,7 +447,7 @@ class Settings:
         About(
             "N s",
             "range of random pushes forward",
-            needs=("trunk", ("suspended", "rail", "free")),
+            needs=("trunk", ("suspended", "boom", "rail", "free")),
         ),
     ] = None
     push_seconds: Annotated[
@@ -447,7 +459,7 @@ class Settings:
         About(
             "s, N s",
             "given ones: time, forward, upward",
-            needs=("trunk", ("suspended", "rail", "free")),
+            needs=("trunk", ("suspended", "boom", "rail", "free")),
         ),
     ] = None
     strength: Annotated[

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from hoof_env.dynamics.engine import MAX_SCALAR_ENVS, TrunkEngine
-from hoof_env.dynamics.parts import TRUNKS, HoofSpring, Limb, Limits, Motor, Prescribed, Trunk
+from hoof_env.dynamics.parts import FREEDOMS, HoofSpring, Limb, Limits, Motor, Prescribed, Trunk
 from hoof_env.dynamics.stepping import SCHEMES
 from hoof_env.ground.contact import Ground
 from hoof_env.ground.laws import FRICTION_LAWS
@@ -30,10 +30,13 @@ COMMAND = np.array(
 )
 
 
-KINDS = [*((trunk, legs) for trunk in TRUNKS for legs in (1, 2, 4)), ("springs", 4)]
+KERNELS = ("fixed", "rail", "suspended", "free")
+"""Kinds of trunk with kernels of their own: a boom has a suspended trunk's."""
+
+KINDS = [*((trunk, legs) for trunk in KERNELS for legs in (1, 2, 4)), ("springs", 4)]
 """Trunk and number of legs; with springs: a free trunk, limits, and swings of three harmonics."""
 
-TWO_LEGS = [(trunk, 2) for trunk in TRUNKS]
+TWO_LEGS = [(trunk, 2) for trunk in KERNELS]
 
 
 def engine(kind, n, **changes):
@@ -44,7 +47,7 @@ def engine(kind, n, **changes):
     trunk_kind, legs = kind
     limbs = [Limb(LEG, (0.4, 0.0), Motor()), Limb(OTHER, (-0.4, 0.1), Prescribed())]
     limbs += [Limb(OTHER, (0.6, 0.0), Motor()), Limb(LEG, (-0.6, 0.0), Motor(rotor_inertia=0.0))]
-    k = TRUNKS.index(trunk_kind)  # another ground, law and scheme with each kind
+    k = FREEDOMS[trunk_kind]  # another ground, law and scheme with each kind
     ground = Ground(exponent=(1.5, 1.125, 2.0, 1.75)[k], friction_law=FRICTION_LAWS[k % 3])
     settings = {"integrator": list(SCHEMES)[-k], "substeps": (3, 1, 2, 2)[k]}
     settings |= {"terrain": ROUGH if k % 2 else None}
@@ -56,7 +59,7 @@ def start(engine, which):
     """Environments `which` of `ALL` different ones, commands on the move."""
     rng, legs = np.random.default_rng(7), len(engine.limbs)
     crank_angle, draw = rng.uniform(-9, 9, (4, ALL))[:legs], rng.normal(size=(5, ALL))
-    k = TRUNKS.index(engine.trunk.kind)
+    k = FREEDOMS[engine.trunk.kind]
     moves = {"vx": draw[0], "vy": 0.3 * draw[1], "pitch": 0.1 * draw[2], "pitch_rate": 0.3 * draw[3]}
     moves = {name: row[which] for name, row in moves.items() if k >= {"vx": 1, "vy": 2}.get(name, 3)}
     if engine.limbs[0].spring:

@@ -153,3 +153,38 @@ def test_order_of_convergence_while_the_hoof_stands(integrator, order):
     errors = [np.abs(end(integrator, h) - exact).max() for h in steps]
     slope = np.polyfit(np.log(steps), np.log(errors), 1)[0]
     assert slope == pytest.approx(order, abs=0.3)
+
+
+def test_a_longer_spring_under_a_higher_trunk_moves_alike():
+    """On level ground only distances to the soles matter; the sum is rounded elsewhere."""
+
+    def fall(length):
+        spring = HoofSpring(2e4, 300.0, length=length)
+        trunk = Trunk("boom", mass=MASS - LEG.mass, drag=0.0, height=3.0)
+        ground = Ground(stiffness=2e6, restitution=0.5, approach_floor=0.1)
+        engine = TrunkEngine(Limb(LEG, drive=Prescribed(), spring=spring), trunk, ground)
+        engine.reset(STILL, 4.1)
+        low = min(engine.report[f"{point}_y"][0, 0] for point in ("toe", "heel"))
+        engine.reset(STILL, 4.1, y=3.0 - low + length + 0.02, vx=0.5)
+        return engine.run(steps=400, every=5)
+
+    short, long = fall(0.0), fall(0.25)
+    assert short["toe_normal"].max() > MASS * GRAVITY
+    np.testing.assert_allclose(long["y"] - 0.25, short["y"], rtol=0, atol=1e-9)
+    np.testing.assert_allclose(long["x"], short["x"], rtol=0, atol=1e-9)
+    depth = long["toe_penetration"]
+    np.testing.assert_allclose(depth, short["toe_penetration"], rtol=0, atol=1e-9)
+    assert min(short["toe_y"].min(), short["heel_y"].min()) < -0.03
+    assert min(long["toe_y"].min(), long["heel_y"].min()) > 0.1  # the leg's points stay above the ground
+
+
+def test_a_leg_bears_the_whole_weight_of_a_boom():
+    spring = HoofSpring.with_ratio(2e4, MASS / 2, 1.0)
+    trunk = Trunk("boom", mass=MASS - LEG.mass, drag=0.0, height=3.0)
+    engine = TrunkEngine(Limb(LEG, drive=Prescribed(), spring=spring), trunk, Ground(stiffness=2e6))
+    engine.reset(STILL, 4.1)
+    low = min(engine.report[f"{point}_y"][0, 0] for point in ("toe", "heel"))
+    engine.reset(STILL, 4.1, y=3.0 - low)
+    assert not engine.advance(steps=6000).any()
+    load = engine.report["toe_normal"] + engine.report["heel_normal"]
+    assert load[0, 0] == pytest.approx(MASS * GRAVITY, rel=1e-6)

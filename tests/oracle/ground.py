@@ -67,7 +67,7 @@ class PlainGround:
         def ground_less_spring(slide_in):
             push = 0.0
             if not np.isnan(approach):
-                push = abs(self.forces(position, velocity, approach, (give[0], slide_in))[0])
+                push = abs(self.forces(position, velocity, approach, (give[0] - spring.length, slide_in))[0])
             return push - k * give[0] - c * slide_in
 
         wide = 1.0

@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hoof_env.constants import GRAVITY
-from hoof_env.dynamics.parts import TRUNKS, Motor
+from hoof_env.dynamics.parts import FREEDOMS, Motor
 from hoof_env.gait import SPEED
 from tests.oracle.bodies import PlainBodies
 from tests.oracle.ground import PlainGround
@@ -64,7 +64,7 @@ class PlainHorse(PlainBodies):
         self.trunk = trunk
         self.ground = None if ground is None else PlainGround(ground, terrain)
         self.motors = np.array([isinstance(limb.drive, Motor) for limb in limbs])
-        self.trunk_freedom = ((), (0,), (0, 1), (0, 1, 2))[TRUNKS.index(trunk.kind)]
+        self.trunk_freedom = ((), (0,), (0, 1), (0, 1, 2))[FREEDOMS[trunk.kind]]
 
     def at(self, trunk, trunk_rate, theta, theta_rate, filters, approach=None, give=None):
         """Everything about one instant.

@@ -13,7 +13,7 @@ import numpy as np
 from benchmarks.common import ALL
 from benchmarks.exudyn_legs import ExudynLegs
 from benchmarks.mujoco_legs import MujocoLegs
-from hoof_env.dynamics.parts import TRUNKS, Motor
+from hoof_env.dynamics.parts import FREEDOMS, Motor
 
 PEERS = {"MuJoCo": MujocoLegs, "Exudyn": ExudynLegs}
 
@@ -61,7 +61,7 @@ def quantities(case, record, has, wanted):
     """What of a record is compared, by name; `has` is its assembly, `wanted` the other's."""
     late = slice(round(EARLY * case.samples), None)
     pins = record.pins if has is wanted else wanted.pin_forces(record.pins)
-    kind = TRUNKS.index(case.kind)
+    kind = FREEDOMS[case.kind]
     found = {name: record.body[late, k] for k, name in enumerate(("x", "y", "pitch")) if k < kind}
     if isinstance(case.drive, Motor):
         found["crank angle"] = record.crank[late]

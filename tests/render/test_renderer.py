@@ -258,7 +258,7 @@ def test_limbs_are_as_thick_as_the_flesh_of_the_leg(run):
     empty = (255, 0, 255)
     canvas = pygame.Surface(picture.size, 0, 32)
     canvas.fill(empty)
-    scene._draw_leg(canvas, places, lettered=False)
+    scene._draw_leg(canvas, places, places, lettered=False)
     drawn = (pygame.surfarray.array3d(canvas) != empty).any(axis=-1)
     flesh = flesh_of(GEOMETRY.mechanism)
     assert flesh
