@@ -29,6 +29,7 @@ from hoof_env.render.outline import (
     TRUNK_M,
     USUAL_HIP_M,
     LegOutline,
+    drawn_sole,
     reach,
 )
 
@@ -206,8 +207,9 @@ class Drawing:
         ankle = whole[:, self._ankle]
         sole, back = (whole[:, corner] for corner in self._corners)
         if self._setting.hoof_length:
-            sole = np.array([complex(leg.toe_x, leg.toe_y) for leg in legs])
-            back = np.array([complex(leg.heel_x, leg.heel_y) for leg in legs])
+            sole, back = np.array(
+                [drawn_sole(complex(leg.toe_x, leg.toe_y), complex(leg.heel_x, leg.heel_y)) for leg in legs]
+            ).T
         pastern = np.stack([ankle, sole, back, ankle], axis=1)
         horn = np.stack(
             [sole, back, back + HORN_SHARE * (ankle - back), sole + HORN_SHARE * (ankle - sole)], axis=1

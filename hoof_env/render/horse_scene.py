@@ -78,7 +78,7 @@ class HorseScene(LegScene):
 
     def _draw_near_leg(self, canvas: Any, leg: Instant) -> None:
         pixels = self.points_of(leg)
-        self._draw_leg(canvas, pixels, self._feet(pixels, leg), lettered=False)
+        self._draw_leg(canvas, pixels, self._sole(pixels, leg), lettered=False)
 
     def _draw_far_leg(self, canvas: Any, leg: Instant) -> None:
         far = pygame.Surface(self._size, pygame.SRCALPHA, 32)

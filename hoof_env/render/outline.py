@@ -23,6 +23,8 @@ MIN_FORCE_SHARE = 0.004  # least drawn force / full scale [-]
 HOLD_M = 0.1  # height above the trunk of the rail or plate that holds it [m]
 HORN_SHARE = 0.45  # part of the hoof triangle, from the sole up, that is horn; above it is the pastern [-]
 
+SOLE_M = 0.14  # least length of a sole that springs hold below the leg [m]
+
 Part = tuple[tuple[float, float], tuple[float, float], float, float]
 """Part of an animal with round ends: from and to about the trunk's centre of mass, radii [m]."""
 
@@ -59,6 +61,15 @@ class LegOutline:
         hip = complex(now.x, now.y)
         turned: NDArray[np.complex128] = hip + z * np.exp(1j * now.pitch)
         return turned
+
+
+def drawn_sole(toe: complex, heel: complex) -> tuple[complex, complex]:
+    """Return toe and heel of the sole that is drawn at the ends of a hoof's springs, at least `SOLE_M` apart:
+    legs were identified from forces, which say little about the length of their soles."""
+    along = toe - heel
+    half = max(abs(along), SOLE_M) / 2 * (along / abs(along) if along else 1.0)
+    middle = (toe + heel) / 2
+    return middle + half, middle - half
 
 
 def reach(geometry: Geometry) -> tuple[float, float]:

@@ -48,6 +48,7 @@ from hoof_env.render.outline import (
     MIN_FORCE_SHARE,
     USUAL_HIP_M,
     LegOutline,
+    drawn_sole,
     reach,
 )
 from hoof_env.render.panel import KILONEWTONS, Unit
@@ -144,7 +145,7 @@ class LegScene:
         for path, pixels, leg in zip(self._paths, each, now.legs, strict=True):
             self._draw_path(canvas, path, self._feet(pixels, leg))
         for pixels, leg in zip(each, now.legs, strict=True):
-            self._draw_leg(canvas, pixels, self._feet(pixels, leg))
+            self._draw_leg(canvas, pixels, self._sole(pixels, leg))
         for leg in now.legs:
             self._draw_forces(canvas, leg, full_scale)
         canvas.blit(self._key(full_scale), (0, 0), special_flags=pygame.BLEND_PREMULTIPLIED)
@@ -176,8 +177,16 @@ class LegScene:
         feet = self._geometry.corners
         if not self._hoof_length:
             return {name: pixels[name] for name in feet}
-        soles = (complex(now.toe_x, now.toe_y), complex(now.heel_x, now.heel_y))
-        return {name: complex(self._pixels(sole)) for name, sole in zip(feet, soles, strict=False)}
+        places = (complex(now.toe_x, now.toe_y), complex(now.heel_x, now.heel_y))
+        return {name: complex(self._pixels(place)) for name, place in zip(feet, places, strict=False)}
+
+    def _sole(self, pixels: dict[str, complex], now: Instant) -> dict[str, complex]:
+        """Return the ends of the drawn sole by the names of toe and heel [pixels]."""
+        feet = self._feet(pixels, now)
+        if not self._hoof_length or len(feet) < 2:
+            return feet
+        ends = drawn_sole(complex(now.toe_x, now.toe_y), complex(now.heel_x, now.heel_y))
+        return {name: complex(self._pixels(end)) for name, end in zip(feet, ends, strict=True)}
 
     def _pixels(self, z: Any) -> Any:
         """Convert positions in the world, complex [m], to pixels of the picture, complex with y down."""
@@ -190,9 +199,9 @@ class LegScene:
         return pygame.transform.smoothscale(ramp, self._size)
 
     def _draw_leg(
-        self, canvas: Any, pixels: dict[str, complex], soles: dict[str, complex], lettered: bool = True
+        self, canvas: Any, pixels: dict[str, complex], sole: dict[str, complex], lettered: bool = True
     ) -> None:
-        """Draw a leg with its points and its soles at some `pixels`."""
+        """Draw a leg with its points and the ends of its sole at some `pixels`."""
         metre = self._girth * self._scale * FINE  # on the fine surface
         crank = self._geometry.crank_length / self._girth
         edge = 1.5 * FINE
@@ -211,10 +220,10 @@ class LegScene:
                     bar(fine, colour, at[a], at[b], radius_a * metre + grow, radius_b * metre + grow)
             for plate in hoof:
                 ankle = next(name for name in plate if name not in feet)
-                horn = [place(soles[n] + HORN_SHARE * (pixels[ankle] - soles[n])) for n in feet]
-                sole = [place(soles[n]) for n in reversed(feet)]
-                pygame.draw.polygon(fine, PASTERN, [at[ankle], *sole])
-                pygame.draw.polygon(fine, HOOF, [*sole, *horn])
+                horn = [place(sole[n] + HORN_SHARE * (pixels[ankle] - sole[n])) for n in feet]
+                ends = [place(sole[n]) for n in reversed(feet)]
+                pygame.draw.polygon(fine, PASTERN, [at[ankle], *ends])
+                pygame.draw.polygon(fine, HOOF, [*ends, *horn])
             pygame.draw.circle(fine, CRANK, at[fixed[0]], crank * metre, round(1.3 * FINE))
             for pivot in fixed[1:]:
                 bar(fine, PLATE, at[fixed[0]], at[pivot], 0.02 * metre, 0.02 * metre)
@@ -235,7 +244,7 @@ class LegScene:
 
         turn = self._geometry.crank_length * self._scale * (1 + 1j)
         hip = pixels[fixed[0]]
-        box = [*pixels.values(), *soles.values(), hip - turn, hip + turn]
+        box = [*pixels.values(), *sole.values(), hip - turn, hip + turn]
         self._brush.smooth(canvas, box, 0.16 * self._girth * self._scale + 2, paint)
         for pivot in fixed if lettered else ():
             side, shift = ("midbottom", -0.05j) if pivot == fixed[0] else ("midleft", 0.06)
