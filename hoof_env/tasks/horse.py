@@ -111,7 +111,7 @@ hundredth."""
 
 FILTERS = {"quick": QUICK, "slow": FilterSettings()}  # command filters, by the setting `filters`
 
-LEG_ONLY_SETTINGS = "trunk", "hip_height", "solver"
+LEG_ONLY_SETTINGS = "trunk", "hip_height", "hoof_length", "solver"
 """Settings of which a horse accepts only the default."""
 
 OPTIONS = {
@@ -198,6 +198,11 @@ class Horse:
         if s.hip_height is not None:
             raise ParameterError(
                 f"hip_height: expected `size` in place of it for a horse, got {brief(s.hip_height)}"
+            )
+        if s.hoof_length:
+            raise ParameterError(
+                f"hoof_length: expected 0 for a horse, whose gaits were found with hooves that sink, got "
+                f"{brief(s.hoof_length)}"
             )
         self.command_step = COMMAND_STEP * self.speed_scale
         self.lowest, self.highest = (self.size * height for height in HEIGHT)

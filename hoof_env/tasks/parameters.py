@@ -224,12 +224,18 @@ MAX_HILLS = 0.2
 by 1.1 times the weight. Hills rise and fall about y = 0, so that they may be as high as `MAX_HILLS` times
 the hip height."""
 
-WORLD_FIXED_HEIGHT = ("suspended", "rail")
-"""Kinds of trunks that travel and keep their height in the world."""
+_KEEPS_HEIGHT = "which keeps its height in the world: the leg would climb into a wall or lose the ground"
+
+DRIFT_REASONS = {
+    "suspended": _KEEPS_HEIGHT,
+    "rail": _KEEPS_HEIGHT,
+    "boom": "whose height is observed and limited in the world: the episode would end on the way",
+}
+"""Reasons why ground must not drift from y = 0, by kinds of trunk that travel."""
 
 
 def check_drift(terrain: Terrain, description: Any, trunk: str, hip_height: float) -> None:
-    """Check that a trunk that keeps its height stays near the ground.
+    """Check that ground stays near the height at which a trunk expects it.
 
     Args:
         terrain: terrain.
@@ -240,11 +246,11 @@ def check_drift(terrain: Terrain, description: Any, trunk: str, hip_height: floa
     Raises:
         ParameterError: the ground drifts too far from y = 0.
     """
-    if trunk not in WORLD_FIXED_HEIGHT or terrain == Terrain.flat():
+    if trunk not in DRIFT_REASONS or terrain == Terrain.flat():
         return
     remedy = (
-        f"under a {trunk} trunk, which keeps its height in the world: the leg would climb into a wall or lose"
-        " the ground; slopes are for hoof_env/Horse-v0, whose trunk follows them"
+        f"under a {trunk} trunk, {DRIFT_REASONS[trunk]}; slopes are for hoof_env/Horse-v0, whose trunk"
+        " follows them"
     )
     if isinstance(description, Mapping) and description.get("kind") == "hills":
         hills = {**HILLS, **description}

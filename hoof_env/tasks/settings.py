@@ -236,7 +236,8 @@ class Settings:
             (
                 'None for level ground, {"kind": "slope", "angle": rad}, {"kind": "hills", ...} as in '
                 "[HorseLegTerrain](HorseLegTerrain.md#terrain), a `Terrain`, or what its `to_dict` returns; "
-                "a suspended trunk and a rail keep their height, so ground that drifts from y = 0 is refused"
+                "a suspended trunk and a rail keep their height, and that of a boom is limited, so ground "
+                "that drifts from y = 0 is refused"
             ),
         ),
     ] = None

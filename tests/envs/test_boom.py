@@ -1,0 +1,60 @@
+"""A leg that carries itself: a trunk on a boom, over hooves with springs that have a length."""
+
+import gymnasium as gym
+import numpy as np
+import pytest
+
+from hoof_env.errors import ParameterError
+
+PASTERN = {"hoof_stiffness": 1e4, "hoof_damping": 200.0, "hoof_length": 0.3}
+BOOM = {"trunk": "boom", "stiffness": 2e6, "exponent": 1.5, **PASTERN}
+
+
+@pytest.mark.parametrize("drive", ["motor", "prescribed"])
+def test_nothing_but_the_ground_holds_the_trunk_and_the_hoof_stands_on_it(drive):
+    """Momentum changes by the impulse of the ground less that of the weight, and by nothing else."""
+    env = gym.make("hoof_env/HorseLeg-v0", drive=drive, **BOOM).unwrapped
+    env.reset(seed=0)
+    engine = env.engine
+    momentum, impulse, time = engine.state["momentum_y"][0], 0.0, 0.0
+    points, deepest = [], 0.0
+    for _ in range(40):
+        _, _, terminated, _, info = env.step(np.zeros(4, np.float32))
+        assert not terminated
+        time += env.dt
+        measured = info["measured"]
+        impulse += measured["normal_impulse"]
+        points += [measured["toe_y"], measured["heel_y"]]
+        deepest = max(deepest, measured["toe_penetration"], measured["heel_penetration"])
+    assert impulse > 0.2 * env.weight * time  # it has landed
+    gained = engine.state["momentum_y"][0] - momentum
+    assert gained == pytest.approx(impulse - env.weight * time, abs=0.002 * impulse)  # a sum over substeps
+    assert min(points) > 0.0  # of the leg's points: the soles are below
+    assert 0.0 < deepest < 0.02  # of the soles
+
+
+def test_pictures_and_records_have_the_soles():
+    env = gym.make("hoof_env/HorseLeg-v0", **BOOM).unwrapped
+    env.reset(seed=0)
+    for _ in range(40):
+        *_, info = env.step(np.zeros(4, np.float32))
+    record = env.record()
+    assert info["measured"]["toe_y"] - 0.3 <= record["toe_y"][-1] <= info["measured"]["toe_y"]
+    assert record["toe_y"].min() > -0.02
+
+
+@pytest.mark.parametrize(
+    ("env_id", "kwargs", "message"),
+    [
+        ("HorseLeg-v0", {"trunk": "boom", "trunk_stiffness": 5.0}, "trunk_stiffness: .*suspended.*boom"),
+        ("HorseLeg-v0", {"trunk": "boom", "trunk_share": 0.5}, "trunk_share: .*suspended.*boom"),
+        ("HorseLeg-v0", {"hoof_length": 0.1}, "hoof_length: expected a hoof_stiffness"),
+        ("HorseLeg-v0", {"hoof_stiffness": 1e4, "hoof_length": -1.0}, r"hoof_length: .*\[0, 1\], got -1"),
+        ("HorseLeg-v0", {"trunk": "boom", "terrain": {"kind": "slope", "angle": 0.05}}, "under a boom trunk"),
+        ("Horse-v0", {"hoof_length": 0.1}, "hoof_length: expected 0 for a horse"),
+        ("Horse-v0", {"trunk": "boom"}, 'trunk: expected "free"'),
+    ],
+)
+def test_contradictions_are_refused_by_name(env_id, kwargs, message):
+    with pytest.raises(ParameterError, match=message):
+        gym.make(f"hoof_env/{env_id}", **kwargs)
