@@ -25,6 +25,9 @@ if TYPE_CHECKING:
     from hoof_env.envs.horse_leg import HorseLegEnv as HorseLegEnv
     from hoof_env.envs.horse_leg import HorseLegMOEnv as HorseLegMOEnv
     from hoof_env.envs.horse_leg import RandomizeParameters as RandomizeParameters
+    from hoof_env.envs.linear_reward import LinearReward as LinearReward
+    from hoof_env.envs.linear_reward import VectorLinearReward as VectorLinearReward
+    from hoof_env.envs.multi_objective import HorseLegMOVectorEnv as HorseLegMOVectorEnv
     from hoof_env.envs.policies import make_policy as make_policy
     from hoof_env.envs.sb3 import Sb3VecEnv as Sb3VecEnv
     from hoof_env.envs.separate_cost import SeparateCost as SeparateCost
@@ -62,6 +65,8 @@ _MODULES = {
     "dynamics.step_length": "StepWarning",
     "envs.horse_leg": "HorseLegEnv HorseLegMOEnv RandomizeParameters",
     "tasks.observation": "Entry Scale",
+    "envs.linear_reward": "LinearReward VectorLinearReward",
+    "envs.multi_objective": "HorseLegMOVectorEnv",
     "envs.policies": "make_policy",
     "envs.separate_cost": "SeparateCost",
     "policies.find": "load_policy",
@@ -146,5 +151,5 @@ for _name, _task in _TASKS.items():
 _register(
     "HorseLegMO-v0",
     entry_point="hoof_env.envs.horse_leg:HorseLegMOEnv",
-    vector_entry_point="hoof_env.envs.horse_leg:refuse_many",
+    vector_entry_point="hoof_env.envs.multi_objective:HorseLegMOVectorEnv",
 )

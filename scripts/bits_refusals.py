@@ -160,7 +160,6 @@ def refusals() -> Iterator[Case]:
 
 def of_many() -> Iterator[Case]:
     """Bad input of vector environments."""
-    import gymnasium as gym
 
     from hoof_env import HorseLegVectorEnv, Sb3VecEnv
 
@@ -169,7 +168,6 @@ def of_many() -> Iterator[Case]:
     yield "threads", lambda: HorseLegVectorEnv(2, num_threads=0)
     yield "autoreset", lambda: HorseLegVectorEnv(2, autoreset_mode="later")
     yield "rendered", lambda: HorseLegVectorEnv(2, render_mode="rgb_array", rendered=3)
-    yield "many objectives", lambda: gym.make_vec("hoof_env/HorseLegMO-v0", 2)
     yield "Sb3VecEnv of another id", lambda: Sb3VecEnv("CartPole-v1", 2)
     yield "Sb3VecEnv's autoreset", lambda: Sb3VecEnv(LEG, 2, autoreset_mode="NEXT_STEP")
     envs = HorseLegVectorEnv(3, autoreset_mode="DISABLED", max_episode_steps=2)

@@ -5,11 +5,10 @@ from __future__ import annotations
 
 import copy
 from collections.abc import Mapping
-from typing import Any, ClassVar, NoReturn
+from typing import Any, ClassVar
 
 import gymnasium as gym
 import numpy as np
-from gymnasium import spaces
 from gymnasium.utils import RecordConstructorArgs
 from numpy.typing import NDArray
 
@@ -25,7 +24,8 @@ from hoof_env.errors import ParameterError, brief, count, flag
 from hoof_env.render.size import USUAL_SIZE
 from hoof_env.simd.compile import BLOCKS
 from hoof_env.tasks.episode import FAILED
-from hoof_env.tasks.reward import OBJECTIVES, TERMS, Term, failure
+from hoof_env.tasks.objectives import reward_space, vector_reward
+from hoof_env.tasks.reward import OBJECTIVES, failure
 
 
 class HorseLegEnv(LegBase, gym.Env[NDArray[np.float32], NDArray[np.float32]]):
@@ -346,37 +346,6 @@ class RandomizeParameters(gym.Wrapper[Any, Any, Any, Any], RecordConstructorArgs
         return self.env.reset(seed=seed, options=options)
 
 
-def vector_reward(info: Mapping[str, Any], terms: tuple[Term, ...] = TERMS) -> NDArray[np.float32]:
-    """Return the reward of each objective, shape (3,), from the terms that `info` holds.
-
-    Energy includes the charge for sliding, which is lost to friction, peak force the charge for the loading
-    rate, and progress the reward for bearing weight and the charge for speed beyond the commanded one. A term
-    without an objective, such as the charge for a failure, is divided equally among all three: a fall costs
-    the same under all preference weights that sum to 1, so that falling early to save force or energy is
-    never worthwhile.
-
-    Args:
-        info: info of a step of `HorseLegEnv`.
-        terms: terms of the reward of its task.
-    """
-    sums = [sum(info[term.key] for term in terms if term.objective == name) for name in OBJECTIVES]
-    shared = sum(info[term.key] for term in terms if term.objective is None)
-    return np.array(sums, np.float32) + np.float32(shared / len(OBJECTIVES))
-
-
-def refuse_many(**kwargs: Any) -> NoReturn:
-    """Refuse to make a vector environment of `HorseLegMO-v0`: without this entry point Gymnasium would make
-    one of many single environments, and its first step would fail.
-
-    Raises:
-        gymnasium.error.Error: always.
-    """
-    raise gym.error.Error(
-        "hoof_env/HorseLegMO-v0: Gymnasium's vector environments keep one number for a reward; this one gives"
-        " three: use mo_gymnasium.wrappers.vector.MOSyncVectorEnv([lambda: mo_gymnasium.make(id)] * n)"
-    )
-
-
 class HorseLegMOEnv(HorseLegEnv):
     """A horse's leg that must carry and move its trunk, judged by three objectives.
 
@@ -390,10 +359,7 @@ class HorseLegMOEnv(HorseLegEnv):
     @takes(EnvArguments)
     def __init__(self, **arguments: Any) -> None:
         super().__init__(**arguments)
-        # Forces and energy are only charged: their rewards are never positive.
-        self.reward_space = spaces.Box(
-            np.full(3, -np.inf, np.float32), np.array([np.inf, 0.0, 0.0], np.float32), (3,), np.float32
-        )
+        self.reward_space = reward_space()
         self.reward_dim = len(OBJECTIVES)
 
     def step(  # type: ignore[override]  # Gymnasium's type of a reward is a number

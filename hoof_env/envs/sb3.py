@@ -180,6 +180,12 @@ class Sb3VecEnv(VecEnv):
             envs = None
         if not isinstance(envs, HorseLegVectorEnv):
             raise ParameterError(f"env_id: expected an id of this package with many at once, got {env_id!r}")
+        if hasattr(envs, "reward_space"):
+            raise ParameterError(
+                f"env_id: expected an id with one number for a reward, got {env_id!r} with a"
+                " vector; hoof_env/HorseLeg-v0 pays its weighted sum with"
+                " reward_weights=hoof_env.tasks.objectives.scalar_weights([...])"
+            )
         if envs.autoreset_mode != AutoresetMode.SAME_STEP:
             raise ParameterError(f"autoreset_mode: expected SAME_STEP, got {settings['autoreset_mode']!r}")
         self.envs = envs

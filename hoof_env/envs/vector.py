@@ -279,7 +279,7 @@ class HorseLegVectorEnv(LegBase, VectorEnv[NDArray[np.float32], NDArray[np.float
             some_ended, terminated, truncated = self.finish_step(batch.run_kernels())
             done = terminated | truncated
             infos = infos_of(batch, some_ended)
-            rewards = batch.rows.rewards[:n].copy()
+            rewards = self._rewards()
             if done.any():
                 infos |= endings_of(batch, done)
             is_same_step = self.autoreset_mode == AutoresetMode.SAME_STEP and done.any()
@@ -446,6 +446,11 @@ class HorseLegVectorEnv(LegBase, VectorEnv[NDArray[np.float32], NDArray[np.float
         # All environments have to start again, by one reset or by several with masks.
         if self._phase == "interrupted":
             self._started[:] = False
+
+    def _rewards(self) -> NDArray[Any]:
+        """Return the rewards of the step, a copy that later steps do not change; 0 of environments that have
+        just started."""
+        return self.batch.rows.rewards[: self.num_envs].copy()
 
     def _remember(self) -> None:
         """Add the step to the recordings."""

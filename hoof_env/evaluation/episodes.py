@@ -101,6 +101,7 @@ def play_rows(envs: HorseLegVectorEnv, policy: Any, seeds: Sequence[int]) -> lis
     episodes: list[dict[str, float]] = [{} for _ in seeds]
     while going.any():
         observation, rewards, terminated, truncated, infos = envs.step(actor.act(observation))
+        rewards = rewards.reshape(envs.num_envs, -1).sum(axis=1)  # vector rewards: the sum of all objectives
         total += np.where(going, rewards, 0.0)  # a row that is over starts again; that is not counted
         ended = going & (terminated | truncated)
         for row in np.flatnonzero(ended):

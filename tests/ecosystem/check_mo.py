@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import gymnasium as gym
 import mo_gymnasium
 import numpy as np
 import pytest
 from mo_gymnasium import wrappers
+
+import hoof_env
 
 
 def play(env, steps=None):
@@ -66,6 +69,51 @@ def test_vector(mo_id):
             break
     assert rewards.shape == (2, 3)
     assert infos["episode"]["r"] == pytest.approx(total * (terminated | truncated)[:, None], rel=1e-4)
+
+
+def test_native(mo_id):
+    """`make_vec` beside `MOSyncVectorEnv`, over ends of episodes: the same bits, spaces and dtypes."""
+    short = {"episode_seconds": 0.1}
+    theirs = wrappers.vector.MOSyncVectorEnv([lambda: mo_gymnasium.make(mo_id, **short)] * 3)
+    ours = gym.make_vec(mo_id, num_envs=3, **short)
+    assert ours.unwrapped.reward_space == theirs.reward_space
+    for envs in ours, theirs:
+        envs.reset(seed=1)
+        envs.action_space.seed(0)
+    ends = 0
+    for _ in range(20):
+        action = ours.action_space.sample()
+        for found, expected in zip(ours.step(action)[:4], theirs.step(action)[:4], strict=True):
+            assert found.dtype == expected.dtype
+            np.testing.assert_array_equal(found, expected)
+        ends += found.sum()
+    assert ends == 9
+
+
+def test_native_statistics(mo_id):
+    """The vector `MORecordEpisodeStatistics` on `make_vec`: the return of each objective."""
+    envs = wrappers.vector.MORecordEpisodeStatistics(gym.make_vec(mo_id, num_envs=2, episode_seconds=0.1))
+    envs.reset(seed=0)
+    totals = []
+    for _ in range(5):
+        *_, infos = stepped = envs.step(envs.action_space.sample())
+        totals.append(stepped[1])
+    assert infos["_episode"].all()
+    np.testing.assert_allclose(infos["episode"]["r"], np.sum(totals, axis=0), rtol=1e-6)
+
+
+def test_own_linear_reward(mo_id):
+    """`LinearReward` of this package, single and vector, beside theirs."""
+    weight = np.array([0.5, 0.2, 0.3])
+    expected, info = play(wrappers.LinearReward(mo_gymnasium.make(mo_id), weight=weight), steps=50)
+    found, info_too = play(hoof_env.LinearReward(mo_gymnasium.make(mo_id), weight=weight), steps=50)
+    np.testing.assert_allclose(found, expected, rtol=1e-12)
+    np.testing.assert_array_equal(info["vector_reward"], info_too["vector_reward"])
+    envs = wrappers.vector.MOSyncVectorEnv([lambda: mo_gymnasium.make(mo_id)] * 2)
+    envs = hoof_env.VectorLinearReward(envs, weight)
+    envs.reset(seed=0)
+    _, rewards, _, _, infos = envs.step(envs.action_space.sample())
+    np.testing.assert_allclose(rewards, infos["vector_reward"] @ weight, rtol=1e-6)
 
 
 def test_picture(mo_id):
