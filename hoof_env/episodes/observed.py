@@ -8,10 +8,16 @@ from functools import cached_property
 from typing import Any
 
 from hoof_env.episodes.scene import functions_of, is_from_outside
-from hoof_env.errors import ParameterError
-from hoof_env.tasks.observation import Entry, check_groups, groups_of, observed
+from hoof_env.errors import ParameterError, check_number
+from hoof_env.tasks.observation import PRESSURE, Entry, check_groups, groups_of, observed
 from hoof_env.tasks.registry import Task
 from hoof_env.tasks.settings import ResolvedSettings
+
+SENSED = ("hoof", PRESSURE)
+"""Groups with numbers that a force sensor reads."""
+
+MAX_THRESHOLD = 1e6
+"""Largest `force_threshold` [N]."""
 
 
 def _ago(steps: int) -> str:
@@ -27,6 +33,7 @@ class Observed:
         trunk, drive: kinds of trunk and drive, on which entries depend.
         groups: groups that are observed.
         privileged: groups of which the true numbers are observed, too.
+        force_threshold: load below which a sensor reads 0 [N].
     """
 
     task: Task
@@ -34,6 +41,7 @@ class Observed:
     drive: str
     groups: tuple[str, ...]
     privileged: tuple[str, ...]
+    force_threshold: float
 
     @classmethod
     def of(cls, s: ResolvedSettings, task: Task, groups: Sequence[str]) -> Observed:
@@ -46,7 +54,7 @@ class Observed:
 
         Raises:
             ParameterError: a group is unknown, constant without another setting, or has nothing on this
-                trunk.
+                trunk; or a threshold of forces is out of range, or no group has forces.
         """
         privileged: Sequence[str] = ()
         if not isinstance(s.privileged, (list, tuple)) or s.privileged:
@@ -58,7 +66,13 @@ class Observed:
                     raise ParameterError(
                         f"{name}: {group!r} is constant without {needed}, got {needed}={value!r}"
                     )
-        found = cls(task, s.trunk, s.drive, tuple(groups), tuple(privileged))
+        threshold = check_number("force_threshold", s.force_threshold, low=0.0, high=MAX_THRESHOLD)
+        if threshold and not {*SENSED} & {*groups, *privileged}:
+            raise ParameterError(
+                f"force_threshold: expected some of {', '.join(SENSED)} among the groups of observation or"
+                f" privileged, without which it has no effect, got observation={list(groups)}"
+            )
+        found = cls(task, s.trunk, s.drive, tuple(groups), tuple(privileged), threshold)
         for name in ("noise", "bias"):
             found._check_any(name, getattr(s, name) or ())
         found._check_any("privileged", privileged)
@@ -133,6 +147,7 @@ class Observed:
             if entry.name in true:
                 record["privileged_columns"][slot] = size - len(true) + true.index(entry.name)
         record["has_privileged"] = bool(true)
+        record["force_threshold"] = self.force_threshold
         return groups
 
     def __getstate__(self) -> dict[str, Any]:

@@ -12,7 +12,7 @@ from hoof_env.simd import Lanes, Pointer, Whole, columns, full_like
 from hoof_env.simd.memory import Arrays, Given, RecordType
 from hoof_env.tasks.body import BodyKernels
 from hoof_env.tasks.episode import ACTIONS, Memories, memories_of, task_type
-from hoof_env.tasks.observation import Entry, ObservationInputs
+from hoof_env.tasks.observation import LATE, Entry, ObservationInputs
 from hoof_env.tasks.reward import Term
 from hoof_env.tasks.user_parts import ActionMap, Constant, Declarations, declared_by
 
@@ -131,6 +131,7 @@ class Slots:
         """Return the places of some entries."""
         saturating = [k for k, entry in enumerate(entries) if entry.scale.saturates]
         linear = [k for k, entry in enumerate(entries) if not entry.scale.saturates]
+        linear.sort(key=lambda k: entries[k].group in LATE)
         vectors = -(-len(saturating) // LANES)
         slots = {k: slot for slot, k in enumerate(saturating)}
         slots |= {k: vectors * LANES + slot for slot, k in enumerate(linear)}

@@ -179,6 +179,7 @@ def task_type(terms: int, entries: int, gait: int = ACTIONS, more: tuple[Any, ..
             ("is_noisy", "?"),  # True with noise or bias
             ("noise", "f8", (entries,)),  # largest error of each slot in a step
             ("bias", "f8", (entries,)),  # largest error of each slot that stays for an episode
+            ("force_threshold", "f8"),  # load of a hoof point below which it is observed as 0 [N]
             *more,
         ],
         # The kernels read every field with one aligned load.

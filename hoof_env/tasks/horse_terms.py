@@ -14,13 +14,18 @@ from hoof_env.simd.math import cos_sin
 from hoof_env.tasks.horse_gaits import LEGS
 from hoof_env.tasks.observation import (
     PLAIN,
+    PRESSURE,
     TRUE_RATE,
     TRUTH,
     Entry,
     ObservationInputs,
     Scale,
-    in_contact,
+    centre_of_pressure,
+    heel_contact,
+    heel_load,
     tanh_of,
+    toe_contact,
+    toe_load,
 )
 from hoof_env.tasks.reward import Outcome, Term
 
@@ -50,35 +55,27 @@ def _in_bounds(k: int) -> Scale:
     return Scale(f"linear, -1 at {low:g} and 1 at {high:g}", lambda x, scene: (x - middle) * per)
 
 
-def _of_leg(i: int, measure: Callable[[Any], Any]) -> Callable[[Any], Any]:
+def _of_leg(i: int, measure: Callable[[Any, Any], Any]) -> Callable[[Any], Any]:
     """Return a function of a scene that measures its i-th leg."""
-    return lambda scene: measure(block_at(scene.leg, i))
+    return lambda scene: measure(block_at(scene.leg, i), scene)
 
 
-def _sine(leg: LegMemory) -> Lanes:
+def _sine(leg: LegMemory, scene: ObservationInputs) -> Lanes:
     return cos_sin(leg.state.crank_angle)[1]
 
 
-def _cosine(leg: LegMemory) -> Lanes:
+def _cosine(leg: LegMemory, scene: ObservationInputs) -> Lanes:
     return cos_sin(leg.state.crank_angle)[0]
 
 
-def _toe_contact(leg: LegMemory) -> Lanes:
-    return in_contact(leg.state.toe)
-
-
-def _heel_contact(leg: LegMemory) -> Lanes:
-    return in_contact(leg.state.heel)
-
-
-def _filter(k: int) -> Callable[[Any], Any]:
+def _filter(k: int) -> Callable[[Any, Any], Any]:
     """Return a function that measures the k-th gait parameter of a leg, after its filter."""
-    return lambda leg: leg.state.gait[k]
+    return lambda leg, scene: leg.state.gait[k]
 
 
-def _filter_rate(k: int) -> Callable[[Any], Any]:
+def _filter_rate(k: int) -> Callable[[Any, Any], Any]:
     """Return a function that measures the rate of the k-th gait parameter of a leg."""
-    return lambda leg: leg.state.gait_rate[k]
+    return lambda leg, scene: leg.state.gait_rate[k]
 
 
 def _offset(k: int) -> Callable[[Any], Any]:
@@ -86,11 +83,11 @@ def _offset(k: int) -> Callable[[Any], Any]:
     return lambda scene: scene.episode.offset[k]
 
 
-# Name, group, unit, function of a leg's memory, scale. A table, one entry a line.
-_PER_LEG: tuple[tuple[str, str, str, Callable[[Any], Any], Scale], ...] = (
+# Name, group, unit, function of a leg's memory and the scene, scale. A table, one entry a line.
+_PER_LEG: tuple[tuple[str, str, str, Callable[[Any, Any], Any], Scale], ...] = (
     ("sin(crank angle)", "crank", "-", _sine, PLAIN),
     ("cos(crank angle)", "crank", "-", _cosine, PLAIN),
-    (TRUE_RATE, "crank", "rad/s", lambda leg: leg.state.crank_angle_rate, tanh_of(10.0)),
+    (TRUE_RATE, "crank", "rad/s", lambda leg, scene: leg.state.crank_angle_rate, tanh_of(10.0)),
     ("crank speed", "gait", "rad/s", _filter(0), tanh_of(10.0)),
     ("swing offset", "gait", "rad", _filter(1), _in_bounds(1)),
     ("swing sine coefficient", "gait", "rad", _filter(2), _in_bounds(2)),
@@ -99,11 +96,11 @@ _PER_LEG: tuple[tuple[str, str, str, Callable[[Any], Any], Scale], ...] = (
     ("rate of swing offset", "rates", "rad/s", _filter_rate(1), tanh_of(10.0)),
     ("rate of swing sine coefficient", "rates", "rad/s", _filter_rate(2), tanh_of(10.0)),
     ("rate of swing cosine coefficient", "rates", "rad/s", _filter_rate(3), tanh_of(10.0)),
-    ("toe contact", "hoof", "-", _toe_contact, TRUTH),
-    ("heel contact", "hoof", "-", _heel_contact, TRUTH),
-    ("toe load", "hoof", "N", lambda leg: leg.report.toe.normal, IN_WEIGHTS),
-    ("heel load", "hoof", "N", lambda leg: leg.report.heel.normal, IN_WEIGHTS),
-    ("running peak force", "hoof", "N", lambda leg: leg.strides.running_peak, IN_WEIGHTS),
+    ("toe contact", "hoof", "-", toe_contact, TRUTH),
+    ("heel contact", "hoof", "-", heel_contact, TRUTH),
+    ("toe load", "hoof", "N", toe_load, IN_WEIGHTS),
+    ("heel load", "hoof", "N", heel_load, IN_WEIGHTS),
+    ("running peak force", "hoof", "N", lambda leg, scene: leg.strides.running_peak, IN_WEIGHTS),
 )
 
 HORSE_ENTRIES = (
@@ -134,6 +131,16 @@ HORSE_ENTRIES = (
         )
         for i, leg in enumerate(LEGS)
         for k, name in enumerate(PARAMETERS)
+    ),
+    *(
+        Entry(
+            f"{leg.replace('_', ' ')}: centre of pressure",
+            PRESSURE,
+            "-",
+            _of_leg(i, centre_of_pressure),
+            PLAIN,
+        )
+        for i, leg in enumerate(LEGS)
     ),
 )
 """Entries that can be observed of a horse; for each quantity, legs in the order of `LEGS`."""

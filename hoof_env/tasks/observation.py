@@ -180,6 +180,41 @@ def in_contact(memory: ContactMemory) -> Lanes:
     return where(memory.penetration > 0.0, 1.0, 0.0)
 
 
+def felt(load: Lanes, x: Lanes, scene: ObservationInputs) -> Lanes:
+    """Return what a sensor with a threshold reads of a number x: 0 where its load [N] is below the threshold,
+    else the number."""
+    # Not the other way round: without a threshold a number that is not finite stays one.
+    return where(load < scene.task.force_threshold, 0.0, x)
+
+
+def centre_of_pressure(leg: LegMemory, scene: ObservationInputs) -> Lanes:
+    """Return where the load acts on the hoof: 1 at the toe, -1 at the heel, 0 without load."""
+    toe, heel = leg.report.toe.normal, leg.report.heel.normal
+    load = toe + heel
+    # The inner `where` avoids a division by 0 in the air.
+    return felt(load, where(load > 0.0, (toe - heel) / where(load > 0.0, load, 1.0), 0.0), scene)
+
+
+def toe_load(leg: LegMemory, scene: ObservationInputs) -> Lanes:
+    """Return the normal force on the toe [N], as a sensor reads it."""
+    return felt(leg.report.toe.normal, leg.report.toe.normal, scene)
+
+
+def heel_load(leg: LegMemory, scene: ObservationInputs) -> Lanes:
+    """Return the normal force on the heel [N], as a sensor reads it."""
+    return felt(leg.report.heel.normal, leg.report.heel.normal, scene)
+
+
+def toe_contact(leg: LegMemory, scene: ObservationInputs) -> Lanes:
+    """Return 1 if the toe is inside the ground, and a sensor reads its load; else 0."""
+    return felt(leg.report.toe.normal, in_contact(leg.state.toe), scene)
+
+
+def heel_contact(leg: LegMemory, scene: ObservationInputs) -> Lanes:
+    """Return 1 if the heel is inside the ground, and a sensor reads its load; else 0."""
+    return felt(leg.report.heel.normal, in_contact(leg.state.heel), scene)
+
+
 def _approach_speed(memory: ContactMemory) -> Lanes:
     """Return the approach speed of a hoof point in contact [m/s], else 0."""
     inverse = memory.inverse_approach_speed
@@ -201,6 +236,13 @@ def _ahead(distance: float) -> Callable[[Any], Any]:
 
 TRUE_RATE = "true rate of the crank"
 """End of the names of entries that are observed only with a motor: without one it is the commanded rate."""
+
+PRESSURE = "pressure"
+"""Group of the centre of pressure."""
+
+LATE = (PRESSURE,)
+"""Groups whose entries have the last slots, behind those of users' own entries: the noise of an entry follows
+from its slot, and these groups were added later."""
 
 _PARAMETERS = ("crank speed", "swing offset", "swing sine coefficient", "swing cosine coefficient")
 _UNITS = ("rad/s", "rad", "rad", "rad")
@@ -228,16 +270,17 @@ ENTRIES = (
         Scale("tanh((x - hip height) / 0.3)", _height, True),
     ),
     Entry("bearing allowance", "trunk", "s", lambda s: s.episode.allowance, PLAIN),
-    Entry("toe contact", "hoof", "-", lambda s: in_contact(s.leg.state.toe), TRUTH),
-    Entry("heel contact", "hoof", "-", lambda s: in_contact(s.leg.state.heel), TRUTH),
-    Entry("toe load", "hoof", "N", lambda s: s.leg.report.toe.normal, IN_WEIGHTS),
-    Entry("heel load", "hoof", "N", lambda s: s.leg.report.heel.normal, IN_WEIGHTS),
+    Entry("toe contact", "hoof", "-", lambda s: toe_contact(s.leg, s), TRUTH),
+    Entry("heel contact", "hoof", "-", lambda s: heel_contact(s.leg, s), TRUTH),
+    Entry("toe load", "hoof", "N", lambda s: toe_load(s.leg, s), IN_WEIGHTS),
+    Entry("heel load", "hoof", "N", lambda s: heel_load(s.leg, s), IN_WEIGHTS),
     Entry("toe approach speed", "hoof", "m/s", lambda s: _approach_speed(s.leg.state.toe), tanh_of(2.0)),
     Entry("heel approach speed", "hoof", "m/s", lambda s: _approach_speed(s.leg.state.heel), tanh_of(2.0)),
     Entry("running peak force", "hoof", "N", lambda s: s.leg.strides.running_peak, IN_WEIGHTS),
     Entry("steepest rise of the force", "hoof", "N/s", lambda s: s.leg.strides.steepest_rise, RISE),
     Entry("commanded speed", "target", "m/s", lambda s: s.episode.target, tanh_of(5.0)),
     *(Entry(f"height of the ground {x:g} m ahead", "ground", "m", _ahead(x), tanh_of(0.5)) for x in AHEAD),
+    Entry("centre of pressure", PRESSURE, "-", lambda s: centre_of_pressure(s.leg, s), PLAIN),
 )
 """Entries that can be observed of one leg, in the order of the observation within each group. Heights of the
 ground are relative to the ground under O."""

@@ -410,6 +410,16 @@ class Settings:
         "trunk",
         "hoof",
     )
+    force_threshold: Annotated[
+        float,
+        About(
+            "N",
+            (
+                "load of toe or heel below which a sensor reads neither load nor contact; of their sum for "
+                "the centre of pressure"
+            ),
+        ),
+    ] = 0.0
     reward_weights: Annotated[
         Mapping[str, float] | None, About("", "mapping of weights that differ from the defaults")
     ] = None
