@@ -219,6 +219,12 @@ class LegBase:
         """Settings of the episode; in a vector environment, of every episode that starts from now on."""
         return self.batch.plan.asked
 
+    @property
+    def contexts(self) -> tuple[dict[str, float], ...]:
+        """Contexts of the setting `context_set`, in order; each can be played by
+        `reset(options={"parameters": context})`. Empty without the setting."""
+        return tuple(map(dict, self.batch.plan.randomization.contexts.known))
+
     def episode_summary(self) -> dict[str, Any]:
         """Return figures of the episode so far by name, as in `info["episode_summary"]`; in a vector
         environment of shape (num_envs,). The info lacks them where a wrapper ends an episode, such as the one

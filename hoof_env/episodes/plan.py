@@ -10,10 +10,12 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from hoof_env.constants import GRAVITY
 from hoof_env.dynamics.engine import TrunkEngine
 from hoof_env.dynamics.parts import MAX_COEFFICIENT, Mechanics
 from hoof_env.dynamics.stepping import SCHEMES
 from hoof_env.episodes.commands import Commands
+from hoof_env.episodes.contexts import Contexts
 from hoof_env.episodes.costs import Costs
 from hoof_env.episodes.delays import Delays
 from hoof_env.episodes.noise import Noise
@@ -23,11 +25,11 @@ from hoof_env.episodes.randomization import Randomization
 from hoof_env.episodes.rows import Rows
 from hoof_env.episodes.scene import Slots
 from hoof_env.episodes.strength import Strength
-from hoof_env.errors import check_choice, check_number
+from hoof_env.errors import check_choice, check_number, flag
 from hoof_env.ground.terrain import Terrain
 from hoof_env.tasks.body import Body
 from hoof_env.tasks.episode import ACTIONS, episode_layout, task_type
-from hoof_env.tasks.observation import check_groups, groups_of
+from hoof_env.tasks.observation import CONTEXT, check_groups, groups_of
 from hoof_env.tasks.parameters import check_drift, check_parameters, make_terrain, resolved, substeps_of
 from hoof_env.tasks.registry import Task
 from hoof_env.tasks.reward import check_weights
@@ -214,8 +216,11 @@ def make_plan(
     pushes = Pushes.of(s, dt, steps)
     delays = Delays.of(s, substeps, steps)
     costs = Costs.of(s)
+    contexts = Contexts.of(s, {**given, **schedule})
+    if flag("context_visible", s.context_visible) and CONTEXT not in groups:
+        groups = (*groups, CONTEXT)
     observed = Observed.of(s, task, groups)
-    randomization = Randomization(s, body, terrain, given, schedule)
+    randomization = Randomization(s, body, terrain, given, schedule, contexts)
     engine = _make_engine(task, s, body, terrain, randomization.substeps(), num_envs, num_threads)
     plan = Plan(
         task=task,
@@ -323,6 +328,9 @@ def _fill(plan: Plan, engine: TrunkEngine) -> None:
     record["dt"] = plan.dt
     record["episode_steps"] = plan.steps_per_episode
     record["is_fixed"] = plan.settings.trunk == "fixed"
+    record["usual_weight"] = GRAVITY * (engine.trunk.mass + sum(limb.geometry.mass for limb in engine.limbs))
+    record["usual_stiffness"] = plan.settings.stiffness
+    record["usual_friction"] = plan.settings.friction
     slots = Slots.of(task.entries).places
     groups = plan.observed.fill(record, slots, len(plan.observation_names))
     plan.noise.fill(record, groups)

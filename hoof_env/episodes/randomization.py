@@ -1,5 +1,5 @@
-"""Physical parameters that episodes draw: parameters of `randomize`, of a schedule, and of a reset's options;
-with the check that the engine's substeps suit all of them."""
+"""Physical parameters that episodes draw: of `randomize`, of a schedule, of contexts and of a reset's
+options; with the check that the engine's substeps suit all of them."""
 
 from __future__ import annotations
 
@@ -13,6 +13,7 @@ from hoof_env.constants import GRAVITY
 from hoof_env.dynamics.engine import TrunkEngine
 from hoof_env.dynamics.parts import Mechanics
 from hoof_env.dynamics.step_length import StepLength
+from hoof_env.episodes.contexts import Contexts
 from hoof_env.episodes.rows import Rows
 from hoof_env.errors import ParameterError
 from hoof_env.ground.terrain import Terrain
@@ -29,9 +30,10 @@ class Randomization:
     """Physical parameters of episodes.
 
     Attributes:
-        ranges: numbers, or ranges to draw from, by name, of `randomize` and of a schedule, there with all
-            values that it ever takes.
+        ranges: numbers, or ranges to draw from, by name, of `randomize`, and of a schedule and of contexts,
+            there with all values that they ever take.
         ramps: ramps of scheduled parameters by name.
+        contexts: sets of parameters of which an episode draws one.
 
     Args:
         s: settings.
@@ -39,6 +41,7 @@ class Randomization:
         terrain: ground.
         given: ranges of the setting `randomize`.
         schedule: ramps of all scheduled settings.
+        contexts: contexts.
     """
 
     def __init__(
@@ -48,12 +51,15 @@ class Randomization:
         terrain: Terrain,
         given: Parameters,
         schedule: Mapping[str, Ramp],
+        contexts: Contexts,
     ) -> None:
         self._settings = s
         self._body = body
         self._terrain = terrain
         self.ramps = {name: schedule[name] for name in drawn_names(schedule)}
-        self.ranges: Parameters = {**given, **{name: ramp.bounds for name, ramp in self.ramps.items()}}
+        ramps = {name: ramp.bounds for name, ramp in self.ramps.items()}
+        self.ranges: Parameters = {**given, **ramps, **contexts.bounds}
+        self.contexts = contexts
         self._last_checked = ""
 
     def substeps(self) -> int | None:
@@ -132,6 +138,7 @@ class Randomization:
             sources: dict[str, Iterable[str]] = {
                 "randomize": self._settings.randomize or (),
                 "schedule": self.ramps,
+                "context_set": self.contexts.bounds,
                 "options['parameters']": [n for n in parameters if parameters[n] != self.ranges.get(n)],
             }
             named = set(re.findall(r"\w+", str(error)))
@@ -151,7 +158,7 @@ class Randomization:
             of_options: parameters of the reset's options, which take precedence.
             engine: engine of the batch.
         """
-        parameters = {**self.ranges, **of_options}
+        parameters = {**self.ranges, **self.contexts.draw(generator), **of_options}
         for name, ramp in self.ramps.items():
             if name not in of_options:
                 low, high = map(float, ramp.range_at(rows.steps_before[env]))

@@ -179,6 +179,9 @@ def task_type(terms: int, entries: int, gait: int = ACTIONS, more: tuple[Any, ..
             ("is_noisy", "?"),  # True with noise or bias
             ("noise", "f8", (entries,)),  # largest error of each slot in a step
             ("bias", "f8", (entries,)),  # largest error of each slot that stays for an episode
+            ("usual_weight", "f8"),  # weight of trunk and legs by the settings [N]
+            ("usual_stiffness", "f8"),  # stiffness of the ground by the settings [N/m^n]
+            ("usual_friction", "f8"),  # friction by the settings [-]
             ("force_threshold", "f8"),  # load of a hoof point below which it is observed as 0 [N]
             *more,
         ],

@@ -13,6 +13,7 @@ from hoof_env.simd import Lanes, Number, absolute, block_at, maximum, minimum, w
 from hoof_env.simd.math import cos_sin
 from hoof_env.tasks.horse_gaits import LEGS
 from hoof_env.tasks.observation import (
+    CONTEXT_ENTRIES,
     PLAIN,
     PRESSURE,
     TRUE_RATE,
@@ -142,6 +143,7 @@ HORSE_ENTRIES = (
         )
         for i, leg in enumerate(LEGS)
     ),
+    *CONTEXT_ENTRIES,
 )
 """Entries that can be observed of a horse; for each quantity, legs in the order of `LEGS`."""
 

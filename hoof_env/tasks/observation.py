@@ -240,7 +240,10 @@ TRUE_RATE = "true rate of the crank"
 PRESSURE = "pressure"
 """Group of the centre of pressure."""
 
-LATE = (PRESSURE,)
+CONTEXT = "context"
+"""Group of the physical parameters that contexts vary."""
+
+LATE = (PRESSURE, CONTEXT)
 """Groups whose entries have the last slots, behind those of users' own entries: the noise of an entry follows
 from its slot, and these groups were added later."""
 
@@ -250,6 +253,35 @@ IN_RANGE = tuple(map(_in_range, range(4)))
 IN_RATE = tuple(map(_in_rate, range(4)))
 """Scales of the gait parameters and their rates. They use the limits and bounds of the leg; their texts show
 the limits and bounds of the published leg; see `envs.manual_bodies.LegTables.scaling`."""
+
+
+def _beside(usual: str) -> Scale:
+    """Return the scale of a positive number by its usual value, a field of the task's record: 0 there, and
+    odd in the logarithm of their ratio."""
+
+    def apply(x: Lanes, scene: ObservationInputs) -> Lanes:
+        return (x - getattr(scene.task, usual)) / (x + getattr(scene.task, usual))
+
+    return Scale("(x - usual) / (x + usual)", apply)
+
+
+def _share(scene: ObservationInputs) -> Lanes:
+    """Measure the part of the weight that the leg must bear; what supports the rest is 0 on a rail."""
+    return 1.0 - scene.trunk.settings.support / scene.episode.weight
+
+
+CONTEXT_ENTRIES = (
+    Entry(
+        "stiffness of the ground",
+        CONTEXT,
+        "N/m^n",
+        lambda s: s.trunk.settings.stiffness,
+        _beside("usual_stiffness"),
+    ),
+    Entry("friction", CONTEXT, "-", lambda s: s.trunk.settings.friction, _beside("usual_friction")),
+    Entry("weight", CONTEXT, "N", lambda s: s.episode.weight, _beside("usual_weight")),
+)
+"""Entries of contexts that any body has."""
 
 ENTRIES = (
     Entry("sin(crank angle)", "crank", "-", _sine, PLAIN),
@@ -281,6 +313,8 @@ ENTRIES = (
     Entry("commanded speed", "target", "m/s", lambda s: s.episode.target, tanh_of(5.0)),
     *(Entry(f"height of the ground {x:g} m ahead", "ground", "m", _ahead(x), tanh_of(0.5)) for x in AHEAD),
     Entry("centre of pressure", PRESSURE, "-", lambda s: centre_of_pressure(s.leg, s), PLAIN),
+    *CONTEXT_ENTRIES,
+    Entry("share of the weight to bear", CONTEXT, "-", _share, PLAIN),
 )
 """Entries that can be observed of one leg, in the order of the observation within each group. Heights of the
 ground are relative to the ground under O."""
@@ -292,8 +326,14 @@ def groups_of(entries: Iterable[Entry]) -> tuple[str, ...]:
 
 
 ABSENT = {
-    "fixed": ("forward speed", "vertical speed", "height", "bearing allowance"),
-    "rail": ("vertical speed", "height", "bearing allowance"),
+    "fixed": (
+        "forward speed",
+        "vertical speed",
+        "height",
+        "bearing allowance",
+        "share of the weight to bear",
+    ),
+    "rail": ("vertical speed", "height", "bearing allowance", "share of the weight to bear"),
 }
 """Names of entries that are constant on a kind of trunk, and are therefore not observed there."""
 

@@ -433,6 +433,19 @@ class Settings:
     ] = None
 
     # Curricula
+    context_set: Annotated[
+        str | None,
+        About(
+            "",
+            (
+                "SPLIT/SET, a set of [contexts](../contexts.md) of which each episode draws one: splits "
+                "ground, body, all; sets train, interpolation, extrapolation"
+            ),
+        ),
+    ] = None
+    context_visible: Annotated[
+        bool, About("", "True adds the group `context`, which shows the context, to the observation")
+    ] = False
     schedule: Annotated[
         Mapping[str, Sequence[Any]] | None,
         About(

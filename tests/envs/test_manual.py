@@ -230,12 +230,14 @@ CHANGED = LARGER | OTHER | {
     "reward_weights": {"peak": 2.0}, "constants": {"free": 1.0}, "schedule": {"strength": [0.0, 1.0, 5]},
     "randomize": {"friction": 0.5}, "noise": {"trunk": 0.1}, "bias": {"trunk": 0.1}, "push_impulse": 9.0,
     "push_seconds": (1.0, 2.0), "pushes": [[1.0, 9.0, 0.0]],
-    "privileged": ["trunk"], "cost": {"peak": 900.0}, "force_threshold": 50.0,
+    "privileged": ["trunk"], "cost": {"peak": 900.0}, "force_threshold": 50.0, "context_set": "all/train",
+    "context_visible": True,
 }  # fmt: skip
 BESIDE = {name: {"drive": "motor"} for name in ("motor_gain", "motor_torque", "motor_inertia")} | {
     f"friction_{name}": {"hoof_stiffness": None} for name in ("law", "slow", "fast")
 }
 BESIDE["push_seconds"] = {"push_impulse": 9.0}
+BESIDE["context_visible"] = {"context_set": "all/train"}
 
 
 def test_the_table_of_the_horse_lists_what_a_horse_takes():

@@ -429,8 +429,9 @@ OTHER_DOORS = [
             lambda env_id=env_id: Sb3VecEnv(env_id, 2),
             "env_id: expected an id .*once",
         )
-        for env_id in (MO, "CartPole-v1", "Nobodys-v0", "no_such_module:Leg-v0")
+        for env_id in ("CartPole-v1", "Nobodys-v0", "no_such_module:Leg-v0")
     ),
+    (lambda: Sb3VecEnv(MO, 2), "env_id: expected an id with one number for a reward, got .*MO-v0"),
     (lambda: Sb3VecEnv(LEG, 2, trunck="rail"), "unexpected keyword argument 'trunck'; did you mean trunk"),
     (
         lambda: Sb3VecEnv(LEG, 2, autoreset_mode="NEXT_STEP"),
