@@ -1,5 +1,6 @@
 """Episodes of policies as a Minari dataset, to learn from offline.
 
+    python -m agents.dataset --level medium             also random, simple, expert, mixed (agents/levels.py)
     python -m agents.dataset run walk random --episodes 100 --dataset-id hoof_env/HorseLeg/scripted-v0
     python -m agents.dataset agents/policies/Horse-v0 --env-id hoof_env/Horse-v0
 
@@ -34,6 +35,7 @@ from tyro.conf import Positional
 import hoof_env
 from agents import runs
 from agents.command import parse, parse_pairs, run
+from agents.levels import SCORES, Level, Levels, Partly
 from hoof_env.envs.policies import start_of
 from hoof_env.errors import DataFileError, MissingExtraError, OutputError, ParameterError, count
 from hoof_env.gait import GaitParameters
@@ -54,8 +56,10 @@ ACTIONS = "actions"  # the key of what actions are
 class Args:
     """Arguments of the command."""
 
-    policies: Positional[tuple[str, ...]]
+    policies: Positional[tuple[str, ...]] = ()
     """policies to play, one after the other"""
+    level: Level | None = None
+    """policies of this level in place of named ones"""
     env_id: str = "hoof_env/HorseLeg-v0"
     """the environment"""
     env_kwargs: tuple[str, ...] = ()
@@ -66,6 +70,12 @@ class Args:
     """of the first episode"""
     dataset_id: str = ""
     """NAMESPACE/NAME-vK; otherwise hoof_env/ID/POLICIES-v0"""
+    author: str = ""
+    """for Minari's description; otherwise the authors in pyproject.toml"""
+    author_email: str = ""
+    """likewise; empty for none"""
+    code_permalink: str = ""
+    """likewise, address of the code that made it; otherwise the repository in pyproject.toml, if any"""
     out: Path = Path("runs/datasets")
     """folder of datasets, as Minari's MINARI_DATASETS_PATH"""
 
@@ -85,9 +95,14 @@ def write(args: Args) -> Path:
         MissingExtraError: Minari is not installed.
     """
     # All arguments are checked before Minari makes a folder
-    _check_policies(args.policies)
+    _check_policies(args.policies, args.level)
     episodes = count("episodes", args.episodes)
-    dataset_id = check_id(args.dataset_id or default_id(args.env_id, args.policies))
+    if args.level == "mixed" and episodes % len(SCORES):
+        raise ParameterError(
+            f"episodes: expected a multiple of {len(SCORES)}, the parts of a mixed level, got {episodes}"
+        )
+    named = [args.level] if args.level else args.policies
+    dataset_id = check_id(args.dataset_id or default_id(args.env_id, named))
     folder = args.out / dataset_id
     if folder.exists():
         raise OutputError(f"{folder}: expected no dataset there; choose another --dataset-id or --out")
@@ -165,10 +180,14 @@ def check_actions(dataset: Any, env: Any) -> None:
         )
 
 
-def _check_policies(policies: Sequence[str]) -> None:
-    """Check that there is a policy, and none twice."""
-    if not policies:
-        raise ParameterError("policies: expected at least one, got none")
+def _check_policies(policies: Sequence[str], level: str | None) -> None:
+    """Check that there is a policy or a level, and none twice."""
+    if level and policies:
+        raise ParameterError(
+            f"policies: expected none together with a level, got {', '.join(policies)} and {level}"
+        )
+    if not policies and not level:
+        raise ParameterError("policies: expected at least one, or a --level, got none")
     for name, times in Counter(policies).items():
         if times > 1:
             raise ParameterError(f"policies: expected each one once, got {name} {times} times")
@@ -222,20 +241,25 @@ def _collect(minari: Any, env: Any, args: Args, episodes: int, dataset_id: str) 
     """Play all episodes, have Minari write them, and return the figures of each policy for the manifest."""
     from tqdm import tqdm
 
-    policies = {name: find_policy(name, env, args.env_id) for name in args.policies}
+    levels = Levels(env, args.env_id, parse_pairs("--env-kwargs", args.env_kwargs)) if args.level else None
+    policies = _policies(env, args, levels)
+    # A level has as many episodes as one policy: its parts share them.
+    each = episodes // len(policies) if levels else episodes
     files = {
-        name: {file.name: _sha256(file) for file in policy_files(name, args.env_id)} for name in policies
+        name: {file.name: _sha256(file) for file in policy_files(name, args.env_id)}
+        for name in args.policies
     }
     collector = minari.DataCollector(env)
     returns = {}
-    with tqdm(total=len(policies) * episodes, unit=" episodes", leave=False, disable=None) as bar:
+    seed = args.seed
+    with tqdm(total=len(policies) * each, unit=" episodes", leave=False, disable=None) as bar:
         for name, policy in policies.items():
             totals = []
             actor = Actor(policy, env)
             options = plain_start(policy)
             # One environment for all episodes, so that a seed alone decides how an episode goes
-            for k in range(episodes):
-                observation, _ = collector.reset(seed=args.seed + k, options=options)
+            for k in range(each):
+                observation, _ = collector.reset(seed=seed + k, options=options)
                 actor.begin()
                 total = 0.0
                 ended = False
@@ -246,21 +270,53 @@ def _collect(minari: Any, env: Any, args: Args, episodes: int, dataset_id: str) 
                 totals.append(total)
                 bar.update()
             returns[name] = {
-                "episodes": episodes,
-                "first_seed": args.seed,
+                "episodes": each,
+                "first_seed": seed,
                 "mean_return": float(np.mean(totals)),
                 "sd_return": float(np.std(totals)),
+                **({"normalised_score": levels.scale.score(float(np.mean(totals)))} if levels else {}),
+                **({"random_share": policy.share} if isinstance(policy, Partly) else {}),
                 **({"start": options} if options else {}),
-                **({"sha256": files[name]} if files[name] else {}),
+                **({"sha256": files[name]} if files.get(name) else {}),
             }
+            # Parts of a level have starts of their own
+            seed += each if levels else 0
     dataset = collector.create_dataset(
         dataset_id,
-        algorithm_name=", ".join(returns),
-        description=f"{episodes} episodes of each of {', '.join(returns)} on {args.env_id}",
+        algorithm_name=", ".join(
+            f"shipped, {value['random_share']:.3f} random" if "random_share" in value else name
+            for name, value in returns.items()
+        ),
+        description=f"{each} episodes of each of {', '.join(returns)} on {args.env_id}",
         requirements=[f"hoof-env=={hoof_env.__version__}"],
+        **_described(args),
     )
-    dataset.storage.update_metadata(describe_actions(env))
+    metadata: dict[str, Any] = {**describe_actions(env)}
+    if levels:
+        # Minari's names for the ends of the normalised score
+        metadata |= {"ref_min_score": levels.scale.random, "ref_max_score": levels.scale.shipped}
+    dataset.storage.update_metadata(metadata)
     return returns
+
+
+def _policies(env: Any, args: Args, levels: Levels | None) -> dict[str, Any]:
+    """Return the policies that the arguments ask for, by name."""
+    if levels and args.level:
+        return levels.policies(args.level)
+    return {name: find_policy(name, env, args.env_id) for name in args.policies}
+
+
+def _described(args: Args) -> dict[str, str]:
+    """Return Minari's descriptive fields that are known."""
+    project = tomllib.loads(PROJECT.read_text(encoding="utf-8"))["project"]
+    authors = project.get("authors", [])
+    known = {
+        "author": args.author or ", ".join(author["name"] for author in authors if "name" in author),
+        "author_email": args.author_email
+        or ", ".join(author["email"] for author in authors if "email" in author),
+        "code_permalink": args.code_permalink or project.get("urls", {}).get("Repository", ""),
+    }
+    return {name: value for name, value in known.items() if value}
 
 
 def _write_manifest(folder: Path, args: Args, returns: dict[str, Any]) -> None:

@@ -10,7 +10,7 @@ import gymnasium as gym
 import numpy as np
 import pytest
 
-from hoof_env.errors import DataFileError
+from hoof_env.errors import DataFileError, ParameterError
 
 minari = pytest.importorskip("minari", reason='needs pip install "hoof-env[minari]"')
 
@@ -64,7 +64,7 @@ def test_a_replay_gives_the_same_bits(shelf, env_id, policies):
 def test_a_dataset_says_what_its_actions_are(shelf):
     data, _ = written(shelf, "run")
     assert dataset.load("hoof_env/some-v0").total_episodes == 2
-    for form, said in (("offsets", "got actions offsets"), (None, "got None")):
+    for form, said in (("offsets", "got offsets"), (None, "got None")):
         data.storage.update_metadata({"actions": form})
         with pytest.raises(DataFileError, match=f"some-v0: expected actions rates, {said}"):
             dataset.load("hoof_env/some-v0")
@@ -152,6 +152,61 @@ def test_two_runs_have_the_same_data(tmp_path, monkeypatch):
     for one, two in zip(*found, strict=True):
         for a, b in zip(one, two, strict=True):
             np.testing.assert_array_equal(a, b)
+
+
+def levelled(shelf, level, *more):
+    arguments = ("--level", level, "--out", str(shelf), "--env-kwargs", "episode_seconds=1.0", *more)
+    dataset.main([*arguments])
+    name = f"hoof_env/HorseLeg/{level}-v0"
+    return minari.load_dataset(name), json.loads((shelf / name / dataset.MANIFEST).read_text())
+
+
+def test_a_level_has_the_fields_of_minari_and_its_score(shelf):
+    author = (
+        "--author",
+        "A. Horse",
+        "--author-email",
+        "a@horse.example",
+        "--code-permalink",
+        "https://x.example",
+    )
+    data, about = levelled(shelf, "medium", "--episodes", "6", *author)
+    stored = data.storage.metadata
+    assert (stored["author"], stored["author_email"]) == ({"A. Horse"}, {"a@horse.example"})
+    assert stored["code_permalink"] == "https://x.example"
+    assert stored["algorithm_name"].startswith("shipped, 0.")
+    assert "6 episodes of each of medium" in stored["description"]
+    assert any("hoof-env==" in requirement for requirement in stored["requirements"])
+    # By Minari's own function, which has 1 for the upper reference
+    returns = np.array([episode.rewards.sum() for episode in data.iterate_episodes()])
+    scores = 100 * minari.get_normalized_score(data, returns)
+    assert scores.mean() == pytest.approx(about["policies"]["medium"]["normalised_score"])
+    assert 0 < about["policies"]["medium"]["random_share"] < 1
+
+
+def test_a_mixed_level_has_equal_parts_with_starts_of_their_own(shelf):
+    data, about = levelled(shelf, "mixed", "--episodes", "8", "--seed", "3")
+    parts = about["policies"]
+    assert [*parts] == ["random", "simple", "medium", "expert"]
+    assert [part["episodes"] for part in parts.values()] == [2] * 4
+    assert [part["first_seed"] for part in parts.values()] == [3, 5, 7, 9]
+    assert parts["simple"]["random_share"] > parts["medium"]["random_share"]
+    env = data.recover_environment()
+    for k, episode in enumerate(data.iterate_episodes()):
+        np.testing.assert_array_equal(env.reset(seed=3 + k)[0], episode.observations[0])
+        for action, reward in zip(episode.actions, episode.rewards, strict=True):
+            assert env.step(action)[1] == reward
+
+
+def test_bad_levels_are_refused(shelf):
+    for words, *arguments in (
+        ("policies: expected none together with a level, got run and expert", "run", "--level", "expert"),
+        ("expected a multiple of 4", "--level", "mixed", "--episodes", "6"),
+        ("policies: expected at least one, or a --level", "--episodes", "4"),
+    ):
+        with pytest.raises(ParameterError, match=words):
+            dataset.main([*arguments, "--out", str(shelf)])
+    assert list(shelf.iterdir()) == []
 
 
 def test_nothing_half_made_stays(shelf, monkeypatch):

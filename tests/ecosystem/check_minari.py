@@ -9,6 +9,7 @@ import pytest
 from stable_baselines3 import PPO
 
 import hoof_env
+from agents import dataset as command
 
 SHORT = {"episode_seconds": 0.4}
 
@@ -116,3 +117,21 @@ def test_combine(env_id):
     combined = minari.combine_datasets([minari.load_dataset(name) for name in names], "hoof_env/both-v0")
     assert combined.total_episodes == 4
     assert [len(part) for part in minari.split_dataset(combined, sizes=[3, 1])] == [3, 1]
+
+
+def test_levels(env_id, tmp_path):
+    """`agents.dataset --level mixed`: Minari's description, its normalised scores, a replay of each part."""
+    kwargs = ("--env-kwargs", "episode_seconds=2.0", "--episodes", "4", "--author", "A. Horse")
+    command.main(["--level", "mixed", "--env-id", env_id, *kwargs, "--out", str(tmp_path)])
+    data = minari.load_dataset(f"hoof_env/{gym.spec(env_id).name}/mixed-v0")
+    stored = data.storage.metadata
+    assert stored["author"] == {"A. Horse"}
+    assert {"algorithm_name", "description", "requirements", "minari_version"} <= stored.keys()
+    scores = [minari.get_normalized_score(data, x.rewards.sum()) for x in data.iterate_episodes()]
+    assert len(scores) == 4
+    assert np.isfinite(scores).all()
+    env = data.recover_environment()
+    for k, episode in enumerate(data.iterate_episodes()):
+        np.testing.assert_array_equal(env.reset(seed=k)[0], episode.observations[0])
+        for action, reward in zip(episode.actions, episode.rewards, strict=True):
+            assert env.step(action)[1] == reward
