@@ -212,4 +212,4 @@ def literal(value: Any) -> str:
         return "[" + ", ".join(map(literal, value)) + "]"
     if isinstance(value, float):
         return f"{value:g}" if float(f"{value:g}") == value else repr(value)
-    return "None" if value is None else json.dumps(value)
+    return repr(value) if value is None or isinstance(value, bool) else json.dumps(value)
