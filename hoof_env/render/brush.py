@@ -12,7 +12,8 @@ import pygame
 from hoof_env.render.colours import Colour
 
 FINE = 2  # resolution of smooth painting / resolution of the picture
-LEAST_LETTERS = 10  # least size of letters, whatever the size of the picture [pixels]
+MIN_LETTERS = 12  # least size of letters in pictures from 576 pixels of width on [pixels]
+MIN_LETTERS_SHARE = 20  # least size in smaller pictures, whose panel holds no larger letters, in `Brush.unit`
 
 Position = tuple[float, float]
 
@@ -37,7 +38,7 @@ class Brush:
 
     Attributes:
         unit: 1 for a picture of 960 x 540 pixels; line widths and letters grow with it, and letters shrink
-            to `LEAST_LETTERS`.
+            to `MIN_LETTERS`, or below in a picture that is too small for them.
     """
 
     def __init__(self, size: tuple[int, int]) -> None:
@@ -59,7 +60,8 @@ class Brush:
 
     def _font(self, size: int) -> Any:
         """Return the font of letters of a size, at `FINE` times the resolution."""
-        return _font(round(max(size * self.unit, LEAST_LETTERS) * FINE))
+        least = min(MIN_LETTERS, MIN_LETTERS_SHARE * self.unit)
+        return _font(round(max(size * self.unit, least) * FINE))
 
     def _paint_letters(self, text: str, size: int, colour: Colour) -> Any:
         image = self._font(size).render(text, True, colour)

@@ -23,7 +23,7 @@ from hoof_env.leg.mechanism_list import flesh_of
 from hoof_env.record.columns import columns_of_engine
 from hoof_env.record.instant import Instant, leg_instants
 from hoof_env.record.surroundings import Surroundings
-from hoof_env.render.brush import Brush
+from hoof_env.render.brush import FINE, Brush
 from hoof_env.render.colours import COAT, HOOF, LINK
 from hoof_env.render.drawing import Drawing
 from hoof_env.render.ground import footprint
@@ -164,6 +164,32 @@ def test_labels_of_the_ruler_are_whole(run, monkeypatch, size):
     assert len(labels) > 150
     assert min(left for left, _ in labels) >= 0
     assert max(right for _, right in labels) <= picture._panel._box.left
+
+
+@pytest.mark.parametrize("env_id", ["hoof_env/HorseLeg-v0", "hoof_env/Horse-v0"])
+@pytest.mark.parametrize(("size", "least"), [((480, 270), 10), ((640, 360), 12), ((960, 540), 12)])
+def test_letters_are_readable_and_no_text_of_the_panel_lies_on_another(env_id, size, least, monkeypatch):
+    places = []
+    write = Brush.write
+
+    def noted(self, canvas, text, at, letters, colour, side="midleft"):
+        assert self._font(letters).get_height() >= pygame.font.Font(None, FINE * least).get_height()
+        image = self._letters(text, letters, colour)
+        places.append((text, image.get_rect(**{side: (round(at[0]), round(at[1]))})))
+        write(self, canvas, text, at, letters, colour, side)
+
+    monkeypatch.setattr(Brush, "write", noted)
+    env = gym.make(env_id, render_mode="rgb_array", width=size[0], height=size[1])
+    env.reset(seed=0)
+    for _ in range(20):
+        env.step(np.zeros(env.action_space.shape, np.float32))
+    env.render()
+    lines = [(text, place) for text, place in places if place.left > 0.66 * size[0]]
+    assert {"time", "forward speed", "time before now, s"} <= {text for text, _ in lines}
+    for k, (text, place) in enumerate(lines):
+        assert place.right < size[0], text
+        for other, beside in lines[:k]:
+            assert not place.colliderect(beside), (text, other)
 
 
 @pytest.mark.parametrize("friction", [-900.0, -400.0, 0.0, 400.0, 900.0])
