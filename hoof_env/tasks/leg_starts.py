@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -16,7 +16,7 @@ from hoof_env.gait import GaitParameters, gait_array, paper_gaits
 from hoof_env.ground.terrain import Terrain
 from hoof_env.leg.profile import LegProfile, by_name
 from hoof_env.tasks.disturbances import MAX_STRENGTH
-from hoof_env.tasks.parameters import check_parameters
+from hoof_env.tasks.parameters import check_parameters, check_range
 from hoof_env.tasks.settings import Settings
 
 Floats = NDArray[np.float64]
@@ -38,6 +38,9 @@ OPTIONS = {
 }
 """Numeric reset options and their ranges [rad, m/s, m, m, m/s, -]; "gait", "parameters" and "pushes" are
 not numeric."""
+
+RANGES = ("crank_angle", "speed", "height", "x")
+"""Options that may be a range, from which each start draws."""
 
 # Minari passes its option on to the environment.
 FOREIGN_OPTIONS = ("minari_autoseed",)
@@ -111,7 +114,8 @@ def draw_starts(
     own_gait: GaitParameters | None = None,
     hoof_length: float = 0.0,
 ) -> Start:
-    """Draw random starts, one for each generator. Options set values (see `check_options`).
+    """Draw random starts, one for each generator. Options set values, or ranges to draw from (see
+    `check_options`).
 
     No episode starts with a hoof inside the ground: a trunk that moves up and down starts higher instead, and
     under any other trunk the crank angle is drawn again.
@@ -134,11 +138,17 @@ def draw_starts(
     mixed = ends[0] + drawn[:, :1] * (ends[-1] - ends[0])
     fixed = options.get("gait") or own_gait
     chosen = np.repeat(fixed.to_array()[None], n, 0) if fixed else mixed
-    theta = np.full(n, options["crank_angle"]) if "crank_angle" in options else 2 * np.pi * drawn[:, 1]
-    rolling = np.zeros(n) if trunk.kind == "fixed" else START_SPEED * drawn[:, 2]
-    speed = np.full(n, options["speed"]) if "speed" in options else rolling
-    height = np.full(n, options.get("height", trunk.height))
-    x = np.full(n, options.get("x", 0.0))
+    turn = options.get("crank_angle", (0.0, 2 * np.pi))
+    theta = _between(turn, drawn[:, 1])
+    rolling = (0.0, 0.0 if trunk.kind == "fixed" else START_SPEED)
+    speed = _between(options.get("speed", rolling), drawn[:, 2])
+    further = {
+        name: np.array([generator.random() for generator in generators])
+        for name in ("height", "x")
+        if isinstance(options.get(name), tuple)
+    }
+    height = _between(options.get("height", trunk.height), further.get("height", np.zeros(n)))
+    x = _between(options.get("x", 0.0), further.get("x", np.zeros(n)))
     ground = np.zeros(n)
     if terrain != FLAT:
         x = start_anywhere(terrain, x, options, generators)
@@ -148,16 +158,24 @@ def draw_starts(
     if trunk.kind in ("suspended", "boom"):
         if "height" not in options:
             height = np.maximum(height, ground - hoof_height(profile, chosen, theta))
-    elif "crank_angle" not in options:
+    elif isinstance(turn, tuple):
         # Only rows with a hoof inside the ground draw again, so that neighbours do not change a row's bits.
         for _ in range(MAX_TRIES):
             below = np.flatnonzero(height + hoof_height(profile, chosen, theta) < ground)
             if not below.size:
                 break
-            theta[below] = [2 * np.pi * generators[int(k)].random() for k in below]
+            theta[below] = _between(turn, np.array([generators[int(k)].random() for k in below]))
     values = {"crank_angle": theta, "speed": speed, "height": height, "x": x}
     trunk_at = {"x": x, "y": height, "vx": speed}
     return Start(values, chosen, chosen.T[None], theta[None], trunk_at)
+
+
+def _between(value: float | tuple[float, float], share: Floats) -> Floats:
+    """Return a value for each share, or the number at that share of a range; shape as `share`."""
+    if not isinstance(value, tuple):
+        return np.full(len(share), value)
+    low, high = value
+    return low + (high - low) * share if low else high * share
 
 
 def start_anywhere(
@@ -180,7 +198,7 @@ def check_options(
     Raises:
         ParameterError: an unknown option, a bad value, or one that the trunk cannot have.
     """
-    checked = checked_options(options, OPTIONS)
+    checked = checked_options(options, OPTIONS, RANGES)
     _check_trunk(checked, trunk)
     if "target_speed" in checked and settings.target_speed is None:
         raise ParameterError(
@@ -192,12 +210,15 @@ def check_options(
     return with_parameters(checked, settings)
 
 
-def checked_options(options: Any, numbers: Mapping[str, tuple[float, float]]) -> dict[str, Any]:
+def checked_options(
+    options: Any, numbers: Mapping[str, tuple[float, float]], ranges: Collection[str] = ()
+) -> dict[str, Any]:
     """Check the names of reset options and the values of the numeric ones.
 
     Args:
         options: options of `reset`, or None.
-        numbers: ranges of the numeric options by name.
+        numbers: lowest and highest values of the numeric options by name.
+        ranges: names of the numeric options that may be a pair, from which starts draw.
 
     Raises:
         ParameterError: an unknown option, or a number out of range.
@@ -213,8 +234,11 @@ def checked_options(options: Any, numbers: Mapping[str, tuple[float, float]]) ->
         )
     checked = dict(options)
     for name, (low, high) in numbers.items():
-        if name in checked:
-            checked[name] = check_number(f"options[{name!r}]", checked[name], low=low, high=high)
+        given = checked.get(name)
+        if name in ranges and isinstance(given, (tuple, list)):
+            checked[name] = check_range(f"options[{name!r}]", given, low, high, or_one=False)
+        elif name in checked:
+            checked[name] = check_number(f"options[{name!r}]", given, low=low, high=high)
     return checked
 
 
@@ -239,25 +263,25 @@ def highest(terrain: Terrain, x: Floats, reach: float) -> Floats:
     return terrain.height_at(np.hstack([low, np.clip(knots, low, high), high])).max(1)
 
 
-def _check_trunk(options: Mapping[str, float], trunk: Trunk) -> None:
+def _check_trunk(options: Mapping[str, Any], trunk: Trunk) -> None:
     """Check that the trunk can have the height and the speed of the options.
 
     Raises:
         ParameterError: it cannot.
     """
-    height = options.get("height", trunk.height)
-    speed = options.get("speed", 0.0)
-    if trunk.kind not in ("suspended", "boom") and height != trunk.height:
-        raise ParameterError(
-            f"options['height']: a {trunk.kind} trunk is at {trunk.height:g} m, got {height:g} m"
-        )
-    if not MIN_HEIGHT * trunk.height < height < MAX_HEIGHT * trunk.height:
-        raise ParameterError(
-            f"options['height']: expected {MIN_HEIGHT:g} to {MAX_HEIGHT:g} times {trunk.height:g} m, "
-            f"outside which an episode fails, got {height:g}"
-        )
-    if trunk.kind == "fixed" and speed != 0.0:
-        raise ParameterError(f"options['speed']: expected 0 for a fixed trunk, got {speed:g}")
+    for height in np.atleast_1d(options.get("height", trunk.height)):
+        if trunk.kind not in ("suspended", "boom") and height != trunk.height:
+            raise ParameterError(
+                f"options['height']: a {trunk.kind} trunk is at {trunk.height:g} m, got {height:g} m"
+            )
+        if not MIN_HEIGHT * trunk.height < height < MAX_HEIGHT * trunk.height:
+            raise ParameterError(
+                f"options['height']: expected {MIN_HEIGHT:g} to {MAX_HEIGHT:g} times {trunk.height:g} m, "
+                f"outside which an episode fails, got {height:g}"
+            )
+    for speed in np.atleast_1d(options.get("speed", 0.0)):
+        if trunk.kind == "fixed" and speed != 0.0:
+            raise ParameterError(f"options['speed']: expected 0 for a fixed trunk, got {speed:g}")
 
 
 def _gait(value: Any, gaits: Mapping[str, GaitParameters]) -> GaitParameters:

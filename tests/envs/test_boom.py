@@ -58,3 +58,42 @@ def test_pictures_and_records_have_the_soles():
 def test_contradictions_are_refused_by_name(env_id, kwargs, message):
     with pytest.raises(ParameterError, match=message):
         gym.make(f"hoof_env/{env_id}", **kwargs)
+
+
+def test_starts_are_drawn_between_two_values_and_numbers_stay_the_same():
+    env = gym.make_vec("hoof_env/HorseLeg-v0", num_envs=64, **BOOM)
+    ranges = {"crank_angle": (3.0, 3.5), "speed": (1.0, 4.0), "height": (1.9, 2.2), "x": (-2.0, 2.0)}
+    _, drawn = env.reset(seed=3, options=ranges)
+    for name, (low, high) in ranges.items():
+        assert low <= drawn[name].min() < low + 0.1 * (high - low)
+        assert high - 0.1 * (high - low) < drawn[name].max() <= high
+    assert np.abs(np.corrcoef([drawn[name] for name in ranges]) - np.eye(4)).max() < 0.4
+    _, again = env.reset(seed=3, options=ranges)
+    assert all((again[name] == drawn[name]).all() for name in ranges)
+    # a number in place of a range leaves the other draws of a seed alone
+    _, other = env.reset(seed=3, options={**ranges, "crank_angle": 3.2})
+    assert (other["speed"] == drawn["speed"]).all()
+    assert (other["crank_angle"] == 3.2).all()
+
+
+def test_a_drawn_crank_angle_on_a_rail_leaves_the_hoof_above_the_ground():
+    env = gym.make_vec("hoof_env/HorseLegRail-v0", num_envs=64)
+    _, info = env.reset(seed=3, options={"crank_angle": (0.0, 4.0)})
+    assert info["measured"]["toe_penetration"].max() <= 0.0
+    assert info["crank_angle"].min() >= 0.0
+    assert 2.0 < info["crank_angle"].max() <= 4.0
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        ({"height": (1.0, 2.0)}, r"options\['height'\]: expected 0.6 to 2 times 1.9975 m, .*got 1"),
+        ({"speed": (4.0, 1.0)}, r"options\['speed'\]\[1\]: expected .*got 1.0"),
+        ({"speed": (1.0, 2.0, 3.0)}, r"options\['speed'\]: expected two numbers"),
+        ({"strength": (0.0, 1.0)}, r"options\['strength'\]: expected .*got"),
+    ],
+)
+def test_ranges_that_no_start_can_have_are_refused(options, message):
+    env = gym.make("hoof_env/HorseLeg-v0", **BOOM)
+    with pytest.raises(ParameterError, match=message):
+        env.reset(options=options)
