@@ -172,6 +172,12 @@ _SUSPENDED = (
     " [their figures](../task.md#the-trunk) next to any force of the ground."
 )
 
+_WHICH_GAIT = (
+    " The question is which gait: a crank that follows its command and a held trunk leave little to feel for,"
+    " and a gait found by search, which sees no force, returns nearly as much as an agent that sees"
+    " everything ([what feedback buys](../agents.md#what-feedback-buys))."
+)
+
 _FOUR_LEGS = (
     "Every 3 to 5 s a new speed is commanded, between Froude numbers 0.1 and 1 (v^2 over g times the height"
     " of the hips) and at most 0.5 m/s from the last. With the speed comes its reference gait, from which"
@@ -199,11 +205,14 @@ _HORSE: Mapping[str, Any] = MappingProxyType(
 
 TASKS: Mapping[str, Task] = MappingProxyType(
     {
-        "leg": Task("HorseLeg", "A horse's leg that must carry and move its trunk.", _SUSPENDED, {}),
+        "leg": Task(
+            "HorseLeg", "A horse's leg that must carry and move its trunk.", _SUSPENDED + _WHICH_GAIT, {}
+        ),
         "rail": Task(
             "HorseLegRail",
             "A horse's leg that pulls its trunk along a rail.",
-            "The trunk slides along x at a fixed height: the leg need not carry it, only move it.",
+            "The trunk slides along x at a fixed height: the leg need not carry it, only move it."
+            + _WHICH_GAIT,
             {
                 "trunk": "rail",
                 **RACING,
@@ -223,7 +232,7 @@ TASKS: Mapping[str, Task] = MappingProxyType(
             "A horse's leg that keeps a commanded speed, which changes.",
             _SUSPENDED
             + " Every 3 to 5 s a new speed is commanded. Travel beyond it is penalised as strongly as travel"
-            " up to it is rewarded, and both weigh more than on the other ids.",
+            " up to it is rewarded, and both weigh more than on the other ids." + _WHICH_GAIT,
             {
                 "target_speed": (1.0, 3.5),
                 "target_seconds": (3.0, 5.0),
