@@ -1,4 +1,4 @@
-"""Model cards of the policies that ship, from what the package has of them.
+"""Model cards of the policies that ship, from data of the package.
 
     python -m agents.cards      after a change of agents/templates/model_card.md.j2
 

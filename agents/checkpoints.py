@@ -1,14 +1,14 @@
-"""Checkpoints: all that a training goes on from, in a folder that is whole or does not exist.
+"""Checkpoints: all that a training needs to continue, in a folder that is complete or does not exist.
 
 `checkpoints/N/`, after N steps and between two rollouts, holds model.zip (weights, optimisers, counters,
 schedules, action noise), policy.*, where they exist vecnormalize.pkl and replay.pkl, state.pkl
-(environments, generators, length of monitor.csv), and digests.json, because a damaged pickle may be readable
-and go on with other numbers.
+(environments, generators, length of monitor.csv), and digests.json, because a damaged pickle may load
+with wrong numbers.
 
 A resumed run has the bits of a run that was never stopped: on the same machine, on the CPU, with the same
 number of threads, with environments that have `get_state` and `set_state`, and without max_episode_steps
-around an environment that is not native. Other environments start new episodes, with other seeds than the
-first ones. These files are pickles: resume only runs that you trust.
+around an environment that is not native. Other environments start new episodes, with seeds that differ
+from the first ones. These files are pickles: resume only runs that you trust.
 """
 
 from __future__ import annotations

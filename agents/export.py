@@ -83,7 +83,7 @@ def write_policy(
 
     Raises:
         OutputError: the file exists already and `overwrite` is False, or it cannot be written.
-        ParameterError: it observes or does something else than vectors, or remembers.
+        ParameterError: its observations or actions are not vectors, or it has memory.
         DataFileError: the file does not act as the policy does; it is not kept.
         HoofEnvError: a package is missing.
     """

@@ -27,7 +27,7 @@ from hoof_env.tasks.horse_gaits import LEGS, PAIRS
 
 Floats = NDArray[np.float64]
 
-SETTLED = 2.0  # time from which on figures count [s]
+SETTLED = 2.0  # time after which figures count [s]
 SECONDS = 10.0  # length of an episode [s]
 WATCHED = 8  # episodes whose forces are kept at every substep
 SHORTEST = 0.05  # stance [s]

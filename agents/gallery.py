@@ -69,7 +69,7 @@ def stock_return(env_id: str) -> dict[str, float]:
 
 
 def passed(curve: Sequence[dict[str, Any]], bar: float) -> tuple[float, float]:
-    """Return the steps and the seconds from which on all scores of one training are above a bar; infinite if
+    """Return the steps and the seconds after which all scores of one training are above a bar; infinite if
     the last one is not."""
     first = (math.inf, math.inf)
     for row in sorted(curve, key=lambda row: -row["steps"]):
@@ -87,9 +87,10 @@ def learning_of(rows: Sequence[dict[str, Any]], bar: float) -> dict[str, Any]:
         bar: return of the best policy without feedback.
 
     Returns:
-        "algo", "seeds", and "steps" and "seconds" from which on it stays above the bar, of the algorithm with
-        the fewest seconds. If none stays above it, the algorithm with the highest return at the end: its
-        steps and seconds in all, and "return", an interquartile mean. {} without rows of a stock learner.
+        "algo", "seeds", and the "steps" and "seconds" after which it stays above the bar, for the algorithm
+        that takes the fewest seconds. If none stays above it, the algorithm with the highest return at the
+        end: its steps and seconds in all, and "return", an interquartile mean. {} without rows of a stock
+        learner.
     """
     found = []
     for algo in sorted({row["algo"] for row in rows} - {TUNED}):

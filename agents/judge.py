@@ -295,7 +295,7 @@ def main(argv: list[str] | None = None) -> None:
     assert envs is not None
     if envs.settings.episode_seconds < SECONDS:
         raise ParameterError(
-            f"episode_seconds: expected {SECONDS:g} or more, for that long is judged, got"
+            f"episode_seconds: expected at least {SECONDS:g}, the time that is judged, got"
             f" {envs.settings.episode_seconds:g}"
         )
     # An animal of another size reaches a Froude number at another speed

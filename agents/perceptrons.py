@@ -127,7 +127,7 @@ class Loss:
 
 
 class Part:
-    """Gradient of the loss over a part of a batch, with room for all that is computed on the way.
+    """Gradient of the loss over a part of a batch, with buffers for intermediate results.
 
     Attributes:
         vector: the gradient, in the order of the weights' vector.

@@ -162,7 +162,7 @@ def _check_entries(row: Row) -> None:
     is one of this package."""
     texts = (row.env_id, row.policy, row.digest, row.command, row.commit, row.note)
     if not all(isinstance(text, str) for text in texts):
-        raise TypeError("env_id, policy, digest, command, commit and note must be texts")
+        raise TypeError("env_id, policy, digest, command, commit and note must be strings")
     check_choice("env_id", row.env_id, [task.id for task in TASKS.values()])
     check_choice("kind", row.kind, KINDS)
     first, stop = row.seeds

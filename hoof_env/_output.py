@@ -159,7 +159,7 @@ def check_arguments(arguments: Iterable[str]) -> None:
         if not item or re.fullmatch("--[a-z-]+=", item):
             name = item.removesuffix("=") or (before if before.startswith("--") else "argument")
             raise ParameterError(
-                f"{name}: expected a value, got an empty text, as of a variable without value"
+                f"{name}: expected a value, got an empty string, as from a variable without a value"
             )
 
 

@@ -90,7 +90,7 @@ def test_a_name_that_is_no_text_is_shown_with_its_bytes(tmp_path, capsys, monkey
 def test_an_argument_without_a_value_is_not_the_working_folder(option, capsys, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     assert cli.main(["manual", *option]) == 2
-    assert "--out: expected a value, got an empty text" in capsys.readouterr().err
+    assert "--out: expected a value, got an empty string" in capsys.readouterr().err
     assert not list(tmp_path.iterdir())
 
 
@@ -110,7 +110,7 @@ def test_a_body_whose_name_is_none_of_xml_is_refused(tmp_path, capsys):
         "from hoof_env.view.playback import Playback",
     ],
 )
-def test_a_process_without_a_home_is_told_to_set_one(tmp_path, what):
+def test_a_process_without_a_home_is_reported_to_set_one(tmp_path, what):
     pytest.importorskip("bokeh")
     code = (
         "import os, pwd, sys\n"

@@ -206,8 +206,8 @@ def check_shared(scene: Mechanics, trunk: Trunk, ground: Ground, limbs: Sequence
             raise ParameterError(f"drive: expected a {type(own_limb.drive).__name__}, got {limb.drive!r}")
         if scales_of(f"limbs[{k}]", limb, own_limb) != (1.0, 1.0) and not scene.features.has_limits:
             raise ParameterError(
-                f"limbs[{k}].geometry: expected the geometry of the engine, which was made without limits; "
-                f"with limits, if only Limits(), legs may have sizes of their own"
+                f"limbs[{k}].geometry: expected the geometry of the engine, which was made without limits; an"
+                " engine made with limits, even Limits(), takes legs of other sizes"
             )
 
 

@@ -31,7 +31,7 @@ class DrawnRecording(Recording):
         super().begin()
 
     def add(self) -> None:
-        """Keep the end of a control step."""
+        """Save the memory at the end of a control step."""
         super().add()
         self._undrawn += 1
 

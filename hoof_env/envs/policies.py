@@ -121,8 +121,8 @@ def heading_seen(env: Any) -> Any:
 
 
 def towards(env: Any, gait_at: Any) -> Any:
-    """Return a function of observations and times that returns the actions towards the gait that `gait_at`
-    returns for them, as fast as is allowed; see `LegBase.action_for`."""
+    """Return a function of observations and times. Its actions change the gait towards `gait_at(observations,
+    times)` as fast as is allowed; see `LegBase.action_for`."""
     leg = env.unwrapped
     heading = heading_seen(env)
     reach = leg.body.reach(leg.engine, leg.dt)

@@ -123,7 +123,9 @@ def check_actions(actions: Any, shape: tuple[int, int]) -> NDArray[np.float32]:
     # The kernel checks, too, but does not know which rows are wrong.
     if not np.isfinite(array).all():
         rows = np.flatnonzero(~np.isfinite(array).all(1)).tolist()
-        raise ParameterError(f"actions: expected finite numbers in [-1, 1], got others in rows {rows[:8]}")
+        raise ParameterError(
+            f"actions: expected finite numbers in [-1, 1], got NaN or infinity in rows {rows[:8]}"
+        )
     return array
 
 

@@ -92,7 +92,7 @@ def loaded_jax() -> Any:
     version = jax.__version_info__
     if version < OLDEST:
         raise MissingExtraError(
-            f"envs.xla(): expected jax from version {'.'.join(map(str, OLDEST))} on, got {jax.__version__}:"
+            f"envs.xla(): expected jax {'.'.join(map(str, OLDEST))} or later, got {jax.__version__}:"
             ' pip install -U "hoof-env[jax]"'
         )
     import jax.ffi

@@ -422,7 +422,7 @@ class EpisodeBatch:
     ) -> bool:
         """Finish a `step` after its kernels, which returned the code `happened`, and after its costs."""
         if happened == NOT_A_NUMBER:
-            raise ParameterError("action: expected finite numbers, got some that are not")
+            raise ParameterError("action: expected finite numbers, got NaN or infinity")
         self._check_mapped()
         # The engine put failed environments back to their last good state; the kernel observed what failed.
         if happened & SOME_ENDED:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property, partial
 from typing import Any, Protocol
@@ -48,7 +48,13 @@ class Feature(Protocol):
     """Feature of episodes, which each episode draws or sets at its start. Its constructor `of` checks its
     settings; its other methods are called where they act."""
 
-    def begin(self, rows: Rows, which: Any, generators: Any, options: Any) -> None:
+    def begin(
+        self,
+        rows: Rows,
+        which: NDArray[np.int64],
+        generators: Sequence[np.random.Generator],
+        options: Mapping[str, Any],
+    ) -> None:
         """Draw or set what is new in the episodes that start in the rows `which`, with a generator for each
         and the options of the reset."""
 

@@ -85,7 +85,7 @@ class Recording:
         self.add()
 
     def add(self) -> None:
-        """Keep the end of a control step."""
+        """Save the memory at the end of a control step."""
         self._ends.append(self._end())
 
     def replace(self) -> None:

@@ -87,8 +87,8 @@ class Scored:
 
 
 def mean_figures(episodes: Sequence[Mapping[str, float]]) -> dict[str, float]:
-    """Return means over episodes of `FIGURES`, those that an id has; the cost of transport is that of the
-    distance and work of all of them, NaN if they do not get forward."""
+    """Return the means over episodes of the `FIGURES` that an id has; the cost of transport is of the
+    distance and work of all episodes together, NaN without forward progress."""
     means = {
         name: float(np.mean([episode[name] for episode in episodes]))
         for name in FIGURES

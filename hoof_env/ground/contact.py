@@ -197,7 +197,7 @@ def load_ground(preset: Preset = DEFAULT_PRESET, **overrides: Any) -> Ground:
     section = read_preset(preset).get("ground", {})
     if not isinstance(section, Mapping) or set(section) - set(SETTINGS):
         raise preset_error_type(preset)(
-            f"{preset_label(preset)}: ground: expected an object with no other entries than "
+            f"{preset_label(preset)}: ground: expected an object with only the entries "
             f"{', '.join(SETTINGS)}, got {brief(section)}"
         )
     try:

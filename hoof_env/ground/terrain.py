@@ -166,7 +166,7 @@ class Terrain:
         """
         names = [field.name for field in fields(cls)]
         if not isinstance(data, Mapping) or set(data) - set(names):
-            wanted = f"an object with no other entries than {', '.join(names)}"
+            wanted = f"an object with only the entries {', '.join(names)}"
             raise ParameterError(f"terrain: expected {wanted}, got {brief(data)}")
         return cls(**data)
 

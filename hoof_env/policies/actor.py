@@ -52,7 +52,7 @@ class Actor:
 
     def act(self, observation: Any) -> Any:
         """Return the action for an observation, or the actions for a row of each; `ParameterError` if the
-        policy returns something else than actions and a state."""
+        policy returns anything other than actions and a state."""
         # Policies without a memory need not know of one.
         remembered = {} if self._state is None else {"state": self._state}
         found = self.policy.predict(observation, episode_start=self._begins, deterministic=True, **remembered)

@@ -108,7 +108,7 @@ def _read(file: Path, model: Any, env: Any) -> Callable[[Any], Any] | None:
     except Exception as error:
         reason = f"{type(error).__name__}: {error}".splitlines()[0]
         raise DataFileError(
-            f"statistics {file}: expected those of VecNormalize for the model beside them ({reason})"
+            f"statistics {file}: expected statistics of VecNormalize for the model beside them ({reason})"
         ) from None
     normalise: Callable[[Any], Any] = statistics.normalize_obs
     return normalise

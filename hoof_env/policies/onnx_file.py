@@ -181,7 +181,7 @@ def stamp_onnx(path: str | Path, env: gym.Env[Any, Any], **record: str) -> OnnxP
         raise ParameterError(f"record: expected no entry that is read off env, got {taken}")
     for key, value in record.items():
         if not isinstance(value, str):
-            raise ParameterError(f'{key}: expected a text, as in seed="3", got {brief(value)}')
+            raise ParameterError(f'{key}: expected a string, as in seed="3", got {brief(value)}')
     metadata = known | record
     try:
         graph = onnx.load(file)

@@ -117,7 +117,7 @@ def refuse_write(what: str) -> NoReturn:
 
 
 def _place(k: Any, size: int) -> Any:
-    """Return an index from 0 on, of `size` elements; one that is known only when the kernel runs as it is."""
+    """Return an index from 0 into `size` elements; an index that is known only at run time stays as it is."""
     if isinstance(k, Index):
         return k
     if isinstance(k, (bool, Value)) or not hasattr(k, "__index__"):

@@ -202,8 +202,8 @@ def check_options(
     _check_trunk(checked, trunk)
     if "target_speed" in checked and settings.target_speed is None:
         raise ParameterError(
-            "options['target_speed']: expected none where no speed is commanded; with target_speed=2.5 among"
-            f" the arguments of gymnasium.make one is, got {checked['target_speed']:g}"
+            "options['target_speed']: expected none where no speed is commanded, got"
+            f" {checked['target_speed']:g}; pass target_speed=2.5 to gymnasium.make to command one"
         )
     if checked.get("gait") is not None:
         checked["gait"] = _gait(checked["gait"], gaits)

@@ -242,7 +242,7 @@ class Session:
         self._go({"env_id": env_id, "arguments": pairs, "policy": policy or None, "seed": seed})
 
     def _go(self, changes: Setup) -> None:
-        """Lead the tab to the page of another set-up, after the set-up was tried."""
+        """Send the tab to the page of another set-up, once that has been tried."""
         here = self.player.simulation
         setup = {
             "env_id": here.env_id,

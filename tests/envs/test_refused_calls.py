@@ -72,7 +72,7 @@ ACTIONS = [
     ([1, [2, 3], 4, 5], "expected"), (np.zeros(4, bool), "expected"), (np.zeros(4, complex), "expected"),
     ({"a": 1}, "expected"), (np.full((3, 4), NAN, np.float32), "rows|expected 4"),
     (np.zeros((3, 3)), "expected"), (np.full(4, 1e300), "expected"),
-    (np.full((3, 4), 1e300), r"others in rows \[0, 1, 2\]|expected 4"),
+    (np.full((3, 4), 1e300), r"NaN or infinity in rows \[0, 1, 2\]|expected 4"),
 ]  # fmt: skip
 
 

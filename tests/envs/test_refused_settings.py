@@ -401,7 +401,7 @@ PRESETS = [
         {**CONTENT, "gaits": {"trot": {**CONTENT["gaits"]["walk"], "higher": [0.1, 0.05]}}},
         "gait 'trot': expected the four parameters .*harmonic, .*, got HarmonicGait",
     ),
-    ({**CONTENT, "ground": {"softness": 1.0}}, "ground: .* no other entries than stiffness, exponent"),
+    ({**CONTENT, "ground": {"softness": 1.0}}, "ground: .* only the entries stiffness, exponent"),
     ({**CONTENT, "geometry": {**CONTENT["geometry"], "lengths": {"OP": 1.0}}}, "lengths: .*missing AJ, "),
 ]
 """Contents of presets."""

@@ -39,8 +39,8 @@ def test_grounds(given, words):
 
 PRESETS = [
     (1.375, "ground: expected .*got 1.375"),
-    ({"n": 1.375}, "no other entries than stiffness, exponent, got .*'n'"),
-    ({"friction": 0.4}, "no other entries than .*got .*'friction'"),
+    ({"n": 1.375}, "only the entries stiffness, exponent, got .*'n'"),
+    ({"friction": 0.4}, "only the entries .*got .*'friction'"),
     ({"exponent": 0.5}, r"ground: exponent: expected .*\[1, 3\], got 0.5"),
     ({"exponent": "1.5"}, "ground: exponent: expected .*got '1.5'"),
     ({"exponent": None}, "ground: exponent: expected .*got None"),
@@ -110,7 +110,7 @@ CALLS = [
     (lambda: Terrain.patches([1]), r"patches\[0\]: expected a row .*got 1"),
     (lambda: Terrain.patches([(0, 2, 1, 1), (1, 3, 1, 1)]), "patches: expected patches apart.*got"),
     (lambda: Terrain.patches([(0, 2, 1, 1)], spacing=0), "terrain.spacing: expected .*got 0"),
-    (lambda: Terrain.from_dict({"heights": [0]}), "no other entries than height, .*got .*heights"),
+    (lambda: Terrain.from_dict({"heights": [0]}), "only the entries height, .*got .*heights"),
     (lambda: Terrain.from_dict([]), r"terrain: expected .*got \[\]"),
 ]
 """Calls and words."""

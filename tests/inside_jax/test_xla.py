@@ -257,7 +257,7 @@ def test_actions_must_be_finite_and_nothing_is_advanced():
     before = envs.get_state()["engine"]
     wrong = zeros(envs)
     wrong[1, 0] = np.nan
-    fails(r"expected finite numbers in \[-1, 1\], got others in rows \[1\]", step, handle, wrong)
+    fails(r"expected finite numbers in \[-1, 1\], got NaN or infinity in rows \[1\]", step, handle, wrong)
     for name, values in envs.get_state()["engine"].items():
         np.testing.assert_array_equal(values, before[name])
     step(envs.xla()[0], zeros(envs))

@@ -99,7 +99,7 @@ def test_each_checkpoint_has_its_own(normalised, env):
     assert is_played(late[0], late[0].model, many, env)
 
 
-def test_statistics_that_are_missing_are_told(normalised, env, tmp_path):
+def test_statistics_that_are_missing_are_reported(normalised, env, tmp_path):
     model, many, _ = normalised
     model.save(tmp_path / "leg.zip")
     _, said = words_of(lambda: hoof_env.load_policy(tmp_path / "leg.zip", env))
@@ -118,7 +118,7 @@ def test_statistics_that_are_missing_are_told(normalised, env, tmp_path):
 
 
 @pytest.mark.parametrize("around", [None, DummyVecEnv([lambda: gym.make(ID)])], ids=["none", "plain"])
-def test_a_model_that_is_an_object_without_its_statistics_is_told(around, normalised, env, tmp_path):
+def test_a_model_that_is_an_object_without_its_statistics_is_reported(around, normalised, env, tmp_path):
     """As `load` gives it, unless the statistics are around its environment."""
     model, many, _ = normalised
     model.save(tmp_path / "leg.zip")
@@ -169,7 +169,7 @@ def test_statistics_that_cannot_be_read_are_named(normalised, env, tmp_path, con
     else:
         file.write_bytes(content)
     with pytest.raises(
-        DataFileError, match=r"statistics .*vecnormalize\.pkl: expected those of VecNormalize"
+        DataFileError, match=r"statistics .*vecnormalize\.pkl: expected statistics of VecNormalize"
     ):
         words_of(lambda: hoof_env.load_policy(tmp_path / "leg.zip", env))
     shutil.rmtree(tmp_path)
