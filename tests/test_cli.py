@@ -80,7 +80,9 @@ def test_a_reader_that_leaves_is_no_error():
         (["mjcf"], "x.xml", "--theta"),
     ],
 )
-def test_a_file_is_replaced_on_demand_only_and_its_folder_is_told(command, name, change, tmp_path, capsys):
+def test_a_file_is_replaced_on_demand_only_and_its_folder_is_reported(
+    command, name, change, tmp_path, capsys
+):
     out = tmp_path / "new" / name
     command = [*command, "--out", str(out)]
     assert cli.main(command) == 0

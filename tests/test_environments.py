@@ -93,7 +93,7 @@ def test_a_dependency_of_another_version_counts(checkout):
     assert not Asked.of(checkout("newer", dependencies=["gymnasium>=1000"]), ()).is_installed()
 
 
-def test_a_build_and_markers_are_told_apart(checkout, monkeypatch):
+def test_a_build_and_markers_are_reported_apart(checkout, monkeypatch):
     packages = {
         "torch": ("2.13.0+cpu", ["absent; python_version < '3'", "absent; extra == 'cuda'", "part[fast]"]),
         "part": ("1.0", ["fast-part; extra == 'fast'"]),
@@ -175,7 +175,7 @@ def test_set_up_makes_what_the_commit_asks_for(checkout, set_up, tmp_path, capfd
     assert (place / "asked").read_text() == first
 
 
-def test_a_set_up_that_stops_is_told(checkout, set_up, tmp_path):
+def test_a_set_up_that_stops_is_reported(checkout, set_up, tmp_path):
     set_up("broken")
     with pytest.raises(NoEnvironment, match="but set-up stopped"):
         environments.made(Asked.of(checkout(), ()), tmp_path / "made")

@@ -260,7 +260,7 @@ def test_what_needs_pytorch_is_known(ours):
     assert not re.search(r"(?m)^torch==", found.stdout)
 
 
-def test_uv_is_told_what_pip_is_told(setup, tmp_path, monkeypatch):
+def test_uv_is_reported_what_pip_is_reported(setup, tmp_path, monkeypatch):
     for name in [name for name in os.environ if name.startswith(("PIP_", "UV_"))]:
         monkeypatch.delenv(name)
     monkeypatch.delenv("SSL_CERT_FILE", raising=False)
@@ -430,7 +430,7 @@ def test_hashes_are_of_the_versions_that_are_locked(setup):
         assert all(re.fullmatch("[0-9a-f]{64}", wheel["hashes"]["sha256"]) for wheel in one["wheels"]), one
 
 
-def test_every_hash_is_told_to_uv(ours):
+def test_every_hash_is_reported_to_uv(ours):
     text = (ROOT / ours.LOCKED_FILES).read_text()
     (ours.ROOT / ours.LOCKED_FILES).write_text(text)
     told = (ours.ROOT / ours.hashes()).read_text()

@@ -39,7 +39,7 @@ def test_actions_of_another_ground_return_the_same_without_feedback(env_id, name
     assert 2 * proof.episodes >= proof.of == 8
 
 
-def test_a_policy_that_sees_the_ground_is_told():
+def test_a_policy_that_sees_the_ground_is_reported():
     with pytest.raises(DataFileError, match=r"actions that do not depend on the ground.*differ by up"):
         prove(policy_of("shipped"), LEG, SEEDS, SHORT)
 

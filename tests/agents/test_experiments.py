@@ -61,7 +61,7 @@ def test_no_training_starts_from_a_scored_seed_or_shares_a_folder(plan):
         assert one.seed + rows <= CURVE_SEEDS.start < CURVE_SEEDS.stop <= FINAL_SEEDS.start
 
 
-def test_a_training_is_told_its_arguments_as_the_command_takes_them():
+def test_a_training_is_reported_its_arguments_as_the_command_takes_them():
     entry = Entry("ppo", LEG, 1, env_kwargs={"target_speed": [2.1, 2.1]})
     words = Run(entry, 3).command(Path("out"))
     assert words[words.index("--out") + 1] == str(Path("out", "ppo-HorseLeg-v0-s3"))
@@ -185,7 +185,7 @@ FINISH = (
 )
 
 
-def test_all_are_trained_once_and_failures_are_told(tmp_path, monkeypatch, capsys):
+def test_all_are_trained_once_and_failures_are_reported(tmp_path, monkeypatch, capsys):
     counts, _ = pretend(monkeypatch, FINISH)
     assert runner.train_all(PLAN, tmp_path, workers=2) == [PLAN[1]]
     assert len(counts) == 3

@@ -110,7 +110,7 @@ def test_metadata(env, exported):
     assert str(ROOT).encode() not in exported.read_bytes()
 
 
-def test_other_settings_and_another_version_are_told(env, exported, trained, tmp_path, monkeypatch):
+def test_other_settings_and_another_version_are_reported(env, exported, trained, tmp_path, monkeypatch):
     import onnx
 
     old = tmp_path / "old.ONNX"  # of before the settings were kept

@@ -132,7 +132,7 @@ def test_a_blind_agent_observes_nothing_of_the_ground_however_seldom_it_looks(tm
         make_row(LEG, "blind", str(run))
 
 
-def test_runs_that_are_not_there_are_told(tmp_path):
+def test_runs_that_are_not_there_are_reported(tmp_path):
     for place in (tmp_path / "nowhere", results.CURVES):
         with pytest.raises(DataFileError, match=r"runs .*found none"):
             results.returns_of_runs(place, LEG)
@@ -147,7 +147,7 @@ def test_only_rows_of_the_published_episodes_are_taken(row, tmp_path, monkeypatc
         results.main(["add", str(away.write(tmp_path))])
 
 
-def test_a_file_of_another_row_is_told(row, tmp_path):
+def test_a_file_of_another_row_is_reported(row, tmp_path):
     row.write(tmp_path).rename(tmp_path / "HorseLegRail-v0-zero.json")
     with pytest.raises(
         DataFileError, match=r"expected hoof_env/HorseLegRail-v0, zero; got hoof_env/HorseLeg"

@@ -86,7 +86,7 @@ def test_one_process_trains_in_a_folder(tmp_path):
     train(arguments("ppo", tmp_path / "run"), At(90, start_another))
 
 
-def test_a_file_system_without_locks_is_told(tmp_path, monkeypatch):
+def test_a_file_system_without_locks_is_reported(tmp_path, monkeypatch):
     def acquire(self, **_):
         raise NotImplementedError
 
@@ -162,7 +162,7 @@ def test_another_command_does_not_resume(stopped, changes, said):
         train(arguments("sac", **{"out": stopped, "resume": True, **changes}))
 
 
-def test_other_versions_and_threads_are_told_on_a_resume(tmp_path):
+def test_other_versions_and_threads_are_reported_on_a_resume(tmp_path):
     train(arguments("ppo", tmp_path), At(90, interrupt))
     record = json.loads((tmp_path / "run.json").read_text())
     record["versions"] |= {"torch": "0.1", "commit": "another"}
@@ -174,7 +174,7 @@ def test_other_versions_and_threads_are_told_on_a_resume(tmp_path):
     assert len([one for one in told if "--resume" in str(one.message)]) == 1
 
 
-def test_a_full_disk_is_told_and_the_last_checkpoint_stays(tmp_path):
+def test_a_full_disk_is_reported_and_the_last_checkpoint_stays(tmp_path):
     full = Path("/dev/full")
     if not full.exists():
         pytest.skip("no device that is always full")

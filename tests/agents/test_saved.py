@@ -149,7 +149,7 @@ def test_a_zip_of_another_name_is_not_mistaken_for_the_plain_policy(env, tmp_pat
     assert isinstance(policy.model, PPO)
 
 
-def test_other_settings_and_versions_are_told(env, tmp_path):
+def test_other_settings_and_versions_are_reported(env, tmp_path):
     save_untrained(tmp_path, env)
     # A setting that the record lacks is newer than the policy, which was trained with its default.
     change(tmp_path / "run.json", settings={}, versions={"hoof-env": "0.0.1"})

@@ -111,7 +111,7 @@ def test_each_policy_gets_the_line_of_the_table(capsys, tmp_path, monkeypatch, t
     assert [float(row["return"]) for row in rows[:5]] == [one["return"] for one in episodes]
 
 
-def test_a_model_without_a_record_is_told(trained, tmp_path, monkeypatch):
+def test_a_model_without_a_record_is_reported(trained, tmp_path, monkeypatch):
     monkeypatch.setattr(scores, "score_vector", lambda *_, **__: [])
     bare = shutil.copy(trained.folder / "model.zip", tmp_path / "bare.zip")
     shutil.copy(trained.folder / "vecnormalize.pkl", tmp_path)

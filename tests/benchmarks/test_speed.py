@@ -166,7 +166,7 @@ def test_first_steps_have_their_seconds_and_the_ratio_of_each_round(own_environm
     }
 
 
-def test_a_spread_is_told_where_there_are_rounds():
+def test_a_spread_is_reported_where_there_are_rounds():
     found = {"a step": {"base": [8.0, 8.0, 16.0], "now": [4.0, 4.0, 4.0]}}
     row = compare_first.table(found, "abc").splitlines()[-1]
     assert row == "| a step | 8 (8 to 12; 8 to 16) | 4 (4 to 4; 4 to 4) | 2 (2 to 3; 2 to 4) |"

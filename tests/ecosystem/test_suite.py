@@ -48,7 +48,7 @@ def check(tmp_path, monkeypatch):
     return run_sample
 
 
-def test_a_failure_is_told_and_does_not_stop_the_rest(check):
+def test_a_failure_is_reported_and_does_not_stop_the_rest(check):
     result = check(sleeps=0, seconds=300)
     good, told = verdict(result)
     assert not good

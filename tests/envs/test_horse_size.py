@@ -123,7 +123,7 @@ def test_ponies_travel(size):
     assert np.mean([one["speed_m_s"] for one in summaries]) == pytest.approx(speed, rel=0.2)
 
 
-def test_a_pony_is_told_the_speeds_of_its_size():
+def test_a_pony_is_reported_the_speeds_of_its_size():
     one, half = make(HORSE), make(HORSE, size=0.5, target_seconds=(1.0, 2.0))
     np.testing.assert_allclose(
         half.batch.plan.commands.speeds, np.sqrt(0.5) * np.array(one.batch.plan.commands.speeds)

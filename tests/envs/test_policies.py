@@ -215,7 +215,7 @@ def test_a_motor_takes_a_clock_and_not_its_crank(env):
         (["gait"], "motor", ""),
     ],
 )
-def test_observations_of_the_ground_are_told(groups, drive, seeing):
+def test_observations_of_the_ground_are_reported(groups, drive, seeing):
     settings = gym.make(ENV_ID, observation=groups, drive=drive).unwrapped.settings
     if seeing:
         with pytest.raises(ParameterError, match=seeing):
@@ -259,7 +259,7 @@ def test_the_clock_of_a_file_is_the_environments(tmp_path):
         np.testing.assert_allclose(later, formula(3 * dt) - formula(2 * dt), atol=2e-6)
 
 
-def test_a_gait_of_another_id_is_told(env, tmp_path):
+def test_a_gait_of_another_id_is_reported(env, tmp_path):
     path = write(tmp_path / "gait.json")
     with warnings.catch_warnings():
         warnings.simplefilter("error", UserWarning)

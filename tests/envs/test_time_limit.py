@@ -126,7 +126,7 @@ def test_a_step_after_the_end_warns_once_and_returns_what_it_did(env_id, setting
 
 
 @pytest.mark.parametrize("seconds", [0.3, 0.7, 2.0, 10.0])
-def test_seconds_are_said_as_they_were_asked_for(seconds):
+def test_seconds_are_reported_as_they_were_asked_for(seconds):
     found = []
     for env in (gym.make(LEG, episode_seconds=seconds), gym.make_vec(LEG, episode_seconds=seconds)):
         env.reset(seed=0)

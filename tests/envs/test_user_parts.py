@@ -231,7 +231,7 @@ def no_number(scene):
     return scene.episode.time / scene.episode.time
 
 
-def test_nan_of_an_entry_is_told(example):
+def test_nan_of_an_entry_is_reported(example):
     hoof_env.register(
         "my_lab/NoNumber-v0", entries=[Entry("no number", "own", "-", no_number, Scale("none"))]
     )
@@ -255,7 +255,7 @@ def test_a_map_that_reads_beyond_its_actions_is_refused():
         gym.make("my_lab/Beyond-v0")
 
 
-def test_nan_of_a_map_is_told():
+def test_nan_of_a_map_is_reported():
     hoof_env.register("my_lab/NaN-v0", action_map=ActionMap("one", {"a": "-"}, undefined))
     env = gym.make("my_lab/NaN-v0")
     env.reset(seed=0)

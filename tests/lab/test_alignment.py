@@ -82,7 +82,7 @@ def test_of_few_strides_all_are_compared(strides):
         assert compare(a, b).limbs["left"].pairs == strides
 
 
-def test_stances_that_one_record_joins_are_said():
+def test_stances_that_one_record_joins_are_reported():
     found = compare(steps(), steps(change=joined))
     assert found.limbs["left"].stances == (10, 9)
     assert "A has 10 whole stances and B 9" in " ".join(found.warnings)

@@ -84,7 +84,7 @@ def ramp(low, high):
     (0, 18, 12, "the force in swing drifts from 1.5 to 16.5 N"),
     (15, 15, 12, "the force in swing is 15 N instead of 0; subtract it"),
 ])  # fmt: skip
-def test_a_baseline_that_is_not_zero_is_said(low, high, stances, words):
+def test_a_baseline_that_is_not_zero_is_reported(low, high, stances, words):
     """A ramp passes the threshold of 20 N: from there on stances run into each other."""
     found = average([ramp(low, high)])
     assert found.limbs["left"].stances == stances
@@ -112,7 +112,7 @@ def odd():
     return record
 
 
-def test_stances_of_odd_length_are_said_and_may_be_left_out():
+def test_stances_of_odd_length_are_reported_and_may_be_left_out():
     found = average([odd()])
     assert (found.limbs["left"].stances, found.limbs["right"].stances) == (11, 11)
     (said,) = found.warnings
@@ -137,7 +137,7 @@ def test_what_the_ends_cut_off_is_counted():
     assert "Stances cut off by the ends of records: left 2, right 0." in report(found)
 
 
-def test_the_first_stance_of_an_episode_is_said_and_may_be_left_out():
+def test_the_first_stance_of_an_episode_is_reported_and_may_be_left_out():
     episode = strides(seconds=12.0)
     episode.own = True
     episode.limbs["left"][episode.time < 1.0] *= 2  # a start that differs
@@ -174,7 +174,7 @@ def test_nothing_is_left_is_an_error():
         average([short], drop=["first"])
 
 
-def test_what_is_missing_is_said():
+def test_what_is_missing_is_reported():
     found = average([trial(None, 700, 0.5), trial(None, 10, 0.5), trial(None, 700, 0.5, "right")])
     assert [found.limbs[limb].trials for limb in ("left", "right")] == [1, 1]
     assert any("left: expected a whole stance above 20 N, found none" in one for one in found.warnings)

@@ -33,7 +33,7 @@ def test_markers_decide_where_corners_have_another_order(tmp_path):
     np.testing.assert_allclose(read_record(path).limbs["plate_1"][:, 1], UP, atol=1e-3)
 
 
-def test_travel_along_another_axis_and_backward_are_said(tmp_path):
+def test_travel_along_another_axis_and_backward_are_reported(tmp_path):
     aside = read_record(plate(tmp_path / "y.c3d", forward="y"))
     assert "plate_1: the horizontal force along y is larger than the force along x" in aside.notes[0]
     assert "--forward-a=y or --forward-b=y (or =-y) changes that" in aside.notes[0]
@@ -52,7 +52,7 @@ def test_travel_along_another_axis_and_backward_are_said(tmp_path):
     )  # what the option says
 
 
-def test_a_text_with_z_up_is_said(tmp_path):
+def test_a_text_with_z_up_is_reported(tmp_path):
     rows = np.column_stack([TIME, FORWARD, ASIDE, UP])
     names = ["time [s]", *(f"left_force_{axis} [N]" for axis in "xyz")]
     np.savetxt(tmp_path / "x.csv", rows, delimiter=",", header=",".join(names), comments="")

@@ -79,6 +79,6 @@ DAMAGES = {
 
 
 @pytest.mark.parametrize(("entries", "words"), DAMAGES.values(), ids=DAMAGES)
-def test_a_damaged_chain_is_told(tmp_path, entries, words):
+def test_a_damaged_chain_is_reported(tmp_path, entries, words):
     with pytest.raises(DataFileError, match=words):
         head_of(write(tmp_path / "a.c3d", entries))

@@ -97,7 +97,7 @@ def test_the_times_of_the_files_are_kept_on_demand():
     assert compare(strides(), late, "none").limbs["left"].forces["vertical"].rmse > 50
 
 
-def test_opposite_fore_aft_forces_are_told():
+def test_opposite_fore_aft_forces_are_reported():
     other = strides()
     other.limbs = {limb: force * [-1, 1] for limb, force in other.limbs.items()}
     assert "warning: left: fore-aft forces point opposite ways; --reverse-b x" in report(
@@ -145,7 +145,7 @@ def test_noise_makes_no_stances(size):
         assert errors.forces["vertical"].r > 0.99
 
 
-def test_stances_that_one_record_lacks_are_told():
+def test_stances_that_one_record_lacks_are_reported():
     step = strides()
     extra = strides()
     time = extra.time
@@ -174,7 +174,7 @@ def test_a_missed_step_leaves_the_other_pairs_where_they_are(missed):
         assert found.limbs["left"].forces["vertical"].rmse < 1e-6
 
 
-def test_touchdowns_that_scatter_are_told():
+def test_touchdowns_that_scatter_are_reported():
     quick = strides()
     quick.time = quick.time * 0.8
     assert "left: touchdowns scatter by" in report(compare(strides(), quick))

@@ -39,7 +39,7 @@ def test_swing_without_values_is_without_force(word, between, tmp_path):
 
 
 @pytest.mark.parametrize("mark", ["-9999", "-999.000", "99999", "999", "-9.999e3"])
-def test_marks_of_missing_values_are_said(mark, tmp_path):
+def test_marks_of_missing_values_are_reported(mark, tmp_path):
     """In swing, where a peak would be one of 9999 N, or all of the limb would be turned."""
     found = read_record(lacking(tmp_path / "x.csv", SWING, mark))
     np.testing.assert_allclose(found.limbs["left"], BOTH, atol=1e-5)
@@ -123,7 +123,7 @@ def test_a_fore_aft_force_without_values_is_none(tmp_path):
     assert found.notes == ("left_force_x: no values, so left has no fore-aft force",)
 
 
-def test_a_column_of_two_limbs_is_said(tmp_path):
+def test_a_column_of_two_limbs_is_reported(tmp_path):
     path = lacking(tmp_path / "x.csv", np.zeros(300, bool))
     found = read_record(path, {"l_force_y": "left_force_y", "r_force_y": "left_force_y"})
     assert found.notes[0].startswith("left_force_y is the vertical force of l and of r")

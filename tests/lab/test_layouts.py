@@ -78,7 +78,7 @@ STALE = {
 
 
 @pytest.mark.parametrize("weight", ["0", "-5", "nan", "heavy", "inf"])
-def test_a_weight_that_is_none_is_said_and_not_used(weight, tmp_path):
+def test_a_weight_that_is_none_is_reported_and_not_used(weight, tmp_path):
     head = f"x\nweight_n={weight}\nendheader\ntime ground_force_vx ground_force_vy\n"
     found = read_record(written(tmp_path / "x.mot", head, between=" "))
     assert found.weight is None
@@ -165,7 +165,7 @@ def test_limbs_of_the_file_may_have_any_name(tmp_path, capsys):
     assert "| 1 | vertical | 3 | 0.0 |" in capsys.readouterr().out
 
 
-def test_travel_backward_in_a_text_is_said(tmp_path):
+def test_travel_backward_in_a_text_is_reported(tmp_path):
     found = read_record(written(tmp_path / "x.csv", OURS, ROWS * [1, -1, 1]))
     assert found.notes[0].startswith("left: propulsion before braking")
     head = "time [s],a [N],b [N]\n"

@@ -50,7 +50,7 @@ def test_a_rate_keeps_the_time_at_which_a_file_starts(name, scale, tmp_path):
     np.testing.assert_allclose(found.time, LATE)
 
 
-def test_a_rate_that_does_not_fit_the_times_is_said(tmp_path):
+def test_a_rate_that_does_not_fit_the_times_is_reported(tmp_path):
     path = table(tmp_path / "x.csv", LATE)
     found = read_record(path, rate=50)
     assert found.time[0] == 0.5

@@ -202,7 +202,7 @@ def test_a_model_plays_its_mode_under_its_own_normalisation():
         hoof_env.load_policy(model, other)
 
 
-def test_a_policy_that_returns_actions_alone_is_told(env):
+def test_a_policy_that_returns_actions_alone_is_reported(env):
     policy = type("Alone", (), {"predict": lambda *_, **__: np.zeros(4)})()
     with pytest.raises(ParameterError, match=r"Alone: expected .* actions and a state.* got array"):
         play(env, policy, [0])
@@ -234,7 +234,7 @@ def test_nothing_else_asks_a_policy_for_actions():
 @pytest.mark.parametrize(
     "predict", [lambda self, seen: (np.zeros(4), None), lambda self, seen, state=None: (np.zeros(4), None)]
 )
-def test_a_predict_of_other_arguments_is_told(predict, env):
+def test_a_predict_of_other_arguments_is_reported(predict, env):
     policy = type("Bare", (), {"predict": predict})()
     with pytest.raises(ParameterError, match=r"Bare: expected predict\(.*episode_start.* got predict\(seen"):
         play(env, policy, [0])

@@ -89,7 +89,7 @@ def test_names_gaits_and_functions(env):
     )
 
 
-def test_settings_that_differ_are_told_and_the_default_ones_are_not():
+def test_settings_that_differ_are_reported_and_the_default_ones_are_not():
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         with gym.make(ENV_ID) as env:
@@ -147,7 +147,9 @@ def test_what_is_no_environment_is_refused(env):
         ("return rows[:, :4] * np.nan", "4 that are not finite"),
     ],
 )
-def test_what_fails_in_a_function_of_the_user_is_told_with_its_line(body, words, env, tmp_path, monkeypatch):
+def test_what_fails_in_a_function_of_the_user_is_reported_with_its_line(
+    body, words, env, tmp_path, monkeypatch
+):
     monkeypatch.syspath_prepend(tmp_path)
     (tmp_path / "mine.py").write_text(f"import numpy as np\ndef act(rows):\n    {body}\n")
     monkeypatch.delitem(sys.modules, "mine", raising=False)
@@ -156,7 +158,7 @@ def test_what_fails_in_a_function_of_the_user_is_told_with_its_line(body, words,
         policy.predict(np.zeros(22))
 
 
-def test_a_module_of_the_user_that_fails_is_told_with_its_line(env, tmp_path, monkeypatch):
+def test_a_module_of_the_user_that_fails_is_reported_with_its_line(env, tmp_path, monkeypatch):
     monkeypatch.syspath_prepend(tmp_path)
     (tmp_path / "licensed.py").write_text("raise RuntimeError('no licence')\n")
     words = r"got 'licensed:act'; RuntimeError in licensed\.py, line 1: no licence"

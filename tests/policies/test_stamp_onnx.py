@@ -189,7 +189,9 @@ def change(path, **metadata):
         ({}, {"env_id": "my/Leg-v0"}, "must not import a module.* --env-id MODULE:my/Leg-v0"),
     ],
 )  # fmt: skip
-def test_what_a_file_does_in_an_evaluation_is_told_with_its_name(env, tmp_path, arguments, metadata, words):
+def test_what_a_file_does_in_an_evaluation_is_reported_with_its_name(
+    env, tmp_path, arguments, metadata, words
+):
     """Metadata of a file that fits, on a graph that does not."""
     path = tmp_path / "mine.onnx"
     write(path)

@@ -63,7 +63,7 @@ def test_another_environment_may_quit_pygame(run, monkeypatch):
     window.close()
 
 
-def test_a_window_without_a_display_is_told_not_drawn_unseen_in_silence(run, monkeypatch):
+def test_a_window_without_a_display_is_reported_not_drawn_unseen_in_silence(run, monkeypatch):
     """SDL falls back to a driver that shows nothing; only who asks for it gets it without a word. Gymnasium's
     checker tries every mode, so that on a machine without a display the mode warns and goes on."""
     words = r'a window needs a display.*render_mode="rgb_array".*xvfb-run'

@@ -326,7 +326,7 @@ def test_a_disk_that_cannot_be_written_is_read(own, monkeypatch):
 @needs_modes
 @pytest.mark.parametrize("what", ["folder", "file"])
 @pytest.mark.parametrize("mode", [0o020, 0o002])
-def test_what_others_may_write_is_not_used_and_that_is_said_once(own, what, mode):
+def test_what_others_may_write_is_not_used_and_that_is_reported_once(own, what, mode):
     assert compiles()
     (file,) = files(own)
     victim = own if what == "folder" else file

@@ -380,7 +380,7 @@ def test_sliders_that_begin_a_new_page(tab):
         tab.check_drawn(until(Simulation(LEG, given), tab.time))
 
 
-def test_a_refusal_is_told_and_the_page_plays_on(tab):
+def test_a_refusal_is_reported_and_the_page_plays_on(tab):
     tab.press("Play")
     tab.page.get_by_label("impulse at the trunk").fill("1e9")
     tab.press("Push")
@@ -428,7 +428,7 @@ def test_a_push_changes_the_speed_of_the_trunk(tab):
     tab.status("forward")
 
 
-def test_a_policy_that_fails_before_the_page_is_there_is_told(browser, tmp_path):
+def test_a_policy_that_fails_before_the_page_is_there_is_reported(browser, tmp_path):
     with served(tmp_path, "broken") as address:
         tab = Tab(browser, address)
         tab.status("expected actions, it raised ValueError: there is no layer 3")

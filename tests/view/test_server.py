@@ -19,7 +19,7 @@ from hoof_env.view.server import Pages, is_own_name, start
 from tests.view.pages import SETUP, opened
 
 
-def test_a_port_that_is_taken_is_told():
+def test_a_port_that_is_taken_is_reported():
     with socket.socket() as taken:
         taken.bind(("127.0.0.1", 0))
         taken.listen()
@@ -45,7 +45,7 @@ def test_without_bokeh_the_command_says_how_to_get_it(monkeypatch):
         start(SETUP)
 
 
-def test_a_page_that_is_refused_takes_no_place_and_an_old_one_is_told(tmp_path):
+def test_a_page_that_is_refused_takes_no_place_and_an_old_one_is_reported(tmp_path):
     pages = Pages(SETUP, tmp_path)
     assert "too old" in opened(pages, setup=[b"guessed"]).template_variables["reason"]
     kept = pages.keep(SETUP | {"seed": 7}).partition("=")[2]

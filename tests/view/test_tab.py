@@ -280,7 +280,7 @@ def test_no_error_of_a_request_leaves_its_callback(page, monkeypatch, name):
     assert (told["status"], told["kind"]) == ("RuntimeError: out of order", "error")
 
 
-def test_an_error_of_the_thread_that_writes_is_told(page, monkeypatch):
+def test_an_error_of_the_thread_that_writes_is_reported(page, monkeypatch):
     monkeypatch.setattr(records, "write", raising)
     page.ask("record", suffix=".csv")
     page.tick(0.1)
@@ -292,7 +292,7 @@ def test_an_error_of_the_thread_that_writes_is_told(page, monkeypatch):
     assert told == [(f"{recording.path}: RuntimeError: out of order", "error")]
 
 
-def test_an_error_of_a_new_page_is_told_on_it(tmp_path, monkeypatch):
+def test_an_error_of_a_new_page_is_reported_on_it(tmp_path, monkeypatch):
     monkeypatch.setattr(session_module, "Simulation", raising)
     refused = opened(Pages(SETUP, tmp_path))
     assert refused.template_variables["reason"] == "RuntimeError: out of order"
