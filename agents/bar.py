@@ -42,7 +42,7 @@ IDS = (
     "Horse-v0",
     "HorseRough-v0",
 )
-"""Ids with a bar; `HorseLegMO-v0` shares that of `HorseLeg-v0`."""
+"""Ids with a bar; `HorseLegMO-v0` shares the bar of `HorseLeg-v0`."""
 
 STARTS_FROM = {"HorseRough-v0": "Horse-v0"}
 """Easier ids whose gait a search begins with."""

@@ -196,7 +196,7 @@ class Resumed:
         model = self.model
         if states is None:
             model._last_obs = None  # the training resets them
-            # New episodes, but not those that the first start played
+            # New episodes, other than the first start's
             many.seed((model.seed or 0) + model.num_timesteps)
             return
         many.reset()

@@ -318,7 +318,7 @@ class Search:
                     break
         except KeyboardInterrupt:
             self.interrupted = True
-        # Rounded before the last score, so that the score is that of the numbers in the file
+        # Rounded before the last score, so that the score belongs to the numbers in the file
         finalists = np.clip(np.round((best * FINALISTS)[:FINALISTS], 5), -1.0, 1.0)
         final = self._costs(finalists, ROWS // FINALISTS)
         return finalists[np.argmin(final)], min(final)

@@ -86,7 +86,7 @@ class Choice:
 
 
 def find_runs(folder: Path) -> dict[str, list[runs.SavedModel]]:
-    """Return the trained models in or beneath a folder by environment, without those that have arguments of
+    """Return the trained models in or beneath a folder by environment, without models that have arguments of
     it.
 
     Raises:

@@ -27,7 +27,7 @@ KEPT = "kept-"
 @contextmanager
 def staged(folder: Path, new: Collection[str] = ()) -> Iterator[Path]:
     """Yield a temporary folder inside `folder`, which is made if need be. If the block succeeds, its files
-    replace those of `folder`. Folders that were made and are still empty are removed.
+    replace the files of `folder`. Folders that were made and are still empty are removed.
 
     Inside the block of another `staged` with its temporary folder, that folder is yielded.
 
@@ -97,7 +97,7 @@ def _publish(stage: Path, folder: Path, new: Collection[str]) -> None:
     except FileExistsError as error:
         there = Path(error.filename)
         kept = folder / stage.name.replace(STAGE, KEPT)
-        # With the rights of any new folder; those of the temporary one are the owner's alone
+        # With the rights of any new folder; the temporary one is the owner's alone
         kept.mkdir()
         for file in sorted(stage.iterdir()):
             os.replace(file, kept / file.name)

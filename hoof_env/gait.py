@@ -41,7 +41,7 @@ def _published_hip_height() -> float:
 
 
 def speed_scale_of(geometry: Geometry) -> float:
-    """Return the speed of a leg relative to that of the published leg at the same Froude number [-]: the root
+    """Return the speed of a leg relative to the published leg's at the same Froude number [-]: the root
     of the ratio of their hip heights. A similar motion takes this many times as long."""
     return math.sqrt(geometry.hip_height / _published_hip_height())
 
@@ -137,7 +137,7 @@ class HarmonicGait(GaitParameters):
         phi = swing_offset + sum over k of A_k sin(k theta) + B_k cos(k theta).
 
     Attributes:
-        higher: A2, B2 and perhaps A3, B3 [rad], -0.6 to 0.6; the others are those of `GaitParameters`.
+        higher: A2, B2 and perhaps A3, B3 [rad], -0.6 to 0.6; the others are as in `GaitParameters`.
 
     Raises:
         ParameterError: a value is not finite, an angle is outside `WIDEST`, or there are not 2 or 4 of
@@ -264,7 +264,7 @@ def _read_gaits(preset: Preset) -> dict[str, Any]:
 
 
 INNER = 5.0
-"""Ratio of the gain of a filter's rate to that of its value; above 4 the approach does not oscillate."""
+"""Ratio of the gain of a filter's rate to the gain of its value; above 4 the approach does not oscillate."""
 
 SPEED, OFFSET, SIN, COS = range(4)
 """Order of the four filters, as in `PARAMETERS`."""

@@ -45,7 +45,7 @@ OPEN_LOOP = "open-loop"  # name of the gait that CMA-ES found for an id, without
 
 SPEED = "hoof_env/HorseLegSpeed-v0"
 COMMANDS = 5  # speeds between the lowest and the highest command
-SETTLED = 4.0  # seconds after which the speed is that of the command
+SETTLED = 4.0  # seconds after which the speed is the commanded one
 
 POINTS = 40  # points of a drawn curve
 SOON = 0.4  # bar: share of the first row's time to the open-loop gait's return

@@ -19,7 +19,7 @@ CURVES = "curves.csv"
 
 COLUMNS = ("env_id", "algo", "seed", "steps", "return", "train_seconds", "commit", "processor")
 """Columns of curves.csv: a line for each score. The seconds are the processor's for learning alone so
-far; the commit is that of the code that trained, empty if there is no git. The processor is empty in rows
+far; the commit has the code that trained, empty if there is no git. The processor is empty in rows
 from before it was noted."""
 
 TUNED: Final = "ppo_flat"

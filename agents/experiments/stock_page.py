@@ -210,7 +210,7 @@ PAGE = """# Stock learners
 
 Learning curves of Stable-Baselines3's PPO, SAC and TD3 and of sb3-contrib's TQC with their library's own
 defaults: one environment, no wrapper. Written by `python -m agents.experiments --plan stock`,
-which trains what is missing in [curves.csv](curves.csv). Returns are those of the policy without its noise on
+which trains what is missing in [curves.csv](curves.csv). Returns are of the policy without its noise, on
 {starts} starts that no training meets: the interquartile mean over seeds, and the lowest and highest seed.
 Seconds are processor time of learning on one thread{processors};
 other work on the machine makes them longer. Trained by the code of {commits}.

@@ -128,8 +128,8 @@ class AverageArgs:
     points: int = 101
     """rows of the table, from touchdown to lift-off."""
     drop: tuple[str, ...] = ()
-    """stances to be left out: first, the first of each file, as that of an episode depends on its start; odd,
-    those that differ from the median duration by more than 25 %."""
+    """stances to be left out: first, the first of each file, which in an episode depends on its start; odd,
+    stances that differ from the median duration by more than 25 %."""
     overwrite: bool = False
     """replace an existing table."""
 

@@ -22,7 +22,7 @@ def parse(
 
     Args:
         command: function or dataclass, or several by the name of their sub-command.
-        arguments: words after the program's name; otherwise those of this process.
+        arguments: words after the program's name; this process's by default.
         program: name of the program in messages.
         description: help above the options; otherwise the docstring of the command.
     """

@@ -89,7 +89,7 @@ class TrunkEngine:
 
     Args:
         limbs: the legs in their places, at most `MAX_LEGS`; arrays have them in this order.
-        trunk: trunk that holds the legs. Its height is that of its centre of mass.
+        trunk: trunk that holds the legs. Its height is its centre of mass's.
         ground: laws of contact. Its exponent must be a multiple of 1/8, so that square roots are enough.
         terrain: heights, and where the ground is softer or more slippery; level if None.
         sim_dt: length of a step [s], after which results can be read.
@@ -362,7 +362,7 @@ class TrunkEngine:
         failed."""
         data = self._memory.data
         form = engine_layout(self.features)
-        # No step, but new reports of all environments; only those of `envs` stay.
+        # No step, but new reports of all environments, of which only `envs` keep theirs.
         before = data.copy()
         leg = form.leg_memory.rows("report")
         self._go(0)

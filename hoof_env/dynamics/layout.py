@@ -378,8 +378,8 @@ class PointReport(Layout):
 
 class LegReport(Layout):
     """Report of a leg. A motor turns crank and swing: its torque is `crank_torque`, `hip_torque` is
-    transmitted by the gear between them, and `hip_power` is that of the actuator that changes the swing's
-    parameters."""
+    transmitted by the gear between them, and `hip_power` is the power of the actuator that changes the
+    swing's parameters."""
 
     crank_angle_acceleration: Row  # [rad/s^2]
     swing_angle: Row  # [rad]

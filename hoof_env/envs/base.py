@@ -144,7 +144,7 @@ class LegBase:
     metadata: dict[str, Any]
     render_mode: str | None
     _size: tuple[int, int]
-    _watched: dict[int, DrawnRecording]  # recordings by environment, of those that are drawn or recorded
+    _watched: dict[int, DrawnRecording]  # recordings of the environments that are drawn or recorded, by index
     _spec: EnvSpec | None = None
     _as_json: tuple[Settings | None, dict[str, Any], list[str]] = (None, {}, [])
     _phase = "new"

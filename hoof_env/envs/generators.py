@@ -1,4 +1,5 @@
-"""Generators and their states; those of a vector environment are seeded as in Gymnasium's `SyncVectorEnv`."""
+"""Generators and their states; a vector environment seeds its generators as Gymnasium's `SyncVectorEnv`
+does."""
 
 from __future__ import annotations
 

@@ -42,7 +42,7 @@ class BodyTables(ABC):
         return scale.text
 
     def name_of_any_leg(self, name: str) -> str:
-        """Return the name of an observation without that of its leg."""
+        """Return the name of an observation without its leg's name."""
         return name
 
     def places(self, numbers: list[int]) -> str:
@@ -102,7 +102,7 @@ class HorseTables(BodyTables):
         return ("Num", "Offset of the reference's", "Is", "At -1", "At +1", "Unit", "Fastest change"), rows
 
     def name_of_any_leg(self, name: str) -> str:
-        """Return the name of an observation without that of its leg."""
+        """Return the name of an observation without its leg's name."""
         return re.sub(rf"({'|'.join(LEGS).replace('_', ' ')})[:,] ", "", name)
 
     def settings(self, s: Settings, words: Words, body: Horse) -> dict[str, tuple[str, str]]:
@@ -121,7 +121,7 @@ TABLES: Mapping[Any, BodyTables] = MappingProxyType({OneLeg: LegTables(), Horse:
 
 
 def tables_of_body(body: Body) -> BodyTables:
-    """Return the parts of tables for a body: those of its class, or of the class that it inherits.
+    """Return the parts of tables for a body: the parts of its class, or of the class that it inherits.
 
     Raises:
         ParameterError: a body of a user's class that inherits none of this package.

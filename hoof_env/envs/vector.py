@@ -359,8 +359,8 @@ class HorseLegVectorEnv(LegBase, VectorEnv[NDArray[np.float32], NDArray[np.float
         return infos | {"final_info": final, "_final_info": done.copy()}
 
     def render(self) -> tuple[NDArray[np.uint8], ...] | None:
-        """Return a picture of each environment, uint8 of shape (H, W, 3): those that are drawn, then black
-        ones; warn and return None without a render_mode."""
+        """Return a picture of each environment, uint8 of shape (H, W, 3), black where none is drawn; warn and
+        return None without a render_mode."""
         if self.render_mode is None:
             gym.logger.warn("render() was called without a render_mode: pass render_mode='rgb_array'")
             return None
@@ -474,7 +474,7 @@ class HorseLegVectorEnv(LegBase, VectorEnv[NDArray[np.float32], NDArray[np.float
 
     @property
     def np_random_seed(self) -> tuple[int, ...]:  # type: ignore[override]
-        """Seed of each environment, -1 if its generator was assigned or is from a state; like that of
+        """Seed of each environment, -1 if its generator was assigned or is from a state; as in
         Gymnasium's `SyncVectorEnv`."""
         # Reading `np_random` makes the generators, if there are none yet.
         return tuple(self._generators.seeds) if self.np_random else ()

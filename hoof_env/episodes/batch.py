@@ -1,7 +1,7 @@
 """Episodes of a task, one or many at once, for the single and the vector environment.
 
 `EpisodeBatch` works with arrays and generators and does not depend on Gymnasium. A row has the same bits for
-any number of neighbours: its starts are drawn from its own generator, and the kernels are those of `step`,
+any number of neighbours: its starts are drawn from its own generator, and the kernels are `step`'s,
 compiled for one environment or for several side by side.
 
 What follows from settings is a `plan.Plan`, what changes from step to step are the arrays of `rows.Rows`, and
@@ -142,7 +142,7 @@ class EpisodeBatch:
     # Plans of rows
 
     def change(self, asked: Sequence[Settings], groups: Sequence[Sequence[int]]) -> None:
-        """Start episodes from now on with other settings, some of those that `row_plans.CHANGEABLE` names.
+        """Start episodes from now on with other values of some settings in `row_plans.CHANGEABLE`.
 
         Args:
             asked: all settings, for each group of rows.

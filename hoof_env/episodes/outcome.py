@@ -42,7 +42,7 @@ def find_outcome(
     task: Any, trunk: TrunkMemory, leg: LegMemory, episode: Episode, layouts: Memories, sums: StrideSums
 ) -> Outcome:
     """Return the outcome of the step; `sums` is memory for `StrideSums`."""
-    # Where the engine failed the state is that of before the step: nothing is rewarded.
+    # Where the engine failed the state is the one before the step: nothing is rewarded.
     works = has_moved(trunk.result)
     x = trunk.report.place.real
     y = trunk.report.place.imag

@@ -27,7 +27,7 @@ STEP_ARRAYS = {
     "frames": "f4",
     "mapped": "f4",
 }
-"""Types of the arrays of a step, besides those of the engine. `acted` are the actions that act now, the same
+"""Types of the arrays of a step, besides the engine's. `acted` are the actions that act now, the same
 array as `actions` where nothing delays them; `mapped` are actions of the body, the same array as `acted`
 without a user's map."""
 
@@ -118,7 +118,7 @@ class Slots:
 
     Attributes:
         places: slot of each entry.
-        vectors: number of vectors of those that saturate.
+        vectors: number of vectors of values that saturate.
         count: number of slots.
     """
 

@@ -130,8 +130,8 @@ def evaluate(
 
     Args:
         policies: policies as `load_policy` takes them as texts.
-        env_id: id of the environment; None takes that of the first policy from a file, or HorseLeg-v0.
-        env_kwargs: its arguments; None takes those of the first policy from a file.
+        env_id: id of the environment; None takes the first policy's from a file, or HorseLeg-v0.
+        env_kwargs: its arguments; None takes the first policy's from a file.
         episodes: number of episodes, 20 if None.
         seed: seed of the first episode, 1000 if None; the others follow it.
         published: play the episodes of the published tables, and refuse policies of other settings.
@@ -196,7 +196,7 @@ def _of_policy(name: str, error: ParameterError) -> ParameterError:
 def _environment(
     policies: Sequence[str], env_id: str | None, published: bool
 ) -> tuple[str, dict[str, Any], str]:
-    """Return id and arguments of the environment, `env_id`, else those of the first policy with a file; and
+    """Return id and arguments of the environment, `env_id`, else the first policy's with a file; and
     the name of that policy, "" without one."""
     records = {name: read_policy_record(name) for name in policies if not is_function(name)}
     for name in filter(is_model, records):

@@ -1,6 +1,6 @@
 """Statistics of episodes: means, their intervals, and the columns of the tables.
 
-Intervals are those of the bootstrap with 95 %: bias-corrected and accelerated over episodes (Efron 1987,
+Intervals are 95 % intervals of the bootstrap: bias-corrected and accelerated over episodes (Efron 1987,
 Better bootstrap confidence intervals), percentiles of the interquartile mean over seeds (Agarwal et al. 2021,
 Deep reinforcement learning at the edge of the statistical precipice).
 """
@@ -79,7 +79,7 @@ class Interval:
 @dataclass(frozen=True)
 class Scored:
     """Policy without learning, or the seeds of an entry, on the episodes of the final score: figures over
-    episodes or over seeds, and those of each seed."""
+    episodes or over seeds, and each seed's."""
 
     name: str
     intervals: Mapping[str, Interval]
@@ -159,7 +159,7 @@ def over_episodes(episodes: Sequence[Mapping[str, float]]) -> dict[str, Interval
 
 
 def transport(episodes: Sequence[Mapping[str, float]]) -> Interval:
-    """Return the cost of transport over episodes, that of their distance and work together, with the
+    """Return the cost of transport over episodes, of their distance and work together, with the
     bootstrap's interval, which draws whole episodes; NaN if they do not get forward."""
     parts = np.array([[episode[name] for episode in episodes] for name in TRANSPORT])
 

@@ -3,7 +3,7 @@
 World frame: x forward (direction of travel), y up, z to the right; right-handed, in metres, as in OpenSim.
 The animal moves in the plane z = 0. Angles are counter-clockwise about z, so that +x turns towards +y.
 
-Signs: forces are those of the ground on the limb (ground reaction forces). `force_y` is positive upward,
+Signs: forces are the ground's on the limb (ground reaction forces). `force_y` is positive upward,
 `force_x` positive forward: braking is negative, propulsion positive. Joint reactions are forces on the link
 that is named first by the link that is named second, along the same axes.
 

@@ -166,7 +166,7 @@ def average(
                 warnings.append(f"{limb}: one stance has no standard deviation")
     if not limbs:
         names = ", ".join(record.name for record in records)
-        raise DataFileError(f"drop: expected stances of {names} besides those that are dropped, found none")
+        raise DataFileError(f"drop: expected stances of {names} besides the dropped ones, found none")
     remarks = [
         f"{record.name}: {text}"
         for record in records

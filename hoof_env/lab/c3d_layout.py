@@ -76,7 +76,7 @@ def readable(path: Path, head: Head, folder: Path) -> tuple[list[Path], int, lis
 
     Returns:
         The file itself, or copies of its parts in order; their number of frames; and notes on counts that
-        are not those of the data.
+        differ from the data's.
 
     Raises:
         DataFileError: the file holds fewer frames than it states.
@@ -196,7 +196,7 @@ def _empty(path: Path, layout: Layout, held: int) -> int:
 
 
 def _notes(head: Head, stated: dict[str, int], frames: int, believed: Layout, layout: Layout) -> list[str]:
-    """Return notes on counts and places that are not those of the data."""
+    """Return notes on counts and places that differ from the data's."""
     notes = []
     wrong = [f"{count} ({name})" for name, count in stated.items() if count != frames]
     if wrong:

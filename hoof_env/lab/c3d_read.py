@@ -88,7 +88,7 @@ class Plates:
             if the file states no rate.
         up: axis of the laboratory that points upward: "x", "y" or "z", with "-" for its other end.
         weight: weight of the animal [N], from files of this package, else None.
-        notes: messages about counts that are not those of the data, and a baseline that was not subtracted.
+        notes: messages about counts that differ from the data's, and a baseline that was not subtracted.
         own: True if this package wrote the file.
     """
 
@@ -154,7 +154,7 @@ def read_plates(path: Path) -> Plates:
 
 
 def _joined(parts: list[dict[str, Any]]) -> dict[str, Any]:
-    """Return the arrays of the parts of a file as those of the whole."""
+    """Return the arrays of the parts of a file, joined to the whole."""
     whole = dict(parts[0])
     for name in whole:
         if name.startswith("force_"):

@@ -175,7 +175,7 @@ def _limb_and_axis(name: str) -> tuple[str, str] | None:
     name = "_".join(name.split())
     if (match := OURS.fullmatch(name)) is not None:
         limb = limb_name(match["limb"])
-        # Our files have the forces at toe and heel next to those of the limb, which are their sums.
+        # Our files have the forces at toe and heel next to the limb's, which are their sums.
         return None if limb.endswith(("toe", "heel")) else (limb, match["axis"])
     if (match := OPENSIM.fullmatch(name)) is not None:
         return match["before"] or match["behind"] or "leg", match["axis"].lower()

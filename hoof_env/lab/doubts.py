@@ -1,4 +1,5 @@
-"""Doubtful stances: those of odd length, and those that run into each other under a baseline that drifts."""
+"""Doubtful stances: stances of odd length, and stances that run into each other under a baseline that
+drifts."""
 
 from __future__ import annotations
 
@@ -33,7 +34,7 @@ def odd_stances(durations: Floats) -> NDArray[np.bool_]:
 
 
 def cut_spans(vertical: Floats, level: float, rate: float) -> Spans:
-    """Return the loaded times that an end of the record cuts off; arguments are those of `whole_stances`."""
+    """Return the loaded times that an end of the record cuts off; arguments are as for `whole_stances`."""
     return [(i, j) for i, j in loaded_spans(vertical, level, rate) if i == 0 or j == len(vertical)]
 
 

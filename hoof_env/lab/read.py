@@ -154,7 +154,7 @@ def read_record(
     table = _load(path)
     upward, ahead = _axes(path.name, table, up, forward)
     sources, time, notes = sources_of(path, table, dict(mapping or {}), ahead, upward)
-    # Columns that a mapping names have no axes of the file; their directions are those of the mapping.
+    # Columns that a mapping names have no axes of the file; their directions are the mapping's.
     has_axes = any(part.axes for parts in sources.values() for part in parts)
     if (up, forward) != ("auto", "auto") and not has_axes:
         raise ParameterError(
@@ -300,7 +300,7 @@ def _check_sums(path: Path, table: Table, sources: dict[str, list[Source]]) -> N
 
 
 def _load(path: Path) -> Table:
-    """Read the table of a file by its suffix; errors are those of `read_record`."""
+    """Read the table of a file by its suffix; errors are `read_record`'s."""
     suffix = path.suffix.lower()
     if suffix not in READERS:
         raise ParameterError(

@@ -1,6 +1,6 @@
 """Times of a record's samples, from a column of times or a sampling rate.
 
-Times are those of the file's clock; with a given rate, the record begins at the first time of the column.
+Times are by the file's clock; with a given rate, the record begins at the first time of the column.
 
 Times need not be exact. Programs write few decimals, so steps differ in the last digit; differences of up to
 half a unit of that digit are not uneven. A missing sample is, if the last digit is finer than a step.

@@ -88,7 +88,7 @@ class Table:
 
     @property
     def names(self) -> list[str]:
-        """Names of all columns, those that cannot be read included."""
+        """Names of all columns, including columns that cannot be read."""
         return self.order or [*self.columns, *self.unread]
 
     def place(self, row: int) -> str:

@@ -35,8 +35,8 @@ class LinkTree:
 
     Attributes:
         mechanism: structure of the leg.
-        links: numbers of the bodies in each link, by its name: `CRANK_LINK`, `HOOF_LINK`, otherwise that of
-            its first body, with "_" behind it if it is one of `TAKEN`.
+        links: numbers of the bodies in each link, by its name: `CRANK_LINK`, `HOOF_LINK`, otherwise the name
+            of its first body, with "_" behind it if it is one of `TAKEN`.
         tree: every link, the one (or `FRAME_NAME`) that carries it and the point of the pin between them;
             carriers stand before what they carry.
     """

@@ -40,7 +40,7 @@ IMPEDANCE = "0.9999 0.9999 0.001 0.5 2"
 """Impedance of the loops, as near to rigid as MuJoCo goes."""
 
 HIP_HEIGHT = 1.7
-"""Hip height of the leg for which the servo's gains are given, about that of the default one [m]."""
+"""Hip height of the leg for which the servo's gains are given, about the default leg's [m]."""
 
 SWING_STIFFNESS = 2e4
 """Stiffness of the servo that holds the swing [N m/rad]: 500 N at a hoof 1.4 m below turn it by 2 degrees.

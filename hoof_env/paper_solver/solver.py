@@ -11,7 +11,7 @@ closed form.
 Phi_q is square, so the second row of Eq. 8 alone fixes qdd: contact, masses and weight change the multipliers
 (joint reactions, drive torques) and never the motion.
 
-The coordinates q are those of `constraints`. Hoof points go to the world, and ground forces come back,
+The coordinates q are as in `constraints`. Hoof points go to the world, and ground forces come back,
 through one mirror.
 """
 
