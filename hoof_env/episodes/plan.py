@@ -28,7 +28,7 @@ from hoof_env.episodes.strength import Strength
 from hoof_env.errors import check_choice, check_number, flag
 from hoof_env.ground.terrain import Terrain
 from hoof_env.tasks.body import Body
-from hoof_env.tasks.episode import ACTIONS, episode_layout, task_type
+from hoof_env.tasks.episode import ACTIONS, Episode, episode_layout, task_type
 from hoof_env.tasks.observation import CONTEXT, check_groups, groups_of
 from hoof_env.tasks.parameters import check_drift, check_parameters, make_terrain, resolved, substeps_of
 from hoof_env.tasks.registry import Task
@@ -130,7 +130,7 @@ class Plan:
         return self.body.kernels.legs
 
     @property
-    def layout(self) -> Any:
+    def layout(self) -> type[Episode]:
         """Layout of an episode's memory."""
         terms, own = self.task.terms, declared_by(self.task.terms, self.task.entries)
         return episode_layout(self.body.kernels.episode, len(terms), self.mechanics.features, self.legs, own)

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 from hoof_env.dynamics.limits import has_moved
 from hoof_env.episodes.scene import Scene, is_from_outside
 from hoof_env.simd import Lanes, Whole, where
 from hoof_env.simd.user_functions import foreign
+from hoof_env.tasks.episode import Episode
 from hoof_env.tasks.reward import Outcome, Term
 
 
@@ -19,7 +18,7 @@ def is_user_term(term: Term) -> bool:
 
 def compute_reward(scene: Scene, outcome: Outcome, n: Whole) -> Lanes:
     """Compute the terms, keep them in `episode.terms`, and return their sum."""
-    episode: Any = scene.episode(n)
+    episode = scene.episode(n)
     total = scene.zeros(n)
     for k, term in enumerate(scene.kind.terms):
         if is_user_term(term):
@@ -51,6 +50,6 @@ def compute_user_term(scene: Scene, term: Term, k: int, outcome: Outcome, n: Who
     return found
 
 
-def clear_failed(outcome: Outcome, episode: Any, k: int) -> None:
+def clear_failed(outcome: Outcome, episode: Episode, k: int) -> None:
     """Set a term to 0 where the engine failed: reports that it may read are of the point of failure."""
     episode.terms[k] = where(has_moved(outcome.trunk.result), episode.terms[k], 0.0)

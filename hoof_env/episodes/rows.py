@@ -14,7 +14,7 @@ from typing import Annotated, Any, NamedTuple, get_type_hints
 import numpy as np
 from numpy.typing import NDArray
 
-from hoof_env.simd.layout import views
+from hoof_env.simd.layout import Layout, views
 
 Floats = NDArray[np.float64]
 Index = NDArray[np.int64]
@@ -62,7 +62,7 @@ class Rows:
         named: views of `episode` by name.
     """
 
-    layout: Any
+    layout: type[Layout]
     num_envs: int
     episode: Annotated[Floats, Declared(-1, is_written=True, is_saved=True)]
     actions: Annotated[NDArray[np.float32], Declared(0)]
@@ -84,7 +84,7 @@ class Rows:
     def __post_init__(self) -> None:
         self.open(self.layout)
 
-    def open(self, layout: Any) -> None:
+    def open(self, layout: type[Layout]) -> None:
         """Find the views of the episodes' memory, in rows that come from a pickle."""
         self.layout = layout
         self.named = views(layout, self.episode)

@@ -8,10 +8,12 @@ from functools import cached_property
 from typing import Any
 
 from hoof_env.dynamics.advance import ARRAYS, LANES, EngineKind
+from hoof_env.dynamics.layout import LegMemory, TrunkMemory
 from hoof_env.simd import Lanes, Pointer, Whole, columns, full_like
+from hoof_env.simd.layout import Block
 from hoof_env.simd.memory import Arrays, Given, RecordType
 from hoof_env.tasks.body import BodyKernels
-from hoof_env.tasks.episode import ACTIONS, Memories, memories_of, task_type
+from hoof_env.tasks.episode import ACTIONS, Episode, Memories, memories_of, task_type
 from hoof_env.tasks.observation import LATE, Entry, ObservationInputs
 from hoof_env.tasks.reward import Term
 from hoof_env.tasks.user_parts import ActionMap, Constant, Declarations, declared_by
@@ -187,23 +189,23 @@ class Scene:
         width: Whole = self._data.shape[1]
         return width
 
-    def trunk(self, n: Whole) -> Any:
+    def trunk(self, n: Whole) -> TrunkMemory:
         """Return the memory of the trunks of rows n, n + 1, ..."""
         return columns(self._data, self.lanes, self.layouts.trunk, n)
 
-    def leg(self, n: Whole) -> Any:
+    def leg(self, n: Whole) -> LegMemory:
         """Return the memory of their first legs."""
         return columns(self._data, self.lanes, self.layouts.leg, n, self.layouts.trunk_rows)
 
-    def episode(self, n: Whole) -> Any:
+    def episode(self, n: Whole) -> Episode:
         """Return the memory of their episodes."""
         return columns(self._episode, self.lanes, self.layouts.episode, n)
 
-    def episode_of(self, row: Whole) -> Any:
+    def episode_of(self, row: Whole) -> Episode:
         """Return the memory of the episode of one row, as ordinary numbers."""
         return columns(self._episode, 0, self.layouts.episode, row)
 
-    def kept_rows(self, n: Whole) -> Any:
+    def kept_rows(self, n: Whole) -> Block:
         """Return the rows that terms keep in the memory of the episodes, by number."""
         return columns(self._episode, self.lanes, None, n, self.layouts.own_first)
 

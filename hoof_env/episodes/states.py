@@ -15,6 +15,7 @@ from hoof_env.episodes.pushes import MAX_PUSH
 from hoof_env.episodes.row_plans import CHANGEABLE, RowPlans
 from hoof_env.episodes.rows import repeated
 from hoof_env.errors import ParameterError
+from hoof_env.simd.layout import Layout
 from hoof_env.tasks.settings import Settings, to_json
 
 Floats = NDArray[np.float64]
@@ -209,7 +210,7 @@ def _is_possible(batch: EpisodeBatch, episode: Floats) -> bool:
 
 
 @cache
-def _bounded_rows(layout: Any) -> NDArray[np.int64]:
+def _bounded_rows(layout: type[Layout]) -> NDArray[np.int64]:
     """Return the rows of a layout of episodes that are not in `UNBOUNDED`."""
     rows = [layout.rows(name) for name in layout.fields if name not in UNBOUNDED]
     return np.concatenate([np.arange(part.start, part.stop) for part in rows])

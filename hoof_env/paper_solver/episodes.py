@@ -60,7 +60,7 @@ class Scheme(NamedTuple):
     integrator: str
 
 
-def check_settings(settings: Any) -> None:
+def check_settings(settings: object) -> None:
     """Check that the solver supports the settings of an environment, `tasks.settings.Settings`.
 
     Raises:

@@ -8,7 +8,15 @@ from typing import Annotated, Any, NamedTuple
 
 import numpy as np
 
-from hoof_env.dynamics.layout import PLAIN, Features, StrideSums, engine_layout, stride_peaks
+from hoof_env.dynamics.layout import (
+    PLAIN,
+    Features,
+    LegMemory,
+    StrideSums,
+    TrunkMemory,
+    engine_layout,
+    stride_peaks,
+)
 from hoof_env.gait import PARAMETERS
 from hoof_env.simd.layout import Block, Layout, Row, Size, Vector, extended
 from hoof_env.tasks.reward import TERMS
@@ -58,8 +66,12 @@ class Episode(Layout):
 
 @cache
 def episode_layout(
-    layout: Any, terms: int, features: Features = PLAIN, legs: int = 1, declared: Declarations = NOTHING
-) -> Any:
+    layout: type[Episode],
+    terms: int,
+    features: Features = PLAIN,
+    legs: int = 1,
+    declared: Declarations = NOTHING,
+) -> type[Episode]:
     """Return the layout of an episode's memory, sized for an engine.
 
     Args:
@@ -69,10 +81,13 @@ def episode_layout(
         legs: number of legs.
         declared: declarations of the terms; their state is the last field, `own`.
     """
-    made = features.of(layout).sized(action=legs * ACTIONS, reward=terms)
+    made: type[Episode] = features.of(layout).sized(action=legs * ACTIONS, reward=terms)
     if not declared.state:
         return made
-    return extended(made, "own", {term: dict.fromkeys(names, Row) for term, names in declared.state})
+    longer: type[Episode] = extended(
+        made, "own", {term: dict.fromkeys(names, Row) for term, names in declared.state}
+    )
+    return longer
 
 
 class Memories(NamedTuple):
@@ -90,14 +105,14 @@ class Memories(NamedTuple):
         own_first, own_rows: first row of the terms' state in the memory of an episode, and number of rows.
     """
 
-    episode: Any
-    trunk: Any
-    leg: Any
+    episode: type[Episode]
+    trunk: type[TrunkMemory]
+    leg: type[LegMemory]
     trunk_rows: int
     legs: int
     gait: int
     has_limits: bool
-    stride_sums: Any
+    stride_sums: type[StrideSums]
     sums: int
     peaks: int
     own_first: int
@@ -106,7 +121,11 @@ class Memories(NamedTuple):
 
 @cache
 def memories_of(
-    layout: Any, terms: int, features: Features, legs: int = 1, declared: Declarations = NOTHING
+    layout: type[Episode],
+    terms: int,
+    features: Features,
+    legs: int = 1,
+    declared: Declarations = NOTHING,
 ) -> Memories:
     """Return the layouts of an engine with these features and of episodes with a number of terms and legs."""
     form = engine_layout(features)
