@@ -168,9 +168,7 @@ def test_the_command_leaves_out(tmp_path, capsys):
 
 def test_nothing_is_left_is_an_error():
     short = strides(seconds=1.3)
-    with pytest.raises(
-        DataFileError, match=r"drop: expected stances of 1\.csv besides the dropped ones"
-    ):
+    with pytest.raises(DataFileError, match=r"drop: expected stances of 1\.csv besides the dropped ones"):
         average([short], drop=["first"])
 
 
