@@ -139,6 +139,7 @@ def read_plates(path: Path) -> Plates:
         raise DataFileError(
             f"record {str(path)!r}: expected {len(raw)} names of plates (HOOF_ENV:LIMBS), got {len(limbs)}"
         )
+    _check_forces(path, limbs, raw, content["corners"])
     rate, camera = (float((*np.ravel(parameters[group]["RATE"]), 0.0)[0]) for group in ("ANALOG", "POINT"))
     first, last = head.frames
     first = first if 0 < first <= last else 1
@@ -205,6 +206,27 @@ def _in_a_process(file: Path, path: Path, folders: list[Path]) -> dict[str, Any]
         f"record {str(path)!r}: cannot read it (ezc3d ended without a word or took too long, code "
         f"{done.returncode}); its header or parameters are damaged"
     )
+
+
+def _check_forces(path: Path, limbs: list[str], raw: list[Floats], corners: Floats) -> None:
+    """Raise `DataFileError` if a plate has no force in any sample, with the parameters that may be why.
+
+    Args:
+        path: the file, for error messages.
+        limbs: names of the plates.
+        raw: forces by plate, shape (n, 3).
+        corners: corners of the plates, shape (plates, 3, 4).
+    """
+    for limb, force, points in zip(limbs, raw, corners, strict=True):
+        if np.isfinite(force).any():
+            continue
+        area = np.cross(points[:, 1] - points[:, 0], points[:, 3] - points[:, 0])
+        flat = not np.isfinite(area).all() or not area.any()
+        where = "FORCE_PLATFORM:CORNERS, which span no plate" if flat else "ANALOG:GEN_SCALE and ANALOG:SCALE"
+        raise DataFileError(
+            f"record {str(path)!r}: {limb}: expected forces, got no number in any sample; look at {where},"
+            " and export the file again"
+        )
 
 
 def _upward(corners: Floats, middle: Floats) -> str:

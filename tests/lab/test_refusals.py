@@ -142,6 +142,13 @@ FILES = [
     ("mixed.c3d", of_plate("ANALOG", "UNITS", ["N", "N", "kN", "V", "V", "V"]), {}, ParameterError,
      "mixed.c3d, .*N and kN; name .*--units-a"),
     ("plates.c3d", of_plate("FORCE_PLATFORM", "USED", [0]), {}, DataFileError, "found no force plates"),
+    *(
+        ("corners.c3d", of_plate("FORCE_PLATFORM", "CORNERS", corners), {}, DataFileError,
+         r"plate_1: expected forces, .*FORCE_PLATFORM:CORNERS")
+        for corners in (np.zeros((3, 4, 1)), np.full((3, 4, 1), np.nan))
+    ),
+    ("scale.c3d", of_plate("ANALOG", "GEN_SCALE", [0.0]), {}, DataFileError,
+     "plate_1: expected forces, .*ANALOG:GEN_SCALE"),
     ("type.c3d", of_plate("FORCE_PLATFORM", "TYPE", [6]), {}, DataFileError,
      r"cannot read it \(ezc3d says: Type 6 is not supported yet\)"),
     ("forward.c3d", plate, {"forward": "z"}, ParameterError,
