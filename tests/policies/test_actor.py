@@ -213,6 +213,7 @@ ASKS = {
     "hoof_env/policies/saved.py": "hands on what a model of Stable-Baselines3 returns",
     "hoof_env/policies/onnx_file.py": "tries a new file with drawn observations",
     "agents/export.py": "compares two policies over drawn observations",
+    "agents/levels.py": "hands on what a policy returns, some of it replaced by random actions",
     "agents/ship.py": "hands on what a policy returns, with noise",
 }
 """Files that ask a policy for actions, and what for."""
