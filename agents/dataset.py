@@ -246,8 +246,7 @@ def _collect(minari: Any, env: Any, args: Args, episodes: int, dataset_id: str) 
     # A level has as many episodes as one policy: its parts share them.
     each = episodes // len(policies) if levels else episodes
     files = {
-        name: {file.name: _sha256(file) for file in policy_files(name, args.env_id)}
-        for name in args.policies
+        name: {file.name: _sha256(file) for file in policy_files(name, args.env_id)} for name in args.policies
     }
     collector = minari.DataCollector(env)
     returns = {}

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import re
 from collections import Counter
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from datetime import time
 from pathlib import Path
@@ -113,12 +113,17 @@ class Table:
 def _read_text(path: Path) -> Table:
     """Read a .csv, .txt or .tsv."""
     table = _table(path, parse(lines_of(path)))
-    table.own = all(any(name.endswith(end) for name in table.order) for end in OWN_COLUMNS)
+    table.own = _are_own(table.order)
     # Our files in body weights have the weight in a column, as they have no other place for it.
     weights = table.columns.get("weight", np.empty(0))
     if weights.size and table.units.get("weight") == "N":
         _set_weight(table, "column weight", weights[0])
     return table
+
+
+def _are_own(names: Sequence[str]) -> bool:
+    """Return True if columns of these names are those of a table of this package."""
+    return all(any(name.endswith(end) for name in names) for end in OWN_COLUMNS)
 
 
 def _set_weight(table: Table, name: str, value: Any) -> None:
@@ -330,7 +335,8 @@ def _read_parquet(path: Path) -> Table:
     content = parquet.read_table(path)
     units = {entry.name: (entry.metadata or {}).get(b"unit", b"").decode() for entry in content.schema}
     about = parse_json((content.schema.metadata or {}).get(b"hoof_env", b"{}"))
-    table = Table({}, units, own="hoof_env" in about)
+    # Other programs that save it again may drop its metadata.
+    table = Table({}, units, own="hoof_env" in about or _are_own(content.column_names))
     if "weight_n" in about:
         _set_weight(table, "weight_n", about["weight_n"])
     for name in content.column_names:

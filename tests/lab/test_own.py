@@ -36,6 +36,23 @@ def test_an_export_is_known_and_is_not_to_be_turned(which, suffix, request, tmp_
     assert ("propulsion before braking, as legs of the model" in said) == (which == "of_fast_horse")
 
 
+@pytest.mark.parametrize("suffix", [".csv", ".parquet"])
+def test_an_export_that_another_program_saved_again_is_known(of_horse, suffix, tmp_path):
+    """A spreadsheet with semicolons and decimal commas, and a table without metadata."""
+    path = records.write(*of_horse, tmp_path / f"x{suffix}")
+    if suffix == ".csv":
+        text = path.read_text()
+        path.write_text(text.replace(",", ";").replace(".", ","))
+    else:
+        pytest.importorskip("pyarrow")
+        from pyarrow import parquet
+
+        parquet.write_table(parquet.read_table(path).replace_schema_metadata(None), path)
+    found = read_record(path, unit="N")
+    assert found.own
+    assert found.notes == ()
+
+
 def test_an_export_in_body_weights_is_known(of_horse, tmp_path):
     record, about = of_horse
     written, description = in_units(record, about, "BW")
