@@ -49,7 +49,7 @@ def write(path, inputs=22, outputs=4, batch="n", names=("obs", "mean"), scale=0.
 def test_a_file_of_any_exporter(env, tmp_path, batch):
     path = tmp_path / "mine.onnx"
     matrix = write(path, batch=batch)
-    with pytest.raises(DataFileError, match=r"names no environment; hoof_env\.stamp_onnx"):
+    with pytest.raises(DataFileError, match=r"no environment; hoof_env\.stamp_onnx"):
         hoof_env.load_policy(path, env)
     policy = hoof_env.stamp_onnx(path, env, algo="mine")
     assert (policy.record["env_id"], policy.record["algo"]) == (ENV_ID, "mine")
@@ -125,7 +125,7 @@ def test_a_stamp_says_nothing_else_than_the_environment(env, tmp_path):
     write(path)
     before = path.read_bytes()
     for entry in ("env_id", "actions", "settings", "hoof_env"):
-        with pytest.raises(ParameterError, match=rf"no entry that is read off env, got \['{entry}'\]"):
+        with pytest.raises(ParameterError, match=rf"no entry .*read off env, got \['{entry}'\]"):
             hoof_env.stamp_onnx(path, env, **{entry: "other"})
     for value in (3, None, ["ppo"]):
         with pytest.raises(ParameterError, match=r"algo: expected .*seed=\"3\", got"):
@@ -155,7 +155,7 @@ def test_arguments_that_are_no_file_or_no_environment(env, tmp_path):
         ("settings", "3", "metadata settings: expected a JSON object, got '3'"),
         ("observation_names", '"abc"', "metadata observation_names: expected a JSON list, got '\"abc\"'"),
         ("observation_names", '["height", "wings"]', "observation_names with wings and without sin"),
-        ("env_id", "", "names no environment"),
+        ("env_id", "", "no environment"),
         ("env_id", "hoof_env/HorseLegRail-v0", "env_id hoof_env/HorseLegRail-v0, expected [^;]*$"),
         ("action_space", "Box(3)", r"action_space Box\(3\), expected Box"),
     ],
@@ -189,9 +189,7 @@ def change(path, **metadata):
         ({}, {"env_id": "my/Leg-v0"}, "must not import a module.* --env-id MODULE:my/Leg-v0"),
     ],
 )  # fmt: skip
-def test_what_a_file_does_in_an_evaluation_is_reported_with_its_name(
-    env, tmp_path, arguments, metadata, words
-):
+def test_what_a_file_does_in_an_evaluation_is_told_with_its_name(env, tmp_path, arguments, metadata, words):
     """Metadata of a file that fits, on a graph that does not."""
     path = tmp_path / "mine.onnx"
     write(path)
