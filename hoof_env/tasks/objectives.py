@@ -17,7 +17,7 @@ from hoof_env.tasks.reward import OBJECTIVES, TERMS, Term, check_weights
 
 REFERENCE_POINT = (0.0, -100.0, -50.0)
 """Reference point of hypervolumes of undiscounted returns over whole episodes, in the order of `OBJECTIVES`:
-no travel, and about twice the forces and work that random actions are charged for. Policies below it in one
+no travel, and some more force and work than random actions are charged for. Policies below it in one
 objective, such as falling ones, add nothing."""
 
 

@@ -467,8 +467,3 @@ OTHER_DOORS = [
 def test_other_doors(call, words):
     with pytest.raises(ParameterError, match=words):
         call()
-
-
-def test_many_with_a_vector_reward_are_refused_with_what_makes_them():
-    with pytest.raises(gym.error.Error, match="MOSyncVectorEnv"):
-        gym.make_vec(MO, num_envs=2)
