@@ -35,6 +35,7 @@ class Venv:
         extras: of hoof-env, which is installed from the checkout and follows its changes.
         loosen: packages whose version in constraints.txt is not asked for.
         torch: whether PyTorch is needed.
+        bare: packages that are installed without what they ask for.
         wheels: projects, from `ROOT`, that are built and installed instead of the checkout; the extras go to
             the first.
         folder: where checks run and lie, from `ROOT`.
@@ -44,6 +45,7 @@ class Venv:
     extras: tuple[str, ...] = ()
     loosen: tuple[str, ...] = ()
     torch: bool = False
+    bare: tuple[str, ...] = ()
     wheels: tuple[str, ...] = ()
     folder: str = "tests/ecosystem"
 
@@ -84,6 +86,8 @@ class Venv:
             self._pip(f"{first}{extras}", *map(str, others))
         else:
             self._pip("--no-binary", "hoof-env", "--no-build-isolation", "--editable", f".{extras}")
+        if self.bare:
+            self._pip("--no-deps", *self.bare)
 
     def _torch(self) -> None:
         """PyTorch for the CPU. Where neither has it, it comes with the rest, perhaps with CUDA."""
