@@ -204,6 +204,7 @@ def draw(found: Sequence[Trained], path: Path) -> None:
                     axes.plot(x, y, "o", color=colour, mfc=filling, ms=5, label=label)
             axes.set(xlabel=f"return of {OBJECTIVES[0]}", ylabel=f"return of {OBJECTIVES[other]}")
             axes.set_yscale("symlog", linthresh=1.0)
+            axes.yaxis.set_major_formatter("{x:g}")
             axes.grid(color=GREY, alpha=0.15)
         title = f"{' : '.join(OBJECTIVES)}; hollow: dominated"
         handles, labels = axes.get_legend_handles_labels()

@@ -64,7 +64,7 @@ def test_the_stored_front_is_one_and_has_its_volume():
     assert low <= volume["iqm"] <= high
     for point in about["front"]:
         assert sum(point["weight"]) == pytest.approx(1.0, abs=1e-5)
-        assert point["seed"] in about["seeds"] or point["steps"] > STEPS
+        assert point["seed"] in about["seeds"] or point["steps"] > 2 * STEPS
 
 
 def test_the_page_shows_the_stored_front():
@@ -78,9 +78,8 @@ def test_the_page_shows_the_stored_front():
 
 def test_the_shipped_agent_returns_what_the_front_says():
     """The one point of which the policy is in the package."""
-    (stored,) = [point for point in read_front()["front"] if point["steps"] > STEPS] or [None]
-    if stored is not None:
-        assert front.shipped().returns == pytest.approx(stored["returns"], abs=1e-2)
+    (stored,) = [point for point in read_front()["front"] if point["steps"] > 2 * STEPS]
+    assert front.shipped().returns == pytest.approx(stored["returns"], abs=1e-2)
 
 
 def test_returns_of_each_objective_are_those_of_single_environments():

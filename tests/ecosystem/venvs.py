@@ -79,7 +79,7 @@ class Venv:
             _run(base, "-I", "-m", "venv", str(CACHE / self.name))
         if self.torch and sys.platform == "linux" and TORCH_INDEX:
             self._torch()
-        self._pip("hatchling", "hatch-fancy-pypi-readme", "pytest")
+        self._pip("hatchling", "hatch-fancy-pypi-readme", "pytest", "filelock")
         extras = f"[{','.join(self.extras)}]"
         if self.wheels:
             first, *others = self._build()
