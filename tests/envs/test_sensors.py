@@ -5,8 +5,11 @@ import numpy as np
 import pytest
 from family import HORSE, IDS, LEGS, actions, same
 
+from hoof_env.episodes.scene import Slots
 from hoof_env.errors import ParameterError
 from hoof_env.tasks.horse_gaits import LEGS as OF_HORSE
+from hoof_env.tasks.horse_terms import HORSE_ENTRIES
+from hoof_env.tasks.observation import ENTRIES, PLAIN, Entry, tanh_of
 from hoof_env.tasks.registry import TASKS
 
 LEG = "hoof_env/HorseLeg-v0"
@@ -73,6 +76,15 @@ def test_a_new_group_changes_no_other_number(env_id):
             same(one, other[:, : one.shape[1]])
             assert other.shape[1] == one.shape[1] + len(prefixes(env_id))
             assert (np.abs(other[:, one.shape[1] :]) <= 1).all()
+
+
+@pytest.mark.parametrize("entries", [ENTRIES, HORSE_ENTRIES], ids=["leg", "horse"])
+@pytest.mark.parametrize("scale", [PLAIN, tanh_of(1.0)], ids=["linear", "saturating"])
+def test_entries_of_users_keep_the_slots_that_they_had_before_these_groups(entries, scale):
+    """Noise follows from the slot."""
+    own = Entry("own", "own", "-", lambda scene: scene.episode.time, scale)
+    before = [entry for entry in (*entries, own) if entry.group not in ("pressure", "context")]
+    assert Slots.of((*entries, own)).places[-1] == Slots.of(tuple(before)).places[-1]
 
 
 @pytest.mark.parametrize("value", [-1.0, np.nan, 1e9, "much"])
