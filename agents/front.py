@@ -62,7 +62,7 @@ STEPS = 150_000
 class Args:
     """Arguments of the command."""
 
-    seeds: int = 3
+    seeds: int = 4
     """trainings for each preference, of the seeds from 0 on"""
     folder: Path = Path("runs/front")
     """folder of the trainings"""
