@@ -116,6 +116,7 @@ class EpisodeBatch:
         self.measurements = InfoLayout(self.engine.features, tuple(self.plan.body.hips))
         self.is_push_unseen = False
         self.unpushed: dict[int, Floats] = {}
+        self._usual_start = self._checked_start()
         self._kernels: dict[TaskKind, StepKernels] = {}
         self._calls: dict[Plan, Calls] = {}
         self._open()
@@ -306,11 +307,22 @@ class EpisodeBatch:
                 return self._start(which, generators, options)
         return self._start(which, generators, options)
 
+    def _checked_start(self) -> dict[str, Any]:
+        """Return the task's own reset options, in the form that `_start` takes.
+
+        Raises:
+            ParameterError: an option that this body, trunk or leg cannot have.
+        """
+        try:
+            return self._check_options(self.task.start)
+        except ParameterError as error:
+            raise ParameterError(f"{self.task.id}: start: {error}") from None
+
     def _start(self, which: Index, generators: Generators, options: Mapping[str, Any]) -> dict[str, Floats]:
         """Start episodes under the present plan; see `reset`. The order of the draws from a generator is part
         of what a seed means."""
         plan, rows, engine = self.plan, self.rows, self.engine
-        options = {**self.task.start, **options}
+        options = {**self._usual_start, **options}
         self.unpushed = {env: values for env, values in self.unpushed.items() if env not in which}
         rows.steps_before[which] += rows.named.steps[which]
         drawn = self._draw_parameters(which, generators, options.get("parameters", {}))

@@ -395,6 +395,7 @@ def register(
     entries: Iterable[Entry] = (),
     contact_law: Callable[..., Any] | None = None,
     action_map: ActionMap | None = None,
+    start: Mapping[str, Any] | None = None,
     **defaults: Any,
 ) -> None:
     """Register a new id for `gymnasium.make` and `make_vec`: a task of this package with further reward terms
@@ -411,6 +412,7 @@ def register(
         contact_law: function of penetration [m], its rate [m/s], inverse approach speed [s/m] and the
             ground's constants, which returns the normal force [N]; see `dynamics.hoof.contact_force`.
         action_map: map from user-defined actions to body actions.
+        start: reset options of every episode, which those of a call replace; None for the base's.
         defaults: settings, see the manual pages.
 
     Raises:
@@ -426,6 +428,8 @@ def register(
         )
     old = task_of(base)
     _check_laws(env_id, contact_law, action_map)
+    if start is not None and not isinstance(start, Mapping):
+        raise ParameterError(f"{env_id}: start: expected a mapping of reset options, got {brief(start)}")
     _check_twice(env_id, [term.name for term in new_terms])
     _check_twice(env_id, [entry.name for entry in (*old.entries, *new_entries)])
     added = {term.name: term for term in new_terms}
@@ -444,6 +448,7 @@ def register(
         entries=(*old.entries, *new_entries),
         contact_law=contact_law or old.contact_law,
         action_map=action_map or old.action_map,
+        start=old.start if start is None else dict(start),
     )
     groups = dict.fromkeys((*old.chosen({}).observation, *groups_of(new_entries)))
     settings = _checked(task, {"observation": tuple(groups), **defaults})

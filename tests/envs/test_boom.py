@@ -4,6 +4,7 @@ import gymnasium as gym
 import numpy as np
 import pytest
 
+import hoof_env
 from hoof_env.errors import ParameterError
 
 PASTERN = {"hoof_stiffness": 1e4, "hoof_damping": 200.0, "hoof_length": 0.3}
@@ -97,3 +98,40 @@ def test_ranges_that_no_start_can_have_are_refused(options, message):
     env = gym.make("hoof_env/HorseLeg-v0", **BOOM)
     with pytest.raises(ParameterError, match=message):
         env.reset(options=options)
+
+
+HIGH = {"gait": "run", "crank_angle": (3.0, 3.7), "height": (1.95, 2.15), "speed": (2.0, 4.0)}
+
+
+def test_a_task_of_ones_own_has_starts_of_its_own():
+    hoof_env.register("test/Hop-v0", base="leg", start=HIGH, **BOOM)
+    env = gym.make_vec("test/Hop-v0", num_envs=32)
+    _, info = env.reset(seed=0)
+    assert info["speed"].min() > 2.0
+    assert (info["gait"] == hoof_env.load_gait("run").to_array()).all()
+    _, info = env.reset(seed=0, options={"speed": 1.0})
+    assert (info["speed"] == 1.0).all()
+    assert info["height"].min() > 1.95
+    # an id that is made from this one has its starts, too
+    hoof_env.register("test/SlowHop-v0", base="test/Hop-v0", crank_rate=5.0)
+    assert gym.make("test/SlowHop-v0").reset(seed=0)[1]["speed"] > 2.0
+
+
+@pytest.mark.parametrize(
+    ("name", "start", "message"),
+    [
+        ("Down", {"speed": (4.0, 1.0)}, r"test/Down-v0: start: options\['speed'\]\[1\]: expected"),
+        ("Trot", {"gait": "trot"}, r"test/Trot-v0: start: options\['gait'\]: expected"),
+        ("Wings", {"wings": 2}, "test/Wings-v0: start: options: expected a mapping with some of gait"),
+    ],
+)
+def test_starts_that_no_episode_can_have_are_refused_with_the_id(name, start, message):
+    hoof_env.register(f"test/{name}-v0", base="leg", start=start, **BOOM)
+    with pytest.raises(ParameterError, match=message):
+        gym.make(f"test/{name}-v0")
+
+
+def test_a_start_that_is_no_mapping_is_refused_at_once():
+    with pytest.raises(ParameterError, match="test/List-v0: start: expected a mapping of reset options, got"):
+        hoof_env.register("test/List-v0", base="leg", start=[1.0], **BOOM)
+    assert "test/List-v0" not in gym.registry
