@@ -18,8 +18,8 @@ PAGES = sorted([*ROOT.glob("*.md"), *(page for folder in FOLDERS for page in (RO
 LIVE = [page for page in PAGES if not {"evidence", "studies"} & {*page.parts}]
 """Frozen pages name the commands of their commits."""
 HAND_WRITTEN = (
-    "agents", "decisions", "elasticity", "engine", "help", "horse", "jax", "look_inside", "own_task", "paper",
-    "parameters", "project", "start", "task", "view",
+    "agents", "contexts", "decisions", "elasticity", "engine", "help", "hop", "horse", "jax", "look_inside",
+    "own_task", "paper", "parameters", "project", "start", "task", "view",
 )  # fmt: skip
 BLOCK = re.compile(r"^```(\w*)\n(.*?)^```", re.MULTILINE | re.DOTALL)
 EXAMPLES = [
