@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from typing import Any, NoReturn
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from hoof_env.envs.arguments import VectorArguments, takes
 from hoof_env.envs.vector import HorseLegVectorEnv
-from hoof_env.errors import ParameterError
 from hoof_env.tasks.objectives import reward_space, vector_reward
 from hoof_env.tasks.reward import OBJECTIVES
 
@@ -37,18 +36,6 @@ class HorseLegMOVectorEnv(HorseLegVectorEnv):
         super().__init__(num_envs, **arguments)
         self.reward_space = reward_space()
         self.reward_dim = len(OBJECTIVES)
-
-    def xla(self) -> NoReturn:
-        """Refuse steps inside `jax.jit`, which return one number for a reward.
-
-        Raises:
-            ParameterError: always.
-        """
-        raise ParameterError(
-            "xla: expected an id with one number for a reward, got hoof_env/HorseLegMO-v0 with a vector;"
-            " hoof_env/HorseLeg-v0 pays its weighted sum with"
-            " reward_weights=hoof_env.tasks.objectives.scalar_weights([...])"
-        )
 
     def _rewards(self) -> NDArray[np.float32]:
         terms = self.batch.rows.named.terms[:, : self.num_envs]

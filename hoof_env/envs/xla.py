@@ -50,7 +50,7 @@ class States(NamedTuple):
 
     Attributes:
         observations: observations, float32, shape (num_envs, numbers).
-        rewards: rewards, shape (num_envs,): float64 where jax has it, else rounded to float32.
+        rewards: rewards, as of `step`: float64 where jax has it, else rounded to float32.
         terminated, truncated: ends of episodes, bool, shape (num_envs,).
         infos: "final_obs", the observations before restarts, in mode SAME_STEP; costs by their keys, float32.
     """
@@ -119,7 +119,7 @@ class XlaSteps:
         is_same_step = envs.autoreset_mode == AutoresetMode.SAME_STEP
         costs = batch.plan.costs.keys
         observations = batch.rows.observations[:n]
-        self._rewards = np.zeros(n)
+        self._rewards = np.zeros(envs._rewards().shape)
         self._ends = np.zeros(-(-2 * n // 8), np.int64)  # bytes, filled up to whole words
         self._terminated, self._truncated = self._ends.view(bool)[: 2 * n].reshape(2, n)
         self._last = np.zeros_like(observations) if is_same_step else None
@@ -149,7 +149,7 @@ class XlaSteps:
             Word.LAST: 0 if self._last is None else self._last.ctypes.data,
             Word.STEP_REWARDS: rows.rewards.ctypes.data,
             Word.REWARDS: self._rewards.ctypes.data,
-            Word.ENVS: envs.num_envs,
+            Word.REWARD_COUNT: self._rewards.size,
             Word.ENDS: self._ends.ctypes.data,
             Word.END_WORDS: self._ends.size,
             Word.STALE: ctypes.addressof(STALE_MESSAGE),
@@ -203,7 +203,7 @@ class XlaSteps:
             envs.check_actions(envs.batch.rows.actions[: envs.num_envs])
         _, terminated, truncated = envs.finish_step(reason)
         rows, n = envs.batch.rows, envs.num_envs
-        self._rewards[:] = rows.rewards[:n]
+        self._rewards[:] = envs._rewards()
         self._terminated[:], self._truncated[:] = terminated, truncated
         self._costs[:] = rows.costs
         if self._last is not None:
@@ -213,7 +213,7 @@ class XlaSteps:
     def _prepare(self, envs: HorseLegVectorEnv) -> None:
         """Tell the handler how to take the next step."""
         batch, words = envs.batch, self._words
-        is_direct = envs.is_plain
+        is_direct = envs.is_plain and self._rewards.ndim == 1
         if is_direct:
             words[Word.KERNEL] = batch.direct_step().code.address
             words[Word.HELD] = int(batch.calls.held)

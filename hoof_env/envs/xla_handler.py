@@ -53,7 +53,7 @@ class Word(_Counted):
     LAST = auto()  # address of a copy of those before restarts, 0 without
     STEP_REWARDS = auto()  # address of the kernel's rewards
     REWARDS = auto()  # of the rewards of the last step, as doubles, and their number
-    ENVS = auto()
+    REWARD_COUNT = auto()
     ENDS = auto()  # of `terminated` and `truncated`, a byte each, and their number in words
     END_WORDS = auto()
     STALE = auto()  # address of the message about an old handle
@@ -201,8 +201,7 @@ def take_step(words: Pointer) -> Index:
     @when(words[Word.IS_DIRECT] != 0)
     def _() -> None:
         code = call_at(words[Word.KERNEL], words[Word.HELD])
-        envs = words[Word.ENVS]
-        copy_bytes(words[Word.REWARDS], words[Word.STEP_REWARDS], envs * 8)
+        copy_bytes(words[Word.REWARDS], words[Word.STEP_REWARDS], words[Word.REWARD_COUNT] * 8)
         ends = numbers_at(words[Word.ENDS], "i64")
         for n in loop(words[Word.END_WORDS]):
             set_word(ends, n, 0)
@@ -225,12 +224,12 @@ def write_results(words: Pointer, outputs: Pointer) -> None:
 
     @when(lower_half(buffer, TYPE) == DOUBLE)
     def _() -> None:
-        copy_bytes(buffer[DATA], words[Word.REWARDS], words[Word.ENVS] * 8)
+        copy_bytes(buffer[DATA], words[Word.REWARDS], words[Word.REWARD_COUNT] * 8)
 
     @when(lower_half(buffer, TYPE) != DOUBLE)
     def _() -> None:
         singles = numbers_at(buffer[DATA], "float")
-        for n in loop(words[Word.ENVS]):
+        for n in loop(words[Word.REWARD_COUNT]):
             singles[n] = rewards[n]
 
     for n in loop(words[Word.OUTPUTS]):

@@ -205,5 +205,3 @@ def test_one_number_for_a_reward_is_refused_and_so_is_a_vector_where_one_is_need
         hoof_env.VectorLinearReward(gym.make_vec("hoof_env/HorseLeg-v0", 2), WEIGHT)
     with pytest.raises(ParameterError, match=r"one number for a reward.*HorseLegMO-v0.*scalar_weights"):
         hoof_env.Sb3VecEnv(MO, 2)
-    with pytest.raises(ParameterError, match=r"xla: .*one number for a reward.*scalar_weights"):
-        gym.make_vec(MO, 2).unwrapped.xla()

@@ -79,6 +79,7 @@ def check_same(envs, actions, states):
         ("HorseLeg", 3, {"push_seconds": 0.2, "push_impulse": 40.0, "episode_seconds": 0.5}),
         ("HorseLegTerrain", 3, {"episode_seconds": 0.4}),
         ("HorseRough", 2, {"episode_seconds": 0.3}),
+        ("HorseLegMO", 3, {"episode_seconds": 0.4}),
         ("HorseLeg", 16, {"episode_seconds": 0.4, "num_threads": 2}),
         ("HorseLegFixed", 2, {"episode_seconds": 0.2, "solver": "paper"}),
     ],
