@@ -31,7 +31,7 @@ FLOORS = (
     ("hoof_env/tasks",),
     ("hoof_env/render", "hoof_env/episodes"),
     ("hoof_env/envs", "hoof_env/__init__.py"),
-    ("hoof_env/paper", "hoof_env/policies"),
+    ("hoof_env/paper", "hoof_env/policies", "hoof_env/jax"),
     ("hoof_env/lab",),
     ("hoof_env/records.py",),
     ("hoof_env/film.py", "hoof_env/evaluation"),

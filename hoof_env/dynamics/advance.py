@@ -291,6 +291,15 @@ class Advance:
 
     def _look(self, turn: Whole, h: Lanes | float, steps: Whole) -> None:
         """Finish a whole step: remember contacts, count strides, find reactions, check limits."""
+        self._remember(turn, h, steps)
+        model = self.model
+        if model.form.has_limits:
+            # counted from the end, so that limits are always checked at the last step
+            left = steps * model.stages - turn
+            when((turn > 0) & (left % (CHECK_EVERY * model.stages) == 0))(self._check_limits)
+
+    def _remember(self, turn: Whole, h: Lanes | float, steps: Whole) -> None:
+        """Remember contacts, count strides and find reactions at the end of a whole step."""
         trunk, model = self.trunk, self.model
         structure = self.kind.features.structure
         for i in loop(self.leg_count):
@@ -302,16 +311,14 @@ class Advance:
                 constants, forces = block_at(self.constants, i), block_at(self.forces, i)
                 find = partial(find_reactions, structure, trunk, leg, constants, forces)
                 when((turn > 0) | (steps == 0))(find)
-        if model.form.has_limits:
-            # counted from the end, so that limits are always checked at the last step
-            left = steps * model.stages - turn
 
-            @when((turn > 0) & (left % (CHECK_EVERY * model.stages) == 0))
-            def _() -> None:
-                for i in loop(self.leg_count):
-                    leg, constants = block_at(self.legs, i), block_at(self.constants, i)
-                    check_joints(structure.mechanism, trunk, leg, constants, model)
-                check_trunk(trunk, model)
+    def _check_limits(self) -> None:
+        """Check the limits of joints and trunk."""
+        mechanism = self.kind.features.structure.mechanism
+        for i in loop(self.leg_count):
+            leg, constants = block_at(self.legs, i), block_at(self.constants, i)
+            check_joints(mechanism, self.trunk, leg, constants, self.model)
+        check_trunk(self.trunk, self.model)
 
     def _move(self, stage: Cell, elapsed: Cell, h: Lanes | float, keeps_account: Truth) -> None:
         """Go on to the next stage, or to the next step from the last."""

@@ -616,7 +616,13 @@ class EpisodeBatch:
     def _kernels_of(self, plan: Plan) -> StepKernels:
         """Return the kernels of a plan. Copies of the batch share them, too: kernels with a function from
         outside are traced again, which takes time."""
-        kind = TaskKind(
+        kind = self._kind_of(plan)
+        if kind not in self._kernels:
+            self._kernels[kind] = step_kernels(kind, self.engine.runs_scalar)
+        return self._kernels[kind]
+
+    def _kind_of(self, plan: Plan) -> TaskKind:
+        return TaskKind(
             self.task.terms,
             self.task.entries,
             plan.body.kernels,
@@ -624,9 +630,11 @@ class EpisodeBatch:
             _engine_kind(plan.mechanics, self.task),
             known_of(plan.record),
         )
-        if kind not in self._kernels:
-            self._kernels[kind] = step_kernels(kind, self.engine.runs_scalar)
-        return self._kernels[kind]
+
+    @property
+    def task_kind(self) -> TaskKind:
+        """Kind of the task under the present plan."""
+        return self._kind_of(self.plan)
 
     def _compile(self, kernels: StepKernels) -> None:
         """Compile or load every kernel of a step, and of entries from outside the one that measures them:

@@ -15,6 +15,7 @@ from __future__ import annotations
 import math
 from typing import TypeVar
 
+from hoof_env.simd.machines import CURRENT
 from hoof_env.simd.values import (
     Lanes,
     Number,
@@ -99,6 +100,10 @@ def tanh(x: Lanes) -> Lanes:
 
 def cos_sin(angle: Lanes) -> tuple[Lanes, Lanes]:
     """Return the cosine and sine of `angle` [rad], error below 2e-16 for |angle| < 1e4."""
+    machine, n = CURRENT.machine, angle.n
+    if machine.has_angles:
+        cosine_x, sine_x = machine.cos_sin(angle.x)
+        return Lanes(cosine_x, n), Lanes(sine_x, n)
     shifted = steady(angle * TWO_OVER_PI + ROUNDER)
     turns = shifted - ROUNDER  # quarter turns to the nearest multiple of pi / 2
     # the first product is exact for up to 2^20 quarter turns, so no digits are lost in the difference

@@ -1,0 +1,203 @@
+"""`hoof_env.jax.make`: the same numbers as the kernels, gradients, resets, and refusals. `make test-jax` runs
+this; compiling takes most of the time."""
+
+import gymnasium as gym
+import numpy as np
+import pytest
+
+import hoof_env
+from hoof_env import ParameterError
+from hoof_env.envs.xla import OLDEST
+
+jax = pytest.importorskip("jax", reason="jax is no part of the environment of set-up: make test-jax")
+jnp = jax.numpy
+
+STEPS = 50
+STARTS = 20
+CLOSE = 1e-9
+
+
+@pytest.fixture(autouse=True)
+def doubles():
+    """JAX with doubles, in these tests only."""
+    before = jax.config.jax_enable_x64
+    jax.config.update("jax_enable_x64", True)
+    yield
+    jax.config.update("jax_enable_x64", before)
+
+
+def make(id, **settings):
+    import hoof_env.jax
+
+    return hoof_env.jax.make(f"hoof_env/{id}-v0", **{"starts": 4, **settings})
+
+
+def stepped(env):
+    """A compiled step of many episodes."""
+    return jax.jit(jax.vmap(env.step_env))
+
+
+def largest_differences(id, steps=STEPS, **settings):
+    """Differences from the kernels over some steps from the same starts: of forces by the weight, of all
+    other numbers in the memory by their size, of rewards and of observations; and how many episodes ended."""
+    env, _ = make(id, **settings)
+    state = env.params_of(range(STARTS)).starts
+    envs = gym.make_vec(f"hoof_env/{id}-v0", num_envs=STARTS, autoreset_mode="DISABLED", **settings).unwrapped
+    observations, _ = envs.reset(seed=0)
+    np.testing.assert_array_equal(state.observation, observations)
+    step, keys = stepped(env), jax.random.split(jax.random.key(0), STARTS)
+    generator = np.random.default_rng(1)
+    memory, shape = envs.engine.arrays[0], envs.action_space.shape
+    names = [k for k, name in enumerate(env.engine_names) if name.endswith(("_normal", "_friction"))]
+    assert names
+    found = np.zeros(4)
+    ended = np.zeros(STARTS, bool)
+    for k in range(steps):
+        if k % 5 == 0:
+            actions = generator.uniform(-1, 1, shape).astype(np.float32)
+        observations, rewards, terminated, truncated, _ = envs.step(actions)
+        seen, state, reward, done, info = step(keys, state, actions)
+        np.testing.assert_array_equal(info["terminated"], terminated)
+        np.testing.assert_array_equal(info["truncated"], truncated)
+        np.testing.assert_array_equal(done, terminated | truncated)
+        now = memory[:, :STARTS].T
+        ended = np.asarray(done)
+        apart = np.abs(np.asarray(state.engine) - now)[~ended]
+        here = (
+            (apart[:, names] / envs.weight[~ended, None]).max(initial=0.0),
+            (apart / (1.0 + np.abs(now[~ended]))).max(initial=0.0),
+            np.abs(reward - rewards).max(),
+            np.abs(seen - observations)[~ended].max(initial=0.0),
+        )
+        found = np.maximum(found, here)
+        if ended.any():
+            break
+    return found, k + 1
+
+
+@pytest.mark.parametrize(
+    "id", ["HorseLeg", "HorseLegRail", "HorseLegFixed", "HorseLegSpeed", "HorseLegTerrain", "Horse"]
+)
+def test_the_first_second_is_that_of_the_kernels(id):
+    found, count = largest_differences(id)
+    print(id, count, found)
+    assert count == STEPS
+    assert (found[:3] < CLOSE).all(), found
+    assert found[3] <= 2.0**-20  # single numbers
+
+
+def test_delays_histories_noise_and_motors_are_those_of_the_kernels():
+    found, count = largest_differences(
+        "HorseLeg", 30, action_delay=1.5, observation_delay=1, observation_history=2, last_actions=2,
+        noise={"trunk": 0.1}, drive="motor", hoof_stiffness=2e5, randomize={"friction": (0.2, 0.5)},
+        episode_seconds=0.5,
+    )  # fmt: skip
+    assert count == 25  # and truncated together
+    assert (found[:3] < CLOSE).all(), found
+    assert found[3] <= 2.0**-20
+
+
+def test_a_gradient_through_a_second_is_that_of_differences():
+    env, params = make("HorseLeg")
+    state = jax.tree.map(lambda array: array[0], params.starts)
+    key = jax.random.key(0)
+
+    @jax.jit
+    def travel(action, state=state):
+        def step(state, _):
+            _, state, reward, _, _ = env.step_env(key, state, action)
+            return state, reward
+
+        return jax.lax.scan(step, state, length=10)[1].sum()
+
+    action = jnp.array([0.3, -0.2, 0.1, 0.25])
+    value, slope = jax.value_and_grad(travel)(action)
+    assert np.isfinite(value)
+    assert (slope != 0.0).all()
+    small = 1e-6
+    for k, unit in enumerate(np.eye(4)):
+        by_differences = (travel(action + small * unit) - travel(action - small * unit)) / (2 * small)
+        np.testing.assert_allclose(slope[k], by_differences, rtol=1e-5)
+
+
+def test_an_episode_that_ends_starts_again():
+    env, params = make("HorseLegSpeed", episode_seconds=0.1, target_seconds=0.04)
+    step = jax.jit(jax.vmap(env.step, (0, 0, 0, None)))
+    keys = jax.random.split(jax.random.key(1), 6)
+    observations, state = jax.vmap(env.reset, (0, None))(keys, params)
+    starts = {tuple(row) for row in np.asarray(params.starts.observation)}
+    assert {tuple(row) for row in np.asarray(observations)} <= starts
+    targets = [np.asarray(state.episode[:, env.episode_rows["target"]])]
+    for k in range(1, 11):
+        keys = jax.vmap(lambda key: jax.random.split(key)[0])(keys)
+        observations, state, rewards, done, info = step(keys, state, jnp.zeros((6, 4)), params)
+        assert (np.asarray(done) == (k % 5 == 0)).all()
+        assert observations.dtype == jnp.float32
+        if k % 5 == 0:
+            assert {tuple(row) for row in np.asarray(observations)} <= starts
+            assert not np.array_equal(info["final_obs"], observations)
+        np.testing.assert_allclose(sum(info["terms"].values()), rewards, rtol=1e-12)
+        targets.append(np.asarray(state.episode[:, env.episode_rows["target"]]))
+    assert len(np.unique(np.concatenate(targets[:5]))) > 6  # other speeds are commanded within an episode
+    low, high = 0.5, 5.0
+    assert (np.concatenate(targets) > low).all() & (np.concatenate(targets) < high).all()
+
+
+def test_single_precision_is_near():
+    env, params = make("HorseLeg", dtype="float32")
+    other, others = make("HorseLeg")
+    key = jax.random.key(0)
+    state, twin = (jax.tree.map(lambda array: array[0], each.starts) for each in (params, others))
+    step, step_of_other = jax.jit(env.step_env), jax.jit(other.step_env)
+    for _ in range(10):
+        observation, state, reward, _, _ = step(key, state, jnp.full(4, 0.2, jnp.float32))
+        wanted, twin, reward_of_other, _, _ = step_of_other(key, twin, jnp.full(4, 0.2))
+    assert state.engine.dtype == reward.dtype == jnp.float32
+    np.testing.assert_allclose(observation, wanted, atol=2e-3)
+    np.testing.assert_allclose(reward, reward_of_other, atol=2e-3)
+
+
+@pytest.mark.parametrize(
+    ("id", "settings", "words"),
+    [
+        ("HorseRough", {}, "push_impulse.*give push_impulse=None"),
+        ("HorseLeg", {"pushes": [(0.1, 5.0, 0.0)]}, "pushes: expected None"),
+        ("HorseLegFixed", {"solver": "paper"}, "solver: expected .*paper"),
+        ("HorseLeg", {"cost": {"peak": 1.0}}, "cost: expected None"),
+        ("HorseLeg", {"action_delay": (0, 2)}, "action_delay: expected one number"),
+        ("HorseLeg", {"schedule": {"friction": (0.1, 0.4, 100)}}, "schedule"),
+        ("Nothing", {}, "id: expected one of .*HorseLeg-v0"),
+        ("HorseLeg", {"dtype": "int32"}, "dtype: expected float32 or float64"),
+        ("HorseLeg", {"starts": 0}, "starts"),
+        ("HorseLeg", {"friction": -1.0}, "friction"),
+    ],
+)
+def test_what_is_missing_is_refused_by_name(id, settings, words):
+    with pytest.raises(ParameterError, match=words):
+        make(id, **settings)
+
+
+def test_doubles_are_refused_where_jax_has_none():
+    jax.config.update("jax_enable_x64", False)
+    with pytest.raises(ParameterError, match=r"jax\.config\.update\('jax_enable_x64', True\)"):
+        make("HorseLeg", dtype="float64")
+    env, params = make("HorseLeg")
+    assert params.starts.engine.dtype == jnp.float32
+    assert env.dt == 0.02
+
+
+def test_an_action_of_another_shape_is_refused():
+    env, params = make("HorseLeg")
+    state = jax.tree.map(lambda array: array[0], params.starts)
+    with pytest.raises(ParameterError, match=r"action: expected shape \(4,\), got \(2, 4\); jax.vmap"):
+        env.step_env(jax.random.key(0), state, jnp.zeros((2, 4)))
+
+
+def test_an_old_jax_is_refused(monkeypatch):
+    from hoof_env.envs import xla
+
+    monkeypatch.setattr(jax, "__version_info__", (0, 4, 38))
+    monkeypatch.setattr(jax, "__version__", "0.4.38")
+    with pytest.raises(hoof_env.errors.MissingExtraError, match=r"from version 0\.5\.0 on, got 0\.4\.38"):
+        xla.loaded_jax.__wrapped__()
+    assert OLDEST == (0, 5, 0)
