@@ -88,11 +88,13 @@ def loaded_jax() -> Any:
     try:
         import jax
     except ImportError as error:
-        raise MissingExtraError(f'envs.xla() needs jax: pip install "hoof-env[jax]" ({error})') from None
+        raise MissingExtraError(
+            f'envs.xla() and hoof_env.jax need jax: pip install "hoof-env[jax]" ({error})'
+        ) from None
     version = jax.__version_info__
     if version < OLDEST:
         raise MissingExtraError(
-            f"envs.xla(): expected jax {'.'.join(map(str, OLDEST))} or later, got {jax.__version__}:"
+            f"expected jax {'.'.join(map(str, OLDEST))} or later, got {jax.__version__}:"
             ' pip install -U "hoof-env[jax]"'
         )
     import jax.ffi

@@ -198,6 +198,6 @@ def test_an_old_jax_is_refused(monkeypatch):
 
     monkeypatch.setattr(jax, "__version_info__", (0, 4, 38))
     monkeypatch.setattr(jax, "__version__", "0.4.38")
-    with pytest.raises(hoof_env.errors.MissingExtraError, match=r"from version 0\.5\.0 on, got 0\.4\.38"):
+    with pytest.raises(hoof_env.errors.MissingExtraError, match=r"jax 0\.5\.0 or later, got 0\.4\.38"):
         xla.loaded_jax.__wrapped__()
     assert OLDEST == (0, 5, 0)
