@@ -84,6 +84,7 @@ class HorseLegEnv(LegBase, gym.Env[NDArray[np.float32], NDArray[np.float32]]):
             self._checked if batch.plan.observed.has_user_entries else rows.observations[0].copy,
             batch.measurements.reader(batch.engine.arrays[0][:, 0]),
             batch.plan.costs.keys,
+            name_columns(rows.unweighted[:, 0], batch.term_names).copy,
         )
 
     @property
@@ -138,7 +139,8 @@ class HorseLegEnv(LegBase, gym.Env[NDArray[np.float32], NDArray[np.float32]]):
             raise
         if self.render_mode == "human":
             self.render()
-        info = copy.deepcopy(self._begun[0]()) | {"measured": self._views[-2]()}
+        info = copy.deepcopy(self._begun[0]()) | {"measured": self._views[8]()}
+        info["unweighted"] = self._views[10]()
         if parameters:
             info["parameters"] = name_columns([values[0] for values in parameters.values()], [*parameters])
         return self._checked(), info
@@ -161,7 +163,7 @@ class HorseLegEnv(LegBase, gym.Env[NDArray[np.float32], NDArray[np.float32]]):
         if self._phase != "running":
             self._check_started("step")
             self._warn_ended()
-        buffer, kernel, held, draws, paid, terms, rewards, observe, measure, costs = self._views
+        buffer, kernel, held, draws, paid, terms, rewards, observe, measure, costs, unweigh = self._views
         # A copy from buffer to buffer is the fastest way; it takes float32 arrays of the right shape only.
         try:
             buffer[:] = action
@@ -181,6 +183,7 @@ class HorseLegEnv(LegBase, gym.Env[NDArray[np.float32], NDArray[np.float32]]):
                 info["parameters"] = info["parameters"].copy()  # callers may change their info
             for key, k in paid:
                 info[key] = terms[k]
+            info["unweighted"] = unweigh()
             if costs:
                 info |= self._cost_info()
             failed = truncated = False
@@ -222,6 +225,7 @@ class HorseLegEnv(LegBase, gym.Env[NDArray[np.float32], NDArray[np.float32]]):
         if self.batch.plan.commands.speeds:
             info["target_speed"] = self.batch.rows.named.target[0]
         info |= {"measured": None, **dict.fromkeys(self.batch.terms, np.float64(0.0))}
+        info["unweighted"] = None
         if keys := self.batch.plan.costs.keys:
             info |= dict.fromkeys(("cost", *keys), np.float64(0.0))
         self._began_with = self._start_and_target()

@@ -157,8 +157,8 @@ class Sb3VecEnv(VecEnv):
 
     Attributes:
         terms: terms of the last rewards by name, shape (num_envs,) each.
-        measured: measurements of the last step, shape (num_envs, ...), by position or by name; where an
-            episode ended, at the start of the next one.
+        measured: measurements of the last step, shape (num_envs, ...), by position or by name, also where it
+            ended an episode.
 
     Raises:
         ParameterError: an id without a native vector environment, another autoreset mode than SAME_STEP, or a
@@ -240,19 +240,17 @@ class Sb3VecEnv(VecEnv):
     def step_wait(self) -> Any:
         """Take a control step; return observations, rewards, ends of episodes, and infos."""
         observations, rewards, terminated, truncated, infos = self.envs.step(self._actions)  # type: ignore[arg-type]
-        self.terms = {name: infos[name] for name in self.terms}
-        self.measured = infos["measured"]
         dones = terminated | truncated
         # With SAME_STEP `infos` are already of the next episode where one ended.
         of_step = infos.get("final_info", infos)
+        self.terms = {name: of_step[name] for name in self.terms}
+        self.measured = of_step["measured"]
         each: list[dict[str, Any]] = [RowInfo(of_step, env) for env in range(self.num_envs)]
         if dones.any():
             final = infos["final_info"]
             figures = infos["final_info"]["episode_summary"]
             names = [name for name in figures if not name.startswith("_")]
             reasons = [reason for reason in final["end"] if not reason.startswith("_")]
-            for name in self.terms:
-                self.terms[name] = np.where(dones, final[name], infos[name])
             started = {key: values for key, values in infos.items() if key in self.reset_infos[0]}
             for env in np.flatnonzero(dones):
                 self.reset_infos[env] = row_of(started, int(env))

@@ -135,6 +135,11 @@ class EpisodeBatch:
         return tuple(term.key for term in self.task.terms)
 
     @property
+    def term_names(self) -> tuple[str, ...]:
+        """Names of the reward's terms."""
+        return tuple(term.name for term in self.task.terms)
+
+    @property
     def ended_row(self) -> int:
         """Row of `Episode.ended` in the memory of the episodes."""
         row: int = self.rows.layout.rows("ended").start
@@ -377,6 +382,7 @@ class EpisodeBatch:
         # The full allowance: a leg can bear its weight from the first step on.
         episode.allowance[which] = BEARING * MAX_STRIDE
         episode.terms[:, which] = 0.0
+        self.rows.unweighted[:, which] = 0.0
         episode.sums[:, which] = 0.0
         begins = [row.initial for term in self.task.terms for row in term.state]
         if begins:
@@ -609,6 +615,7 @@ class EpisodeBatch:
             rows.past_actions,
             rows.frames,
             acted if rows.mapped is None else rows.mapped,
+            rows.unweighted,
         )
         held: Held = kernel.parameters[0].hold(dict(zip(ALL_ARRAYS, arrays, strict=True)) | more, columns)
         return held

@@ -159,6 +159,7 @@ class Plan:
             actions=np.zeros((columns, actions), single),
             observations=np.zeros((columns, len(self.observation_names)), single),
             rewards=np.zeros(columns),
+            unweighted=np.zeros((len(self.task.terms), columns)),
             acted=np.zeros((columns, actions), single) if self.delays.has_actions else None,
             mapped=np.zeros((columns, len(self.body.action_names)), single) if self.task.action_map else None,
             past_actions=np.zeros((columns, self.delays.past_actions, actions), single),

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from hoof_env.dynamics.limits import has_moved
 from hoof_env.episodes.scene import Scene, is_from_outside
-from hoof_env.simd import Lanes, Whole, where
+from hoof_env.simd import Lanes, Number, Whole, full, where, write
 from hoof_env.simd.user_functions import foreign
 from hoof_env.tasks.episode import Episode
 from hoof_env.tasks.reward import Outcome, Term
@@ -17,24 +17,33 @@ def is_user_term(term: Term) -> bool:
 
 
 def compute_reward(scene: Scene, outcome: Outcome, n: Whole) -> Lanes:
-    """Compute the terms, keep them in `episode.terms`, and return their sum."""
+    """Compute the terms, keep them in `episode.terms`, and with a weight of 1 in the array `unweighted`;
+    return their sum."""
     episode = scene.episode(n)
     total = scene.zeros(n)
     for k, term in enumerate(scene.kind.terms):
+        weight = scene.task.weights[k]
+        one = full(1.0, 0)
         if is_user_term(term):
-            number = compute_user_term(scene, term, k, outcome, n)
+            number, unweighted = compute_user_term(scene, term, (weight, one), outcome, n)
         else:
-            number = term.compute(outcome, scene.task.weights[k])
+            number, unweighted = (term.compute(outcome, each) for each in (weight, one))
         # + 0.0 makes 0 of the -0 that a weight of 0 gives
         episode.terms[k] = number + 0.0
         if is_user_term(term):
             clear_failed(outcome, episode, k)
+            unweighted = where(has_moved(outcome.trunk.result), unweighted, 0.0)
+        # a term may be a number that is known before the kernel runs
+        write(scene.zeros(n) + unweighted, scene.unweighted, k * scene.columns + n, 1)
         total = episode.terms[k] if k == 0 else total + episode.terms[k]
     return total
 
 
-def compute_user_term(scene: Scene, term: Term, k: int, outcome: Outcome, n: Whole) -> Lanes:
-    """Return a term from outside this package, which may have constants and keep rows.
+def compute_user_term(
+    scene: Scene, term: Term, weights: tuple[Number, Number], outcome: Outcome, n: Whole
+) -> tuple[Lanes, Lanes]:
+    """Return a term from outside this package, which may have constants and keep rows, under two weights. The
+    rows are those of the first.
 
     The rows that it keeps have their former values where the engine failed: what it read there may be NaN.
     """
@@ -43,11 +52,15 @@ def compute_user_term(scene: Scene, term: Term, k: int, outcome: Outcome, n: Who
     before = [now[row] for row in range(count)]
     stateful = term.name if term.state else ""
     compute = foreign(term.title, term.compute, stateful=stateful, legs=scene.layouts.legs)
-    found: Lanes = compute(outcome, scene.task.weights[k], *scene.constants(term.constants))
+    found: Lanes = compute(outcome, weights[0], *scene.constants(term.constants))
+    after = [now[row] for row in range(count)]
+    for row in range(count):
+        now[row] = before[row]
+    other: Lanes = compute(outcome, weights[1], *scene.constants(term.constants))
     works = has_moved(outcome.trunk.result)
     for row in range(count):
-        now[row] = where(works, now[row], before[row])
-    return found
+        now[row] = where(works, after[row], before[row])
+    return found, other
 
 
 def clear_failed(outcome: Outcome, episode: Episode, k: int) -> None:

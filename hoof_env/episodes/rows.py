@@ -45,6 +45,7 @@ class Rows:
         episode: memory of the episodes, rows of `episode.Episode`, shape (numbers, columns).
         actions, observations, rewards: input and output of a step, shapes (columns, actions), (columns,
             numbers) and (columns,).
+        unweighted: terms of the last reward, each with a weight of 1, shape (terms, columns).
         acted: actions that act now, shape (columns, actions); None where nothing delays `actions`.
         mapped: actions of the body, shape (columns, its actions); None without a user's map.
         past_actions: last actions, the newest first, shape (columns, number, actions); empty where they are
@@ -68,6 +69,7 @@ class Rows:
     actions: Annotated[NDArray[np.float32], Declared(0)]
     observations: Annotated[NDArray[np.float32], Declared(0, is_written=True)]
     rewards: Annotated[Floats, Declared(0, is_written=True)]
+    unweighted: Annotated[Floats, Declared(-1, is_written=True)]
     acted: Annotated[NDArray[np.float32] | None, Declared(0, is_written=True)]
     mapped: Annotated[NDArray[np.float32] | None, Declared(0, is_written=True)]
     past_actions: Annotated[NDArray[np.float32], Declared(0, is_written=True, is_saved=True)]

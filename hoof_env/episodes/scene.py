@@ -28,10 +28,11 @@ STEP_ARRAYS = {
     "past_actions": "f4",
     "frames": "f4",
     "mapped": "f4",
+    "unweighted": "f8",
 }
 """Types of the arrays of a step, besides the engine's. `acted` are the actions that act now, the same
 array as `actions` where nothing delays them; `mapped` are actions of the body, the same array as `acted`
-without a user's map."""
+without a user's map. `unweighted` are the reward's terms with a weight of 1, shape (terms, columns)."""
 
 CHANGING = ("episode_steps", "substeps", "part_substeps", "is_noisy")
 """Whole numbers and booleans of a task's record that kernels read when they run: settings may change them."""
@@ -162,7 +163,8 @@ class Scene:
         lanes: number of rows side by side.
         given: arrays of the kernel.
         task: record of the task.
-        actions, acted, mapped, past_actions, observations, frames, rewards: pointers to the arrays.
+        actions, acted, mapped, past_actions, observations, frames, rewards, unweighted: pointers to the
+            arrays.
     """
 
     def __init__(self, kind: TaskKind, given: Given, lanes: int) -> None:
@@ -182,6 +184,7 @@ class Scene:
         self.observations: Pointer = given.observations.first
         self.frames: Pointer = given.frames.first
         self.rewards: Pointer = given.rewards.first
+        self.unweighted: Pointer = given.unweighted.first
 
     @property
     def columns(self) -> Whole:

@@ -60,8 +60,8 @@ def infos_of(batch: EpisodeBatch, ended: bool = True) -> dict[str, NDArray[Any]]
         ended: False if no episode ended, so that all environments were simulated.
 
     Returns:
-        Arrays by name, shape (num_envs,); "gait", "measured" and "parameters" are `NamedArray` of shape
-        (num_envs, numbers).
+        Arrays by name, shape (num_envs,); "gait", "measured", "unweighted" and "parameters" are
+        `NamedArray` of shape (num_envs, numbers).
     """
     n = batch.num_envs
     values = batch.rows.start_values.copy()
@@ -84,6 +84,7 @@ def infos_of(batch: EpisodeBatch, ended: bool = True) -> dict[str, NDArray[Any]]
         infos["target_speed"] = batch.rows.named.target[:n].copy()
     infos["measured"] = measured.T.view(batch.measurements.kind)
     infos.update(zip(batch.terms, batch.rows.named.terms[:, :n].copy(), strict=True))
+    infos["unweighted"] = name_columns(batch.rows.unweighted[:, :n].T.copy(), batch.term_names)
     if batch.plan.costs.limits:
         infos["cost"] = batch.rows.costs.sum(axis=0)
         infos.update(zip(batch.plan.costs.keys, batch.rows.costs.copy(), strict=True))

@@ -38,7 +38,7 @@ def test_reset_and_step_have_the_same_keys_of_numpys_numbers(env_id, settings):
     if env.unwrapped.settings.target_speed is not None:
         more.add("target_speed")
     for info in infos:
-        assert set(info) == {*start, "gait", "measured", *terms, *more}
+        assert set(info) == {*start, "gait", "measured", "unweighted", *terms, *more}
         for key, value in info.items():
             assert isinstance(value, np.float64 | np.ndarray), key
             assert value.dtype == np.float64
@@ -82,7 +82,7 @@ def test_gymnasiums_vector_environments_stack_them(kind):
     theirs.reset(seed=0), ours.reset(seed=0)
     for taken in actions(0, 6, 2):
         one, two = theirs.step(taken)[4], ours.step(taken)[4]
-        for key in ("gait", "measured", "parameters", *START, *TERMS):
+        for key in ("gait", "measured", "unweighted", "parameters", *START, *TERMS):
             assert one[f"_{key}"].all()
             same(one[key], two[key])
     theirs.close()
@@ -144,7 +144,7 @@ def test_infos_are_nobody_elses():
     infos = [env.reset(seed=0)[1], *(env.step(taken)[4] for taken in actions(0, 5))]
     kept = copy.deepcopy(infos)
     for k in (0, 2):
-        for key in ("gait", "measured", "parameters"):
+        for key in ("gait", "measured", "unweighted", "parameters"):
             infos[k][key][:] = -1.0
         env.step(actions(0))
         same(env.step(actions(0))[4]["gait"], kept[1]["gait"])
