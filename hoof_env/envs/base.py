@@ -491,12 +491,18 @@ class LegBase:
     @property
     def terms(self) -> tuple[str, ...]:
         """Keys of the reward's terms in infos."""
-        return self.batch.terms
+        return tuple(term.key for term in self.task.terms if not term.is_cost)
+
+    @property
+    def costs(self) -> tuple[str, ...]:
+        """Keys of the costs in infos, of which `info["cost"]` is the sum."""
+        return self.batch.plan.costs.keys
 
     @property
     def weights(self) -> dict[str, float]:
         """Weights of the reward's terms by name."""
-        return dict(self.batch.plan.weights)
+        weights = self.batch.plan.weights
+        return {term.name: weights[term.name] for term in self.task.terms if not term.is_cost}
 
     @property
     def episode_seconds(self) -> float:

@@ -157,7 +157,10 @@ def observed(task: Task) -> list[observation.Entry]:
 def rewards(task: Task) -> Table:
     """Return the terms of the reward with their weights."""
     weights = check_weights(task.settings({}).reward_weights, task.terms)
-    rows: list[tuple[str, ...]] = [(t.name, f"{weights[t.name]:g}", t.unit, t.meaning) for t in task.terms]
+    rows: list[tuple[str, ...]] = []
+    for term in task.terms:
+        also = "; a cost, no part of the reward" if term.is_cost else ""
+        rows.append((term.name, f"{weights[term.name]:g}", term.unit, term.meaning + also))
     return Table(("Term", "Weight", "Unit", "Meaning"), rows)
 
 

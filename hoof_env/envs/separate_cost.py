@@ -24,15 +24,14 @@ class SeparateCost(gym.Wrapper[Any, Any, Any, Any], RecordConstructorArgs):
     0.0
 
     Args:
-        env: environment of this package, wrapped or not, made with `cost`.
+        env: environment of this package, wrapped or not, made with `cost` or with costs of its task.
 
     Raises:
         ParameterError: the environment has no costs.
     """
 
     def __init__(self, env: gym.Env[Any, Any]) -> None:
-        settings = getattr(env.unwrapped, "settings", None)
-        if not getattr(settings, "cost", None):
+        if not getattr(env.unwrapped, "costs", ()):
             raise ParameterError(
                 "env: expected an environment with limits, as gymnasium.make('hoof_env/HorseLeg-v0',"
                 f" cost={{'peak': 1500.0}}), got {type(env.unwrapped).__name__} without cost"

@@ -131,12 +131,12 @@ class EpisodeBatch:
 
     @property
     def terms(self) -> tuple[str, ...]:
-        """Keys of the reward's terms in infos."""
+        """Keys of the terms in infos, costs included."""
         return tuple(term.key for term in self.task.terms)
 
     @property
     def term_names(self) -> tuple[str, ...]:
-        """Names of the reward's terms."""
+        """Names of the terms, costs included."""
         return tuple(term.name for term in self.task.terms)
 
     @property
@@ -401,7 +401,7 @@ class EpisodeBatch:
 
     def end_step(self, happened: int, generators: Generators, idle: NDArray[np.bool_] | None = None) -> bool:
         """Do what follows `run_kernels` in a `step`."""
-        if self.plan.costs.limits:
+        if self.plan.costs.names:
             self.plan.costs.add(self.rows, self.engine)
         # A step between two episodes does not count.
         if idle is not None:

@@ -14,7 +14,9 @@ from hoof_env.dynamics.engine import TrunkEngine
 from hoof_env.dynamics.layout import Features, engine_layout, stride_sums
 from hoof_env.dynamics.parts import broken
 from hoof_env.episodes.rows import Rows
-from hoof_env.errors import ParameterError, check_number
+from hoof_env.errors import ParameterError, brief, check_number
+from hoof_env.tasks.registry import Task
+from hoof_env.tasks.reward import MAX_STRIDE
 from hoof_env.tasks.settings import ResolvedSettings
 
 Floats = NDArray[np.float64]
@@ -30,8 +32,16 @@ COSTS = {
         "N/s",
         "increase of the stances' steepest rises of the normal force above the limit [N/s]",
     ),
+    "leaning": (
+        "-",
+        "1 in a step in which the leg owes more than it must bear in a second: each step adds the share of"
+        " the weight that is the limit [-], what the leg bears repays it, and more than a second is forgiven",
+    ),
 }
 """Costs by name: unit and meaning. The resultant force is that of the hoof with the highest one."""
+
+LEANING = ("suspended", "rail")
+"""Kinds of trunk of which something else than the legs can bear a part of the weight."""
 
 
 @cache
@@ -44,38 +54,57 @@ def memory_rows(features: Features, legs: int, name: str) -> NDArray[np.int64]:
 
 @dataclass(frozen=True)
 class Costs:
-    """Limits of costs.
+    """Costs of a task: those with limits, then those of its own terms.
 
     Attributes:
         limits: limit of each cost, by names of `COSTS`.
+        own: place of each of the task's own costs among its terms, by name.
+        dt: control step [s].
     """
 
     limits: Mapping[str, float]
+    own: Mapping[str, int]
+    dt: float
 
     @classmethod
-    def of(cls, s: ResolvedSettings) -> Costs:
+    def of(cls, s: ResolvedSettings, task: Task, dt: float) -> Costs:
         """Return the costs of settings.
 
         Raises:
-            ParameterError: not a mapping, an unknown cost, or a limit that is not a number from 0.
+            ParameterError: not a mapping, an unknown cost, one that the task has under this name, one that
+                means nothing for its trunk, or a limit out of range.
         """
         given = {} if s.cost is None else s.cost
+        own = {term.name: k for k, term in enumerate(task.terms) if term.is_cost}
         if not isinstance(given, Mapping) or not set(given) <= set(COSTS):
             raise ParameterError(
-                f"cost: expected a mapping with limits of some of {', '.join(COSTS)}, got {s.cost!r}"
+                f"cost: expected a mapping with limits of some of {', '.join(COSTS)}, got {brief(s.cost)}"
             )
-        limits = {name: check_number(f"cost[{name!r}]", limit, low=0.0) for name, limit in given.items()}
-        return cls(limits)
+        if twice := sorted(set(given) & set(own)):
+            raise ParameterError(
+                f"cost: expected none of the names of the task's own costs, got {', '.join(twice)}"
+            )
+        if "leaning" in given and s.trunk not in LEANING:
+            raise ParameterError(
+                f"cost['leaning']: expected a trunk that is {' or '.join(LEANING)}, got a {s.trunk} one, of"
+                f" which {'no weight is borne' if s.trunk == 'fixed' else 'the legs bear all weight'}"
+            )
+        highest = {"leaning": 1.0}
+        limits = {
+            name: check_number(f"cost[{name!r}]", limit, low=0.0, high=highest.get(name, np.inf))
+            for name, limit in given.items()
+        }
+        return cls(limits, own, dt)
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names of all costs, in the order of their rows."""
+        return (*self.limits, *self.own)
 
     @property
     def keys(self) -> tuple[str, ...]:
         """Keys in infos and summaries: of each cost."""
-        return tuple(f"cost_{name}" for name in self.limits)
-
-    @property
-    def rises(self) -> bool:
-        """True if the steepest rises of stances are needed."""
-        return "loading" in self.limits
+        return tuple(f"cost_{name}" for name in self.names)
 
     def begin(
         self,
@@ -88,6 +117,7 @@ class Costs:
         rows.costs[:, which] = 0.0
         rows.cost_sums[:, which] = 0.0
         rows.stance_rises[:, which] = 0.0
+        rows.debts[:, which] = 0.0
 
     def add(self, rows: Rows, engine: TrunkEngine) -> None:
         """Compute the costs of a control step, after its kernel, and add them up. A row between two episodes
@@ -113,12 +143,21 @@ class Costs:
                 rows.cost_sums[k] = np.where(counts, excess, rows.cost_sums[k])
             elif name == "loading":
                 cost = self._add_rises(rows, sums("loading_rate_increase"), sums("stances"), limit, counts)
+            elif name == "leaning":
+                borne = sums("normal_impulse").sum(axis=0) / rows.named.weight[:n]
+                most = limit * MAX_STRIDE
+                debts = np.maximum(rows.debts[0] + limit * self.dt - borne, 0.0)
+                rows.debts[0] = np.where(counts, np.minimum(debts, most), rows.debts[0])
+                cost = np.where(debts > most, 1.0, 0.0)
             else:
                 over = highest - limit
                 cost = np.maximum(over, 0.0) if name == "excess" else np.where(over > 0.0, 1.0, 0.0)
             rows.costs[k] = np.where(counts, cost, 0.0)
             if name != "peak":
                 rows.cost_sums[k] += rows.costs[k]
+        first = len(self.limits)
+        rows.costs[first:] = rows.named.terms[[*self.own.values()], :n]  # 0 where a step failed
+        rows.cost_sums[first:] += rows.costs[first:]
 
     def _add_rises(
         self, rows: Rows, increases: Floats, stances: Floats, limit: float, counts: NDArray[np.bool_]

@@ -168,9 +168,10 @@ class Plan:
             steps_before=np.zeros(num_envs),
             has_overrides=np.zeros(num_envs, bool),
             pushes=pushes,
-            costs=np.zeros((len(self.costs.limits), num_envs)),
-            cost_sums=np.zeros((len(self.costs.limits), num_envs)),
-            stance_rises=np.zeros((self.legs if self.costs.rises else 0, num_envs)),
+            costs=np.zeros((len(self.costs.names), num_envs)),
+            cost_sums=np.zeros((len(self.costs.names), num_envs)),
+            stance_rises=np.zeros((self.legs if "loading" in self.costs.limits else 0, num_envs)),
+            debts=np.zeros((int("leaning" in self.costs.limits), num_envs)),
         )
 
     def __deepcopy__(self, memo: dict[int, Any]) -> Plan:
@@ -222,7 +223,7 @@ def make_plan(
     strength = Strength.of(s, schedule)
     pushes = Pushes.of(s, dt, steps)
     delays = Delays.of(s, substeps, steps)
-    costs = Costs.of(s)
+    costs = Costs.of(s, task, dt)
     contexts = Contexts.of(s, {**given, **schedule})
     if flag("context_visible", s.context_visible) and CONTEXT not in groups:
         groups = (*groups, CONTEXT)

@@ -18,9 +18,9 @@ def is_user_term(term: Term) -> bool:
 
 def compute_reward(scene: Scene, outcome: Outcome, n: Whole) -> Lanes:
     """Compute the terms, keep them in `episode.terms`, and with a weight of 1 in the array `unweighted`;
-    return their sum."""
+    return the sum of all but the costs."""
     episode = scene.episode(n)
-    total = scene.zeros(n)
+    total: Lanes | None = None
     for k, term in enumerate(scene.kind.terms):
         weight = scene.task.weights[k]
         one = full(1.0, 0)
@@ -35,8 +35,9 @@ def compute_reward(scene: Scene, outcome: Outcome, n: Whole) -> Lanes:
             unweighted = where(has_moved(outcome.trunk.result), unweighted, 0.0)
         # a term may be a number that is known before the kernel runs
         write(scene.zeros(n) + unweighted, scene.unweighted, k * scene.columns + n, 1)
-        total = episode.terms[k] if k == 0 else total + episode.terms[k]
-    return total
+        if not term.is_cost:
+            total = episode.terms[k] if total is None else total + episode.terms[k]
+    return scene.zeros(n) if total is None else total
 
 
 def compute_user_term(

@@ -60,6 +60,8 @@ class Rows:
         costs, cost_sums: costs of the last step and of the episode so far, shape (costs, num_envs).
         stance_rises: steepest rise of the normal force in the present stance of each leg [N/s], shape (legs,
             num_envs); no rows without a cost of them.
+        debts: weight that the legs must bear and have not borne, over the weight [s], shape (1, num_envs); no
+            row without a cost of it.
         named: views of `episode` by name.
     """
 
@@ -81,6 +83,7 @@ class Rows:
     costs: Annotated[Floats, Declared(-1, is_saved=True)]
     cost_sums: Annotated[Floats, Declared(-1, is_saved=True)]
     stance_rises: Annotated[Floats, Declared(-1, is_saved=True)]
+    debts: Annotated[Floats, Declared(-1, is_saved=True)]
     named: Any = field(init=False, repr=False)
 
     def __post_init__(self) -> None:

@@ -20,7 +20,7 @@ from hoof_env.tasks.settings import Settings, to_json
 
 Floats = NDArray[np.float64]
 
-COSTS = ("costs", "cost_sums", "stance_rises")
+COSTS = ("costs", "cost_sums", "stance_rises", "debts")
 """Arrays of `Rows` about costs."""
 
 UNBOUNDED = frozenset({"target", "switch", "next_target", "commanded", "push_at", "own", "terms"})
@@ -300,16 +300,22 @@ def _read_costs(batch: EpisodeBatch, name: str, given: Any) -> Floats:
     """Return costs in a state.
 
     Raises:
-        ParameterError: not numbers from 0, or another shape.
+        ParameterError: not numbers, below 0 except of a task's own costs, or another shape.
     """
     expected = batch.rows.get(name).shape
     try:
         values = np.asarray(given, np.float64)
     except (TypeError, ValueError):
         values = np.array(np.nan)
-    if values.shape != expected or not ((values >= 0.0) & np.isfinite(values)).all():
+    count = len(batch.plan.costs.limits) if name in ("costs", "cost_sums") else None
+    if values.shape != expected or np.isnan(values).any() or not _are_costs(values[:count]):
         raise ParameterError(f"state[{name!r}]: expected numbers from 0, shape {expected}")
     return values
+
+
+def _are_costs(values: Floats) -> bool:
+    """Return whether numbers can be costs with limits."""
+    return bool(((values >= 0.0) & np.isfinite(values)).all())
 
 
 def _read_seen(batch: EpisodeBatch, name: str, given: Any) -> NDArray[np.float32]:

@@ -43,7 +43,7 @@ def vector_reward(info: Mapping[str, Any], terms: tuple[Term, ...] = TERMS) -> N
         terms: terms of the reward of the task.
     """
     sums = [sum(info[term.key] for term in terms if term.objective == name) for name in OBJECTIVES]
-    shared = np.asarray(sum(info[term.key] for term in terms if term.objective is None))
+    shared = np.asarray(sum(info[term.key] for term in terms if term.objective is None and not term.is_cost))
     part = np.asarray(shared / len(OBJECTIVES), np.float32)
     rewards: NDArray[np.float32] = np.stack(sums, axis=-1).astype(np.float32) + part[..., np.newaxis]
     return rewards
@@ -89,4 +89,5 @@ def scalar_weights(
     by_objective: dict[str | None, float] = {None: float(factors.mean())}
     by_objective.update(zip(OBJECTIVES, factors.tolist(), strict=True))
     usual = check_weights(weights, terms)
-    return {term.name: by_objective[term.objective] * usual[term.name] for term in terms}
+    paid = [term for term in terms if not term.is_cost]
+    return {term.name: by_objective[term.objective] * usual[term.name] for term in paid}

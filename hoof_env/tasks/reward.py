@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from hoof_env.errors import ParameterError, brief, check_choice, check_number
+from hoof_env.errors import ParameterError, brief, check_choice, check_number, flag
 from hoof_env.simd import Lanes, Number, absolute, maximum, minimum, where
 from hoof_env.simd.user_functions import inputs
 from hoof_env.tasks.user_parts import Constant, TermState, check_arguments, check_parts
@@ -138,6 +138,8 @@ class Term:
         constants: further arguments of `compute`, which the setting `constants` changes.
         state: numbers that last from step to step of an episode: `compute` reads and sets them, as
             `step.episode.own.<term>.<name>`; entries read them, too.
+        is_cost: True for a cost, which is no part of the reward: the key in infos is "cost_" followed by the
+            name, and `reward_weights` cannot change its weight.
         objective: one of `OBJECTIVES`, to which `HorseLegMO-v0` adds the term; None divides it among all in
             equal parts.
 
@@ -145,7 +147,7 @@ class Term:
 
     Raises:
         ParameterError: the name is missing, the weight is out of range, `compute` is not a function of two
-            arguments, or the objective is unknown.
+            arguments, the objective is unknown, or a cost has one.
     """
 
     name: str
@@ -156,10 +158,13 @@ class Term:
     objective: str | None = None
     constants: Sequence[Constant] = ()
     state: Sequence[TermState] = ()
+    is_cost: bool = False
 
     def __post_init__(self) -> None:
         if not isinstance(self.name, str) or not self.name:
             raise ParameterError(f"name: expected a string, got {brief(self.name)}")
+        if flag(f"{self.title}: is_cost", self.is_cost) and self.objective is not None:
+            raise ParameterError(f"{self.title}: objective: expected none of a cost, got {self.objective!r}")
         check_number(f"{self.title}: weight", self.weight, low=0, high=1e6)
         # Without one the term is divided among all objectives.
         if self.objective is not None:
@@ -180,7 +185,7 @@ class Term:
     @property
     def key(self) -> str:
         """Key of the term in infos."""
-        return f"reward_{self.name}"
+        return f"cost_{self.name}" if self.is_cost else f"reward_{self.name}"
 
 
 TERMS = (
@@ -248,17 +253,18 @@ TERMS = (
 
 
 def check_weights(changes: Mapping[str, float] | None, terms: tuple[Term, ...] = TERMS) -> dict[str, float]:
-    """Return the weights of all terms by name: the terms' defaults with `changes`.
+    """Return the weights of all terms by name, costs included: the terms' defaults with `changes`.
 
     Raises:
-        ParameterError: an unknown term, or a weight out of range.
+        ParameterError: an unknown term, a cost, or a weight out of range.
     """
     weights = {term.name: term.weight for term in terms}
     if changes is None:
         return weights
-    if not isinstance(changes, Mapping) or not set(changes) <= set(weights):
+    paid = [term.name for term in terms if not term.is_cost]
+    if not isinstance(changes, Mapping) or not set(changes) <= set(paid):
         raise ParameterError(
-            f"reward_weights: expected a mapping with some of {', '.join(weights)}, got {brief(changes)}"
+            f"reward_weights: expected a mapping with some of {', '.join(paid)}, got {brief(changes)}"
         )
     weights |= changes
     return {

@@ -494,8 +494,12 @@ class Settings:
     cost: Annotated[
         Mapping[str, float] | None,
         About(
-            "N, N/s",
+            "N, N/s, -",
             (
+                "limits of the costs `peak`, `excess`, `indicator` [N], `loading` [N/s] and `leaning` [-] in "
+                "infos, which are no part of the reward"
+            ),
+            of_horse=(
                 "limits of the costs `peak`, `excess`, `indicator` [N] and `loading` [N/s] in infos, which "
                 "are no part of the reward"
             ),

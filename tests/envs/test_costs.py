@@ -180,7 +180,8 @@ def test_a_step_with_six_values():
 @pytest.mark.parametrize(
     ("cost", "message"),
     [
-        ({"force": 1.0}, "cost: expected .*peak, excess, indicator, loading, got .*force"),
+        ({"force": 1.0}, "cost: expected .*peak, excess, indicator, loading, leaning, got .*force"),
+        ({"leaning": 1.2}, r"cost\['leaning'\]: expected .*\[0, 1\], got 1.2"),
         ({"peak": -1.0}, r"cost\['peak'\]: expected .*got -1"),
         ({"peak": "high"}, r"cost\['peak'\]: expected .*got 'high'"),
         (1500.0, "cost: expected a mapping .*got 1500"),
@@ -189,7 +190,107 @@ def test_a_step_with_six_values():
 def test_refused_costs(cost, message):
     with pytest.raises(ParameterError, match=message):
         gym.make(LEG, cost=cost)
-    assert len(COSTS) == 4
+    assert set(COSTS) == {*LIMITS, "leaning"}
+
+
+@pytest.mark.parametrize(("env_id", "trunk"), [("hoof_env/HorseLegFixed-v0", "fixed"), (HORSE, "free")])
+def test_leaning_is_refused_where_nothing_can_be_leant_on(env_id, trunk):
+    with pytest.raises(
+        ParameterError, match=rf"cost\['leaning'\]: expected .*suspended or rail, got a {trunk}"
+    ):
+        gym.make(env_id, cost={"leaning": 0.5})
+
+
+def test_leaning_counts_what_is_owed_beyond_a_second():
+    """Before the first step beyond it, what a queue of such arrivals and departures holds (Lindley); over the
+    episode, steps beyond it make up for what is missing in the sums of the whole episode."""
+    share, env = 0.9, gym.make(LEG, cost={"leaning": 0.9})
+    infos = played(env, 500, seed=3)
+    weight, dt = env.unwrapped.weight, env.unwrapped.dt
+    net = np.cumsum([share * dt - info["measured"]["normal_impulse"] / weight for info in infos])
+    owed = net - np.minimum(np.minimum.accumulate(net), 0.0)
+    found = np.array([info["cost_leaning"] for info in infos])
+    first = np.flatnonzero(found)[0]
+    assert first == np.flatnonzero(owed > share)[0]
+    forgiven = net[-1] - share  # at least: what was owed at the end may be less than a second
+    assert found.sum() * share * dt >= forgiven > 0.0
+    assert 0 < found.sum() == env.unwrapped.episode_summary()["cost_leaning"] < 500
+
+
+def hoof_speed(step, weight):
+    """Return how fast the hoof slides while it is loaded, a cost."""
+    return weight * abs(step.leg.report.toe.slide) * np.where(step.leg.strides.normal_force > 100.0, 1.0, 0.0)
+
+
+SLIDING = hoof_env.Term("sliding", 2.0, "s/m", "speed of a loaded toe", hoof_speed, is_cost=True)
+
+
+@pytest.fixture(scope="module")
+def own_id():
+    hoof_env.register("tests/Sliding-v0", terms=[SLIDING])
+    return "tests/Sliding-v0"
+
+
+def test_a_cost_of_ones_own_is_no_part_of_the_reward(own_id):
+    env, base, limited = gym.make(own_id), gym.make(LEG), gym.make(own_id, cost={"indicator": 700.0})
+    for each in (env, base, limited):
+        each.reset(seed=2)
+    total = both = 0.0
+    for taken in np.random.default_rng(0).uniform(-1, 1, (300, 4)).astype(np.float32):
+        one, other, third = (each.step(taken) for each in (env, base, limited))
+        assert one[1] == other[1] == third[1]
+        info = one[4]
+        measured = info["measured"]
+        expected = 2.0 * abs(measured["toe_slide"]) * (measured["normal_force"] > 100.0)
+        assert info["cost"] == info["cost_sliding"] == pytest.approx(expected, rel=1e-12)
+        assert info["unweighted"]["sliding"] == pytest.approx(expected / 2.0, rel=1e-12)
+        assert third[4]["cost"] == third[4]["cost_indicator"] + info["cost"]
+        assert not {"reward_sliding", "cost_indicator"} & set(info)
+        total, both = total + info["cost"], both + third[4]["cost"]
+    assert 0.0 < total < both
+    assert env.unwrapped.episode_summary()["cost_sliding"] == pytest.approx(total, rel=1e-9)
+    assert env.unwrapped.costs == ("cost_sliding",)
+    assert "cost_sliding" not in env.unwrapped.terms
+    assert "sliding" not in env.unwrapped.weights
+    assert len(hoof_env.SeparateCost(env).step(taken)) == 6
+
+
+def test_a_cost_of_ones_own_in_every_form(own_id):
+    settings = {"episode_seconds": 0.3, "cost": {"peak": 500.0}}
+    many = gym.make_vec(own_id, num_envs=2, autoreset_mode="SAME_STEP", **settings)
+    sb3, alone = hoof_env.Sb3VecEnv(own_id, num_envs=2, **settings), gym.make(own_id, **settings)
+    many.reset(seed=1), sb3.seed(1), sb3.reset(), alone.reset(seed=1)
+    twin = gym.make(own_id, **settings).unwrapped
+    total = 0.0
+    for k, taken in enumerate(np.random.default_rng(3).uniform(-1, 1, (45, 2, 4)).astype(np.float32)):
+        *_, over, info = alone.step(taken[0])
+        infos, (row, _) = many.step(taken)[4], sb3.step(taken)[3]
+        there = infos["final_info"] if over else infos
+        for key in ("cost", "cost_peak", "cost_sliding"):
+            assert info[key] == there[key][0] == row[key]
+        total += info["cost_sliding"]
+        if k > 20:
+            assert twin.step(taken[0])[4]["cost_sliding"] == info["cost_sliding"]
+        if over:
+            assert info["episode_summary"]["cost_sliding"] == row["episode_summary"]["cost_sliding"]
+            alone.reset()
+            twin.set_state(alone.unwrapped.get_state())
+        elif k == 20:
+            twin.set_state(alone.unwrapped.get_state())
+    assert total > 0.0
+
+
+def test_refusals_of_ones_own_costs(own_id):
+    with pytest.raises(ParameterError, match=r"reward_weights: expected .*loading, got .*sliding"):
+        gym.make(own_id, reward_weights={"sliding": 0.0})
+    with pytest.raises(ParameterError, match="'sliding': objective: expected none of a cost, got 'energy'"):
+        hoof_env.Term("sliding", 1.0, "-", "", hoof_speed, objective="energy", is_cost=True)
+    with pytest.raises(ParameterError, match="'sliding': is_cost: expected True or False, got 'yes'"):
+        hoof_env.Term("sliding", 1.0, "-", "", hoof_speed, is_cost="yes")
+    peak = hoof_env.Term("peak", 1.0, "-", "", hoof_speed, is_cost=True)
+    hoof_env.register("tests/Peak-v0", terms=[peak])
+    with pytest.raises(ParameterError, match=r"cost: expected none of .*own costs, got peak"):
+        gym.make("tests/Peak-v0", cost={"peak": 1.0})
 
 
 def test_a_state_with_other_costs_is_refused():
