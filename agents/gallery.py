@@ -121,7 +121,8 @@ def returns_of(env_id: str, random: float) -> dict[str, Any]:
     played = STANDS_FOR.get(env_id, env_id)
     found = {"random": round(random, 4), **{k: round(v, 4) for k, v in stock_return(played).items()}}
     scored = shipped_returns(env_id.rpartition("/")[2])
-    learnt = learning_of([row for row in read_curves(CURVES) if row["env_id"] == env_id], scored["blind"])
+    rows = [row for row in read_curves(CURVES) if row["env_id"] == env_id]
+    learnt = learning_of(rows, scored["blind"]) if rows else {}
     return found | ({"learnt": learnt} if learnt else {})
 
 

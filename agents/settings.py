@@ -5,6 +5,7 @@ from __future__ import annotations
 import ast
 from collections.abc import Mapping
 from dataclasses import dataclass
+from importlib import import_module
 from pathlib import Path
 from typing import Any, Literal
 
@@ -16,17 +17,19 @@ from hoof_env.errors import DataFileError
 from hoof_env.policies.saved import ALGORITHMS as ALGORITHMS
 from hoof_env.policies.saved import algorithm_class as library_class
 
-Algorithm = Literal["ppo", "ppo_flat", "sac", "td3", "tqc"]  # `ALGORITHMS` and our own, for the commands
+Algorithm = Literal["ppo", "ppo_flat", "ppo_lagrangian", "sac", "td3", "tqc"]
+"""Names of `ALGORITHMS` and our own, for the commands."""
+
+OWN = {"ppo_flat": "FlatPPO", "ppo_lagrangian": "LagrangianPPO"}
+"""Classes of our own algorithms, each in the module of its name."""
 
 
 def algorithm_class(name: str) -> Any:
-    """Return the class of an algorithm, that of `agents.ppo_flat` or one of `saved.algorithm_class`."""
-    if name != "ppo_flat":
+    """Return the class of an algorithm, one of this folder's or one of `saved.algorithm_class`."""
+    if name not in OWN:
         return library_class(name)
     with paused():
-        from agents.ppo_flat import FlatPPO
-
-    return FlatPPO
+        return getattr(import_module(f"agents.{name}"), OWN[name])
 
 
 @dataclass(frozen=True)

@@ -92,10 +92,12 @@ _TASKS = {
     "HorseLeg": "leg",
     "HorseLegRail": "rail",
     "HorseLegSpeed": "speed",
+    "HorseLegSafe": "safe",
     "HorseLegTerrain": "terrain",
     "HorseLegFixed": "fixed",
     "Horse": "horse",
     "HorseRough": "rough",
+    "HorseSafe": "horse_safe",
 }
 
 

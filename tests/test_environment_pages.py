@@ -116,10 +116,11 @@ def test_a_policy_without_scores_is_named(tmp_path, monkeypatch):
 def test_spaces_and_groups_of_a_page_are_those_of_the_environment(name):
     """On the page, or on the one that it refers to."""
     env = gym.make(f"hoof_env/{name}-v0")
-    place = "Horse" if name == "HorseRough" else name
+    place = "Horse" if name in ("HorseRough", "HorseSafe") else name
     acted = TEXTS[place if "## Action Space" in TEXTS[place] else "HorseLeg"]
     assert f"`Box(-1, 1, {env.action_space.shape}, float32)`" in section(acted, "Action Space")
-    observed = section(TEXTS[place], "Observation Space")
+    seen = TEXTS[place if "## Observation Space" in TEXTS[place] else "HorseLeg"]
+    observed = section(seen, "Observation Space")
     assert f"`Box(-1, 1, {env.observation_space.shape}, float32)`" in observed
     listed = re.search(r"not observed by default: (.+?)\.", observed)
     task = tables.task(name)
@@ -133,8 +134,10 @@ def test_options_infos_and_quantities_are_those_of_the_environment(name):
     env = gym.make(f"hoof_env/{name}-v0", randomize=None, episode_seconds=0.02)
     _, started = env.reset(seed=0, options={"parameters": {"friction": 0.3}})
     info = env.step(np.zeros(env.action_space.shape, np.float32))[4]
-    assert names_of(tables.figures(name)) == list(info["episode_summary"])
-    assert set(names_of(tables.infos(name))) == {key for key in started if not key.startswith("reward_")}
+    costs = env.unwrapped.costs
+    assert [*names_of(tables.figures(name)), *costs] == list(info["episode_summary"])
+    keys = {key for key in started if not key.startswith("reward_")}
+    assert {*names_of(tables.infos(name)), *costs, *(["cost"] if costs else [])} == keys
     options = horse.OPTIONS if tables.is_horse(name) else leg_starts.OPTIONS
     assert set(names_of(tables.options(name))) == {*options, "gait", "parameters", "pushes"}
     found = {"both": [], "record": [], "measured": []}

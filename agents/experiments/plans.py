@@ -18,15 +18,16 @@ from hoof_env.errors import DataFileError
 PLANS = Path(__file__).parents[1] / "plans"
 """Folder of the plans."""
 
-Plan = Literal["full", "nightly", "trainers", "stock"]
+Plan = Literal["full", "nightly", "trainers", "stock", "costs"]
 """Names of the plans: the table of baselines, a small part of it that takes minutes, trainers of PPO compared
-with each other, and learners with the defaults of their library."""
+with each other, learners with the defaults of their library, and learners under a constraint."""
 
 FOLDERS: Mapping[Plan, Path] = {
     "full": Path("runs/baselines"),
     "nightly": Path("runs/baselines-nightly"),
     "trainers": Path("runs/trainers"),
     "stock": Path("runs/stock"),
+    "costs": Path("runs/costs"),
 }
 """Folders of the trainings, by plan."""
 

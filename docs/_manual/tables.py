@@ -15,6 +15,7 @@ from hoof_env.envs import manual
 from hoof_env.envs.manual import Table, literal
 from hoof_env.envs.manual_bodies import HorseTables, has_effect, tables_of_body
 from hoof_env.envs.vector import HorseLegVectorEnv
+from hoof_env.episodes.costs import COSTS
 from hoof_env.episodes.summaries import SUMMARY
 from hoof_env.tasks import horse, leg_starts
 from hoof_env.tasks.body import Body
@@ -117,6 +118,12 @@ def figures(_: str) -> Table:
     )
 
 
+def costs(_: str) -> Table:
+    """Return the costs that limits can have."""
+    rows: list[tuple[str, ...]] = [(name, *cells) for name, cells in COSTS.items()]
+    return with_code(Table(("Cost", "Unit", "Of a step"), rows))
+
+
 def vector(_: str) -> Table:
     """Return the arguments that only the vector environment has."""
     known = inspect.signature(HorseLegVectorEnv).parameters
@@ -158,6 +165,7 @@ TABLES: dict[str, Callable[[str], Table | str]] = {
     "infos": infos,
     "quantities": quantities,
     "figures": figures,
+    "costs": costs,
     "vector": vector,
     "hills": hills,
     "objectives": objectives,

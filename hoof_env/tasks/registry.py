@@ -240,6 +240,19 @@ TASKS: Mapping[str, Task] = MappingProxyType(
                 "observation": ("crank", "gait", "trunk", "hoof", "target"),
             },
         ),
+        "safe": Task(
+            "HorseLegSafe",
+            "A horse's leg whose forces must stay below a limit, and which may not lean on its suspension.",
+            _SUSPENDED
+            + " No term of the reward charges forces. Two costs count steps instead, beside the reward: those"
+            " with a force of the ground above 2.2 kN, and those in which the leg owes more than it must bear"
+            " of the weight in a second, so that leaning on the suspension is no way out. The limit of the"
+            " force is three quarters of the highest force that agents without the constraint use.",
+            {
+                "reward_weights": {"peak": 0.0, "loading": 0.0},
+                "cost": {"indicator": 2200.0, "leaning": 0.8},
+            },
+        ),
         "terrain": Task(
             "HorseLegTerrain",
             "A horse's leg on slopes and on patches of stiff, soft and slippery ground.",
@@ -300,6 +313,20 @@ TASKS: Mapping[str, Task] = MappingProxyType(
             " `terrain`, `strength` and `push_impulse` change these disturbances; `size` does not.",
             # With the weights of Horse-v0, agents trade falls and the commanded speed for smoother gaits.
             {**_HORSE, **rough_ground(1.0, MASS), "reward_weights": {"fall": 100.0, "tracking": 64.0}},
+            reference="reference",
+            terms=HORSE_TERMS,
+            entries=HORSE_ENTRIES,
+            body=Horse,
+            speeds=(1.172, 3.706),
+        ),
+        "horse_safe": Task(
+            "HorseSafe",
+            "A horse on four legs that keeps a commanded speed, and the force on each hoof below a limit.",
+            _FOUR_LEGS
+            + "\n\nNo term of the reward charges forces. A cost beside it counts the steps in which the force"
+            " on a hoof is above 4.5 kN, three quarters of the highest force that agents without the"
+            " constraint use. The legs bear all of the weight: there is nothing to lean on.",
+            {**_HORSE, "reward_weights": {"peak": 0.0}, "cost": {"indicator": 4500.0}},
             reference="reference",
             terms=HORSE_TERMS,
             entries=HORSE_ENTRIES,

@@ -30,9 +30,11 @@ TINY_OFF = (
     '{"policy_kwargs": {"net_arch": [8]}, "normalize": {"norm_obs": true}}',
 )  # fmt: skip
 NOISE = ("noise_type=ornstein-uhlenbeck", "noise_std=0.3")
+COST = '{"cost": {"indicator": 400.0}}'
 CASES = {
     "ppo": {"params": (*TINY, "learning_rate=lin_0.01")},
     "ppo_flat": {"params": (*TINY, "learning_rate=lin_0.01", "norm_reward=true")},
+    "ppo_lagrangian": {"params": (*TINY, "cost_limit=1.0"), "env_kwargs": (*SHORT, COST)},
     "sac": {"params": TINY_OFF, "steps": 160},
     "td3": {"params": (*TINY_OFF, *NOISE), "steps": 160},
     "tqc": {"params": (*TINY_OFF, "learning_starts=100"), "steps": 160},

@@ -28,7 +28,7 @@ OF_ZOO = {"n_envs", "n_timesteps", "normalize", "env_wrapper", "frame_stack", "c
 
 
 def test_the_commands_name_every_algorithm():
-    assert set(get_args(Algorithm)) == {*ALGORITHMS, "ppo_flat"}
+    assert set(get_args(Algorithm)) == {*ALGORITHMS, "ppo_flat", "ppo_lagrangian"}
 
 
 @pytest.mark.parametrize("env_id", ["hoof_env/HorseLeg-v0", "hoof_env/HorseLegFixed-v0", "Pendulum-v1"])

@@ -86,11 +86,13 @@ def test_score(folder):
         # No word of settings that are newer than the policy
         warnings.simplefilter("error", UserWarning)
         policy = OnnxPolicy(folder).load(env, score["env_id"])
+        has_costs = bool(env.unwrapped.costs)
     recorded = np.mean(score["returns"][: score["check"]["episodes"]])
     allowed = score["check"]["tolerance"]
     assert checked_mean(policy, score) == pytest.approx(recorded, abs=allowed)
     assert allowed < 0.2 * recorded  # so that it can fail
-    assert recorded > max(
+    # Where a limit of forces takes the place of their price a return is not all: docs/evidence/costs.md
+    assert has_costs or recorded > max(
         score["policies"].get(name, {"mean": {"return": 0.0}})["mean"]["return"]
         for name in ("run", "walk", "reference")
     )

@@ -15,7 +15,7 @@ from hoof_env.tasks.settings import NEEDED, PER_EPISODE, Settings, check_effect
 
 HORSE = "hoof_env/Horse-v0"
 ROUGH = "hoof_env/HorseRough-v0"
-HORSES = (HORSE, ROUGH)
+HORSES = (HORSE, ROUGH, "hoof_env/HorseSafe-v0")
 
 LEGS = sorted(
     name

@@ -70,6 +70,7 @@ def test_types_and_infos_of_a_step(env_id, settings):
     """Plain Python numbers, and NumPy's in the infos, which libraries stack."""
     env = gym.make(env_id, episode_seconds=2.0, **effective(settings, env_id))
     _, started = env.reset(seed=0)
+    costs = len(env.unwrapped.costs) + 1 if env.unwrapped.costs else 0
     done = False
     while not done:
         _, reward, terminated, truncated, info = env.step(env.action_space.sample())
@@ -77,7 +78,7 @@ def test_types_and_infos_of_a_step(env_id, settings):
         assert reward == sum(value for key, value in info.items() if key.startswith("reward_"))
         done = terminated or truncated
         ended = {"episode_summary", "end", "is_success"} if done else set()
-        assert len(info) <= 9 + len(env.unwrapped.task.terms) + len(ended)
+        assert len(info) <= 10 + len(env.unwrapped.task.terms) + costs + len(ended)
         assert set(started) <= set(info)
         assert set(info) - set(started) == ended
     assert all(type(value) is float for value in info["episode_summary"].values())

@@ -217,6 +217,22 @@ def test_leaning_counts_what_is_owed_beyond_a_second():
     assert 0 < found.sum() == env.unwrapped.episode_summary()["cost_leaning"] < 500
 
 
+def test_a_gait_that_leans_on_the_suspension_breaks_that_limit_alone():
+    """The paper's walk hangs on the suspension of the leg, the run carries itself."""
+    found = {}
+    for name in ("walk", "run"):
+        env = gym.make("hoof_env/HorseLegSafe-v0")
+        policy = hoof_env.make_policy(name, env)
+        observation, _ = env.reset(seed=0, options=policy.start)
+        over = False
+        while not over:
+            observation, _, _, over, info = env.step(policy.predict(observation)[0])
+        found[name] = info["episode_summary"]
+    assert found["walk"]["weight_share"] < 0.3 < 0.7 < found["run"]["weight_share"]
+    assert found["walk"]["cost_indicator"] == 0.0 < 250.0 < found["walk"]["cost_leaning"]
+    assert found["run"]["cost_leaning"] == 0.0 < 50.0 < found["run"]["cost_indicator"]
+
+
 def hoof_speed(step, weight):
     """Return how fast the hoof slides while it is loaded, a cost."""
     return weight * abs(step.leg.report.toe.slide) * np.where(step.leg.strides.normal_force > 100.0, 1.0, 0.0)

@@ -37,6 +37,8 @@ def test_reset_and_step_have_the_same_keys_of_numpys_numbers(env_id, settings):
     more = {"parameters"} if settings else set()
     if env.unwrapped.settings.target_speed is not None:
         more.add("target_speed")
+    if env.unwrapped.costs:
+        more |= {"cost", *env.unwrapped.costs}
     for info in infos:
         assert set(info) == {*start, "gait", "measured", "unweighted", *terms, *more}
         for key, value in info.items():
@@ -61,7 +63,7 @@ def test_what_an_ended_episode_says_can_be_written_as_yaml_and_json(env_id):
     for told in (summary, info["end"], info["is_success"], env.unwrapped.episode_summary()):
         same(yaml.safe_load(yaml.safe_dump(told)), told)
         assert json.loads(json.dumps(told)) == told
-    assert set(summary) == set(SUMMARY)
+    assert set(summary) == {*SUMMARY, *env.unwrapped.costs}
 
 
 @pytest.mark.parametrize("target", [1.0, 3.0])

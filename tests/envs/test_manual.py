@@ -24,7 +24,7 @@ from hoof_env.tasks.registry import TASKS
 from hoof_env.tasks.reward import BEARING, MAX_STRIDE
 from hoof_env.tasks.settings import Settings, to_json
 
-HORSES = "horse", "rough"  # tasks of a horse
+HORSES = "horse", "rough", "horse_safe"  # tasks of a horse
 OF_LEGS = [name for name, task in TASKS.items() if task.body is OneLeg]
 
 

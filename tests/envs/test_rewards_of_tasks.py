@@ -244,9 +244,11 @@ SHAKEN = {
 }
 """Rates without a mean, which shake the gait that an episode starts in."""
 
-SHAKEABLE = [task for task in TASKS if task not in ("fixed", "terrain")]
+SHAKEABLE = [task for task in TASKS if task not in ("fixed", "terrain", "safe")]
 """On level ground. The paper's set-up pays 0.3 for a second of the walk that it starts in, and up to 0.6 for
-a gait near it, as half a flip may be; on hills a few hard impacts decide, with a shaken gait or without."""
+a gait near it, as half a flip may be; on hills a few hard impacts decide, with a shaken gait or without.
+Where forces have a limit in place of a price, shaking adds to the return: what holds it back is no part of
+it."""
 
 
 def rows(task, policies, **settings):
