@@ -222,7 +222,7 @@ class JaxEnv:
 
     def step_env(self, key: Any, state: State, action: Any, params: Any = None) -> Any:
         """Take a control step without another start; see `step`."""
-        after, reward, terms = self._advance(state, action)
+        after, reward, terms, unweighted = self._advance(state, action)
         ended = after.episode[self.episode_rows["ended"]]
         after = after._replace(episode=self._command(key, after.episode))
         info = {
@@ -230,6 +230,7 @@ class JaxEnv:
             "truncated": ended > FAILED,
             "final_obs": after.observation,
             "terms": dict(zip(self.terms, terms, strict=True)),
+            "unweighted": dict(zip((term.name for term in self._task.terms), unweighted, strict=True)),
         }
         return after.observation, after, reward, ended > 0.0, info
 
@@ -257,7 +258,7 @@ class JaxEnv:
     # The kernel of a step
 
     def _advance(self, state: State, action: Any) -> Any:
-        """Return state, observation, reward and terms after the kernel of a step."""
+        """Return state, reward, terms and terms with a weight of 1 after the kernel of a step."""
         task, kind = self._task, self._kind
         if jnp.shape(action) != (self.num_actions,):
             raise ParameterError(
@@ -272,6 +273,7 @@ class JaxEnv:
             "rewards": Cells([0.0]),
             "past_actions": _cells(state.past_actions),
             "frames": _cells(state.frames),
+            "unweighted": Cells([0.0] * len(self.terms)),
         }
         cells["acted"] = _cells(state.acted) if state.acted.size else cells["actions"]
         body_actions = Cells([0.0] * (task.body.legs * ACTIONS))
@@ -291,7 +293,7 @@ class JaxEnv:
             _stacked(cells["observations"], jnp.float32),
         )
         terms = after.episode[self._plan.layout.rows("terms")]
-        return after, jnp.asarray(cells["rewards"][0], kind), terms
+        return after, jnp.asarray(cells["rewards"][0], kind), terms, _stacked(cells["unweighted"], kind)
 
     def _episode_cells(self, episode: Any) -> Cells:
         """Return the rows of an episode; delays, which never change, as ordinary numbers."""

@@ -122,6 +122,7 @@ def test_a_gradient_through_a_second_is_that_of_differences():
 
 def test_an_episode_that_ends_starts_again():
     env, params = make("HorseLegSpeed", episode_seconds=0.1, target_seconds=0.04)
+    weights = gym.make("hoof_env/HorseLegSpeed-v0").unwrapped.weights
     step = jax.jit(jax.vmap(env.step, (0, 0, 0, None)))
     keys = jax.random.split(jax.random.key(1), 6)
     observations, state = jax.vmap(env.reset, (0, None))(keys, params)
@@ -137,6 +138,10 @@ def test_an_episode_that_ends_starts_again():
             assert {tuple(row) for row in np.asarray(observations)} <= starts
             assert not np.array_equal(info["final_obs"], observations)
         np.testing.assert_allclose(sum(info["terms"].values()), rewards, rtol=1e-12)
+        for name, weight in weights.items():
+            np.testing.assert_allclose(
+                info["terms"][f"reward_{name}"], weight * info["unweighted"][name], rtol=1e-12
+            )
         targets.append(np.asarray(state.episode[:, env.episode_rows["target"]]))
     assert len(np.unique(np.concatenate(targets[:5]))) > 6  # other speeds are commanded within an episode
     low, high = 0.5, 5.0
