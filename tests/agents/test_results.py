@@ -45,7 +45,7 @@ DAMAGES = [
     ("seeds backwards", lambda data: data | {"seeds": [5, 3]}, r"seeds \(5, 3\)"),
     ("a return that is none", lambda data: data | {"mean": {"return": math.nan}}, "returns nan|NaN"),
     ("an unknown entry", lambda data: data | {"secret": 1}, "secret"),
-    ("a policy that is no text", lambda data: data | {"policy": 3}, "must be texts"),
+    ("a policy that is no text", lambda data: data | {"policy": 3}, "must be strings"),
     ("a number too large", lambda data: data | {"mean": {"return": 10**400}}, "OverflowError"),
     (
         "a figure that is no number",

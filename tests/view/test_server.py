@@ -95,7 +95,7 @@ def test_names_of_a_page_that_other_machines_reach():
     assert is_own_name("rebound.example.org", "0.0.0.0", ["Rebound.example.org"])
     assert is_own_name("lab.example.org", "lab.example.org")
     assert is_own_name("localhost.", "127.0.0.1")
-    with pytest.raises(ParameterError, match=r"host: expected a name without .*got 'lab:80'"):
+    with pytest.raises(ParameterError, match=r"host: expected a host name without .*got 'lab:80'"):
         start(SETUP, hosts=["lab:80"])
 
 
