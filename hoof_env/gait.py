@@ -241,7 +241,7 @@ def load_gait(name: str, preset: Preset = DEFAULT_PRESET) -> GaitParameters:
 
 
 def paper_gaits(gaits: Mapping[str, Gait]) -> dict[str, Gait]:
-    """Return the paper's own gaits among those of a preset, by name and in alphabetical order; all of
+    """Return the paper's own gaits among the gaits of a preset, by name and in alphabetical order; all of
     them if it has neither.
 
     Environments draw or derive from these: their behaviour must not change when a gait is added to a preset.

@@ -297,7 +297,7 @@ def files_of(path: Path | str) -> list[Path]:
 def write(record: Columns, about: Mapping[str, Any], path: Path | str) -> Path:
     """Write the results of `record_episode` and `describe` in the format of the path's suffix.
 
-    Older files are replaced when all new ones are complete. Errors are those of `check_export`, and
+    Older files are replaced when all new ones are complete. Errors are as in `check_export`, and
     `ParameterError` if the record does not fit into the format.
     """
     path = as_path("path", path)

@@ -36,7 +36,7 @@ def state_of(generator: np.random.Generator) -> Any:
     """Return the state of a generator.
 
     Raises:
-        ParameterError: its bit generator is none of NumPy's, so that `generator_of` could not restore it.
+        ParameterError: its bit generator is not one of NumPy's, so that `generator_of` could not restore it.
     """
     state = generator.bit_generator.state
     if type(generator.bit_generator).__name__ not in BIT_GENERATORS:

@@ -124,7 +124,7 @@ def tables_of_body(body: Body) -> BodyTables:
     """Return the parts of tables for a body: the parts of its class, or of the class that it inherits.
 
     Raises:
-        ParameterError: a body of a user's class that inherits none of this package.
+        ParameterError: a body of a user's class that inherits from no body of this package.
     """
     found = next((TABLES[kind] for kind in type(body).__mro__ if kind in TABLES), None)
     if found is None:

@@ -16,8 +16,8 @@ from hoof_env.tasks.reward import OBJECTIVES
 class HorseLegMOVectorEnv(HorseLegVectorEnv):
     """`num_envs` environments of `HorseLegMO-v0`, stepped together; rewards are float32, shape (num_envs, 3).
 
-    Row i is bitwise identical to the single environment with that seed. Restarts and infos are those of
-    `HorseLegVectorEnv`, spaces and rewards of restarts those of MO-Gymnasium's `MOSyncVectorEnv`.
+    Row i is bitwise identical to the single environment with that seed. Restarts and infos are as in
+    `HorseLegVectorEnv`, spaces and rewards of restarts as in MO-Gymnasium's `MOSyncVectorEnv`.
 
     >>> import gymnasium as gym, hoof_env
     >>> envs = gym.make_vec("hoof_env/HorseLegMO-v0", num_envs=2)

@@ -72,7 +72,7 @@ def open_loop(parameters: Mapping[str, Any], env: Any, blind: bool = True) -> Sc
     """Make a policy of a family.
 
     Args:
-        parameters: {"constant": gait parameters, shape (4,)}, or {"coefficients": those of 1, sin(theta),
+        parameters: {"constant": gait parameters, shape (4,)}, or {"coefficients": factors of 1, sin(theta),
             cos(theta), sin(2 theta) ... by the power of the command, shape (powers, 1 + 2 harmonics,
             numbers)} with numbers 4 of a leg and 8 of a horse; with a clock also "frequency_hz". Each may
             have a leading axis of n environments.

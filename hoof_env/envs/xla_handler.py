@@ -1,6 +1,6 @@
 """Handler of XLA's typed foreign function interface: machine code that XLA calls for a control step.
 
-XLA gives the address of a call frame, whose words are named below; the structs are those of
+XLA gives the address of a call frame, whose words are named below; the structs are in
 `xla/ffi/api/c_api.h`, version 0.x of the interface. The handler copies the actions into the arrays of the
 environments, calls the kernel of a step, and copies the outcome out; it asks Python only for what Python has
 to do. The first operand is a handle: the address of `Word`s, and how often these were used.

@@ -54,7 +54,7 @@ def memory_rows(features: Features, legs: int, name: str) -> NDArray[np.int64]:
 
 @dataclass(frozen=True)
 class Costs:
-    """Costs of a task: those with limits, then those of its own terms.
+    """Costs of a task: costs with limits, then costs of its own terms.
 
     Attributes:
         limits: limit of each cost, by names of `COSTS`.

@@ -44,7 +44,7 @@ def compute_user_term(
     scene: Scene, term: Term, weights: tuple[Number, Number], outcome: Outcome, n: Whole
 ) -> tuple[Lanes, Lanes]:
     """Return a term from outside this package, which may have constants and keep rows, under two weights. The
-    rows are those of the first.
+    rows are written under the first.
 
     The rows that it keeps have their former values where the engine failed: what it read there may be NaN.
     """

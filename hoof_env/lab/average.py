@@ -1,8 +1,8 @@
 """Mean stance of several trials: `hoof-env average`.
 
 Each whole stance, from the first to the last sample above the threshold, is interpolated linearly to points
-that are evenly spaced in its duration. Mean and standard deviation (of a sample, over n - 1) are those of all
-stances of a limb; every stance has the same weight, whatever its trial.
+that are evenly spaced in its duration. Mean and standard deviation (of a sample, over n - 1) are taken over
+all stances of a limb; every stance has the same weight, whatever its trial.
 
 Stances of odd length, the first of an episode, those that the ends of records cut off and a baseline that
 drifts are counted and said; `drop` leaves stances out.
@@ -262,7 +262,7 @@ def write_table(found: Average, path: Path | str) -> Path:
     """Write a CSV table with one row for each point.
 
     Its columns are `stance [%]` and, for each limb, mean and standard deviation of the forces, as
-    `left_force_y_mean [N]` and `left_force_y_sd [N]`, and the number of stances. Errors are those of
+    `left_force_y_mean [N]` and `left_force_y_sd [N]`, and the number of stances. Errors are as in
     `check_table`.
     """
     path = as_path("path", path)

@@ -139,7 +139,7 @@ def _parameters(head: bytes, begin: int, order: str) -> Head:
     groups: dict[str, int] = {}
     while head[at] != 0:
         # The length of a name is negative if the entry is locked; the number of a group is negative in the
-        # entry that names the group, and positive in those of its parameters.
+        # entry that names the group, and positive in the entries of its parameters.
         length, group = struct.unpack_from("2b", head, at)
         raw = head[at + 2 : at + 2 + abs(length)]
         if group == 0 or any(sign not in PRINTED for sign in raw):

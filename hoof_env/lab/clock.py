@@ -30,7 +30,7 @@ PATTERNS = (
 def moment(text: str) -> tuple[int, float] | None:
     """Return a time as days and seconds, None if the text is none.
 
-    Days are those of a duration, or of a date since the year 1.
+    Days are a duration's, or a date's since the year 1.
     """
     bare = text.strip()
     # Most cells are numbers.

@@ -49,7 +49,7 @@ def baseline(vertical: Floats, stances: Spans, level: float, time: Floats, unit:
         unit: unit of the force.
     """
     rate = (len(time) - 1) / float(time[-1] - time[0])
-    # The middle half of swing, as forces near its ends may be those of the limb.
+    # The middle half of swing, as forces near its ends may be the limb's.
     middles = [((3 * j + k) // 4, (j + 3 * k) // 4 + 1) for (_, j), (k, _) in pairwise(stances)]
     levels = np.array([np.median(vertical[j:k]) for j, k in middles])
     remedy = "subtract it, or raise --threshold"

@@ -172,7 +172,7 @@ def _pair(error: float, of_a: float, places: int) -> str:
 
 
 def draw(found: Comparison, path: Path | str) -> Path:
-    """Write a picture of a comparison and return its path. Errors are those of `check_picture`.
+    """Write a picture of a comparison and return its path. Errors are as in `check_picture`.
 
     Each limb has a row of panels: the vertical and the fore-aft force of A and B from touchdown on, single
     stances thin and their mean thick. A force that a record lacks has no panel.

@@ -88,8 +88,8 @@ class OnnxPolicy(FilePolicy):
             ) from None
 
     def _read_graph(self) -> None:
-        """Read the names and the types of input and output; raise ValueError where they, or the metadata, are
-        none of a policy."""
+        """Read the names and the types of input and output; raise ValueError where they, or the metadata, do
+        not belong to a policy."""
         if not self.record.get("env_id"):
             raise ValueError("its metadata names no environment; hoof_env.stamp_onnx(path, env) adds them")
         inputs = self._session.get_inputs()
@@ -200,7 +200,7 @@ def stamp_onnx(path: str | Path, env: gym.Env[Any, Any], **record: str) -> OnnxP
 
 
 def arguments_of(env: gym.Env[Any, Any]) -> dict[str, Any]:
-    """Return the arguments with which an environment was made beyond those of its id, as JSON has them; what
+    """Return the arguments with which an environment was made beyond its id's own, as JSON has them; what
     JSON cannot hold is left out."""
     assert env.spec is not None
     of_id = gym.registry[env.spec.id].kwargs if env.spec.id in gym.registry else {}

@@ -1,5 +1,5 @@
 """Random numbers inside kernels, without a state: each is a function of a key, a count and a number. The bits
-are those of splitmix64 (Steele, Lea & Flood 2014), with a seed mixed from key and count."""
+are made by splitmix64 (Steele, Lea & Flood 2014), with a seed mixed from key and count."""
 
 from __future__ import annotations
 

@@ -244,8 +244,8 @@ CONTEXT = "context"
 """Group of the physical parameters that contexts vary."""
 
 LATE = (PRESSURE, CONTEXT)
-"""Groups whose entries have the last slots, behind those of users' own entries: the noise of an entry follows
-from its slot, and these groups were added later."""
+"""Groups whose entries have the last slots, behind the slots of users' own entries: the noise of an entry
+follows from its slot, and these groups were added later."""
 
 _PARAMETERS = ("crank speed", "swing offset", "swing sine coefficient", "swing cosine coefficient")
 _UNITS = ("rad/s", "rad", "rad", "rad")

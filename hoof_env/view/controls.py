@@ -111,7 +111,7 @@ def shown_settings(simulation: Simulation, parameters: Mapping[str, float] | Non
 
     Args:
         simulation: simulation.
-        parameters: parameters that were touched, by default those of the simulation.
+        parameters: parameters that were touched, by default as in the simulation.
     """
     env: Any = simulation.env.unwrapped
     touched = simulation.parameters if parameters is None else parameters

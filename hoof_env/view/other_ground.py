@@ -24,7 +24,7 @@ class OtherGround:
 
     A rigid hoof is where its leg has it, and the force is Eq. 14 there. A spring in the hoof gives way to the
     force: the leg's motion stays, and the sole's follows from the balance of spring, damper and ground, as in
-    `dynamics.hoof.spring_contact`. Approach speeds are those of the simulated touch-downs. An episode
+    `dynamics.hoof.spring_contact`. Approach speeds are taken from the simulated touch-downs. An episode
     may start with hooves in the ground and springs without load, which elastic ground would throw out: with
     springs, forces are NaN until a hoof has been in the air.
 

@@ -117,7 +117,7 @@ class Playback:
         Args:
             simulation: simulation.
             chunks: chunks.
-            played: policy, seed and touched parameters of that episode, by default those of the present one.
+            played: policy, seed and touched parameters of that episode, by default as in the present one.
         """
         player = Player(simulation)
         rows = []

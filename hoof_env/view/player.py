@@ -56,7 +56,7 @@ class Player:
 
     Attributes:
         history: what was shown.
-        numbers: names and digits of the numbers in a row: those of the body, those of each leg with its index
+        numbers: names and digits of the numbers in a row: of the body, of each leg with its index
             behind them, and the terms of the reward, summed over the episode.
         drawing: drawing data.
         clock, shown: time up to which the page may show and shows substeps [s].

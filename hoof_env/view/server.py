@@ -97,7 +97,7 @@ class Pages:
 def is_own_name(name: str, address: str, hosts: Collection[str] = ()) -> bool:
     """True if a page that is served at an address may be asked for by this name.
 
-    A site on the internet can make its own name lead to this machine, and its scripts would then be those of
+    A site on the internet can make its own name lead to this machine, and its scripts would then act as
     the page. Only loopback names are therefore answered at a loopback address. At an address that other
     machines reach a browser may also come by an address in numbers, or by a name of the local network.
 
