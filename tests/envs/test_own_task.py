@@ -371,7 +371,10 @@ def test_the_page_shows_the_examples():
     assert len("".join(shown).split()) > 0.6 * len(first.split())
     rest = [block for block in blocks if block not in first]
     assert len([block for block in rest if block in second]) == 3
-    curricula, on_arrays = sorted((block for block in rest if block not in second), key=len)
+    (own_cost,) = (block for block in rest if "is_cost=True" in block)
+    exec(compile(own_cost, "own_task.md", "exec"), {})
+    assert gym.make("my_lab/Grip-v0").unwrapped.costs == ("cost_slide",)
+    curricula, on_arrays, *_ = sorted((block for block in rest if block not in second), key=len)
     exec(compile(on_arrays, "own_task.md", "exec"), runpy.run_path(str(folder / "own_task.py")))
     known = {}
     exec(compile(curricula, "own_task.md", "exec"), known)

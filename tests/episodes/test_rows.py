@@ -18,7 +18,7 @@ ALL = {
     "last_actions": 2,
     "action_delay": 1.5,
     "randomize": {"friction": (0.2, 0.6)},
-    "cost": {"peak": 900.0, "loading": 1e4},
+    "cost": {"peak": 900.0, "loading": 1e4, "leaning": 0.8},
 }
 """Settings with which no array is empty."""
 
