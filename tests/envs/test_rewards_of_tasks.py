@@ -247,8 +247,8 @@ SHAKEN = {
 SHAKEABLE = [task for task in TASKS if task not in ("fixed", "terrain", "safe")]
 """On level ground. The paper's set-up pays 0.3 for a second of the walk that it starts in, and up to 0.6 for
 a gait near it, as half a flip may be; on hills a few hard impacts decide, with a shaken gait or without.
-Where forces have a limit in place of a price, shaking adds to the return: what holds it back is no part of
-it."""
+Where forces have a limit in place of a price, nothing in the return holds shaking back: it adds 8 to 96, at a
+cost of 128 in place of 106, or 5 at a cost of 102."""
 
 
 def rows(task, policies, **settings):
