@@ -90,8 +90,8 @@ FRAME_EXTENSION, FRAME_API, FRAME_STAGE, FRAME_COUNT, FRAME_INPUTS, FRAME_RESULT
 """Words of a call frame."""
 
 OLDEST_VERSION = 1 << 32
-"""Version 0.1 of the interface, that of jax 0.5.0, which asks without naming its own; its structs have the
-words above."""
+"""Version 0.1 of the interface, used by jax 0.5.0, which asks without naming it; its structs have the words
+above."""
 
 API_VERSION, API_ERROR = 4, 6
 """Words of XLA's functions: the version of the interface, and the function that makes an error."""
