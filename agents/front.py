@@ -182,7 +182,7 @@ def summarise(found: Sequence[Trained], more: Sequence[Trained] = ()) -> dict[st
 
 
 def draw(found: Sequence[Trained], path: Path) -> None:
-    """Draw all trainings, those of the front filled, progress against the other two objectives."""
+    """Draw all trainings, the front filled, progress against the other two objectives."""
     import matplotlib
     from matplotlib.figure import Figure
 
@@ -235,7 +235,7 @@ one seed learnt to stand.
 
 
 def write(found: Sequence[Trained], more: Sequence[Trained], data: Path, evidence: Path) -> dict[str, Any]:
-    """Write file, page and picture, and return the content of the file; `found` and `more` are those of
+    """Write file, page and picture, and return the content of the file; `found` and `more` are as in
     `summarise`."""
     about = summarise(found, more)
     rows = [

@@ -35,7 +35,7 @@ from agents.ppo_flat import Scale
 from hoof_env.errors import ParameterError, check_number
 
 WIDTHS = (64, 64)
-"""Widths of the hidden layers of the costs' critic, those of Stable-Baselines3's own critic."""
+"""Widths of the hidden layers of the costs' critic, as in Stable-Baselines3's own critic."""
 
 Floats = NDArray[np.float32]
 
@@ -135,7 +135,7 @@ class LagrangianPPO(PPO):
     def _setup_model(self) -> None:
         super()._setup_model()
         numbers = int(np.prod(self.observation_space.shape or 1))
-        with torch.random.fork_rng():  # the policy draws as that of PPO
+        with torch.random.fork_rng():  # the policy draws the numbers of PPO's
             torch.manual_seed(self.seed or 0)
             self.constraint = Constraint(numbers, self.first_multiplier)
         self.critic_optimizer = torch.optim.Adam(self.constraint.critic.parameters(), eps=1e-5)
@@ -209,7 +209,7 @@ class LagrangianPPO(PPO):
         self.logger.record("train/episode_cost", mean_cost)
 
     def charge(self, rollouts: RolloutBuffer) -> None:
-        """Replace the advantages of a rollout by those of the reward and of the cost."""
+        """Replace the advantages of a rollout by advantages of reward and cost together."""
         buffer, values = self.cost_buffer, self.constraint.values
         buffer.reset()
         costs = np.array(self.rollout_costs, np.float32)
