@@ -31,7 +31,7 @@ EXAMPLES = [
     )
     if page.stem != "own_task" and "```python" in page.read_text(encoding="utf-8")
 ]
-"""Pages whose code this file runs; the tests of tasks and legs of one's own run those of own_task."""
+"""Pages whose code this file runs; the tests of tasks and legs of one's own run the code of own_task."""
 
 LINK = re.compile(r"\]\(([^)\s]+)\)")
 CODE = re.compile(r"^( {4}|```).*?$|`[^`\n]*`", re.MULTILINE)

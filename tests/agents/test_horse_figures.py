@@ -1,4 +1,4 @@
-"""Terms add up to the return, legs accelerate the horse, and the committed figures are those of today."""
+"""Terms add up to the return, legs accelerate the horse, and the committed figures are today's."""
 
 import json
 

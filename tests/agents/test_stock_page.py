@@ -117,7 +117,7 @@ def test_what_is_written_is_read_back(tmp_path):
 
 
 def test_seconds_are_compared_on_one_processor(tmp_path, monkeypatch):
-    """On the one of most trainings of HorseLeg-v0; those of other ids alone are marked."""
+    """On the processor of most trainings of HorseLeg-v0; one of other ids alone is marked."""
     monkeypatch.setattr(stock_page, "anchors", lambda env_id: {"zero action": 0.5, stock_page.BEST: 1.5})
     rows = [
         row

@@ -57,7 +57,7 @@ def test_the_energy_of_a_turn_adds_up_and_is_that_of_the_data(data, gait, factor
     found = parameters.turn(gait, ground)
     assert found == pytest.approx({name: row[name] for name in found}, rel=1e-6, abs=1e-9)
     losses = sum(found[name] for name in parameters.ACCOUNT if name.endswith("loss"))
-    # The trunk's speed still creeps to that of the steady gait
+    # The trunk's speed still creeps to the steady gait's
     assert losses == pytest.approx(found["crank_work"] + found["swing_work"], rel=0.05)
 
 

@@ -13,7 +13,7 @@ BOOM = {"trunk": "boom", "stiffness": 2e6, "exponent": 1.5, **PASTERN}
 
 @pytest.mark.parametrize("drive", ["motor", "prescribed"])
 def test_nothing_but_the_ground_holds_the_trunk_and_the_hoof_stands_on_it(drive):
-    """Momentum changes by the impulse of the ground less that of the weight, and by nothing else."""
+    """Momentum changes by the impulse of the ground less the impulse of the weight, and by nothing else."""
     env = gym.make("hoof_env/HorseLeg-v0", drive=drive, **BOOM).unwrapped
     env.reset(seed=0)
     engine = env.engine

@@ -64,8 +64,8 @@ def test_a_row_has_the_bits_of_one_environment_on_any_number_of_threads(env_id, 
 
 
 def test_noise_and_bias_are_within_their_bounds_and_change_nothing_else():
-    """Numbers that do not saturate differ by their error from those of an environment without noise, in which
-    the episode is the same."""
+    """Numbers that do not saturate differ by their error from an environment without noise, in which the
+    episode is the same."""
     noise, bias = 0.03, 0.02
     n, count = 64, 40
     noisy = make(LEG, n, noise={"gait": noise}, bias={"gait": bias, "hoof": 0.1})
@@ -405,7 +405,7 @@ def test_an_option_without_pushes_leaves_drawn_ones_out():
     settings = {"push_impulse": [20.0, 30.0], "push_seconds": [0.04, 0.06]}
     env, plain = make(LEG, **settings), make(LEG)
     for given in ([], None):
-        # The draws of the pushes are left out, too: the generator goes on as that of an environment without.
+        # The draws of the pushes are left out, too: the generator goes on as without pushes.
         same(env.reset(seed=3, options={"pushes": given})[0], plain.reset(seed=3)[0])
         taken = actions(0, 20)
         for action in taken[:10]:

@@ -95,7 +95,7 @@ def test_the_height_is_that_above_the_ground():
 
 
 def test_the_step_of_a_fall_happened():
-    """It is paid, summed up and recorded; only that of a simulation that broke is not."""
+    """It is paid, summed up and recorded; only the step of a simulation that broke is not."""
     env = gym.make(HORSE, target_speed=SPEEDS[0]).unwrapped
     _, begun = env.reset(seed=0, options={"pitch": 0.4})
     env.record()  # from now on substeps are kept

@@ -165,7 +165,7 @@ def test_a_state_says_what_the_episode_started_with(n):
     other.set_state(state)
     info = env.step(taken)[4]
     same(info, other.step(taken)[4])
-    del state["start_values"]  # as those of older versions
+    del state["start_values"]  # as in states of older versions
     other.set_state(state)
     old = other.step(taken)[4]
     assert np.isnan(old["crank_angle"]).all()

@@ -147,7 +147,7 @@ def test_a_term_takes_the_place_of_one_of_the_base(own):
     assert [term.name for term in task.terms] == [term.name for term in tasks.TASKS["speed"].terms]
     assert task.terms[0] is mine
     kept = dict(tasks.TASKS["speed"].defaults["reward_weights"])
-    assert task.settings({}).reward_weights == {**kept, "peak": 0.5}, "those of the base stay"
+    assert task.settings({}).reward_weights == {**kept, "peak": 0.5}, "the weights of the base stay"
 
 
 def test_a_step_that_could_not_be_simulated_pays_for_nothing_but_the_failure(own):

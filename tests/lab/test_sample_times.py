@@ -1,4 +1,4 @@
-"""Times of records: rounded ones, those of other units, and the clock of the file."""
+"""Times of records: rounded times, times in other units, and the clock of the file."""
 
 from __future__ import annotations
 

@@ -243,7 +243,7 @@ def test_a_predict_of_other_arguments_is_reported(predict, env):
 
 
 def test_a_memory_of_any_kind_is_carried(env):
-    """Tuples as those of recurrent policies, and dictionaries."""
+    """Tuples, as in recurrent policies, and dictionaries."""
 
     class Summing:
         def predict(self, seen, state=None, episode_start=None, deterministic=True):
