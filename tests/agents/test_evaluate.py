@@ -67,7 +67,7 @@ def test_policies_meet_the_same_episodes_whatever_stands_beside_them():
     assert alone.scores[0] == beside.scores[1]
 
 
-def test_intervals_are_those_of_scipy():
+def test_intervals_agree_with_scipy():
     """The bootstrap that the published tables were made with, and the interval of a skewed sample."""
     from scipy.stats import bootstrap, trim_mean
 

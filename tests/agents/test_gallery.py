@@ -59,7 +59,7 @@ def test_the_committed_file_has_what_the_curves_say():
 
 
 @pytest.mark.parametrize("name", ["HorseLegRail", "HorseLegSpeed", "HorseLegTerrain"])
-def test_the_committed_return_of_random_actions_is_that_of_the_present_reward(name):
+def test_the_committed_return_of_random_actions_has_the_present_reward(name):
     committed = json.loads((gallery.POLICIES / RETURNS).read_text(encoding="utf-8"))
     env_id = f"hoof_env/{name}-v0"
     # Another machine has other last bits, which change an episode, and hardly the mean of a hundred

@@ -106,7 +106,7 @@ def test_a_longer_training_replaces_a_shorter_one_and_no_other(tmp_path):
     assert [row["return"] for row in found] == [3.0, 4.0, 1.0, 2.0]
 
 
-def test_what_is_written_is_read_back(tmp_path):
+def test_written_rows_are_read_back(tmp_path):
     rows = curve(LEG, "ppo", 0, [1.0, 2.5])
     with (tmp_path / "curves.csv").open("w", newline="") as file:
         writer = csv.DictWriter(file, COLUMNS)

@@ -49,7 +49,7 @@ def test_the_deleted_tables_come_out_again(data):
 
 
 @pytest.mark.parametrize(("gait", "factor", "restitution"), [("run", 1.0, 1.0), ("walk", 4.0, 0.0)])
-def test_the_energy_of_a_turn_adds_up_and_is_that_of_the_data(data, gait, factor, restitution):
+def test_the_energy_of_a_turn_adds_up_and_agrees_with_the_data(data, gait, factor, restitution):
     row = parameters.find(data["suspended"], gait=gait, factor=factor, restitution=restitution)
     ground = parameters.ground_of(
         restitution=restitution, stiffness=factor * parameters.ground_of().stiffness

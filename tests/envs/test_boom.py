@@ -131,7 +131,7 @@ def test_starts_that_no_episode_can_have_are_refused_with_the_id(name, start, me
         gym.make(f"test/{name}-v0")
 
 
-def test_a_start_that_is_no_mapping_is_refused_at_once():
+def test_a_start_other_than_a_mapping_is_refused_at_once():
     with pytest.raises(ParameterError, match="test/List-v0: start: expected a mapping of reset options, got"):
         hoof_env.register("test/List-v0", base="leg", start=[1.0], **BOOM)
     assert "test/List-v0" not in gym.registry

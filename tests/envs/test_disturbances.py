@@ -94,7 +94,7 @@ def test_noise_and_bias_are_within_their_bounds_and_change_nothing_else():
     same(noisy.raw_observation(), plain.raw_observation())
 
 
-def test_strength_is_a_factor_and_zero_is_none():
+def test_strength_is_a_factor_and_zero_disturbs_nothing():
     none = make(LEG, **{**ALL, "strength": 0.0})
     plain = make(LEG, episode_seconds=0.5)
     same(none.reset(seed=2)[0], plain.reset(seed=2)[0])
@@ -135,7 +135,7 @@ def test_a_push_adds_its_impulse_to_the_momentum_and_turns_motors_alone(env_id, 
 
 
 @pytest.mark.parametrize("drive", ["prescribed", "motor"])
-def test_an_impulse_is_what_a_short_force_leaves(drive):
+def test_an_impulse_is_the_limit_of_a_short_force(drive):
     """Independent of `push`: the same change as by a constant force, here a change of weight, over a time
     that goes to 0. The difference goes with the time."""
     impulse = 15.0

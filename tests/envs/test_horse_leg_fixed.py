@@ -49,7 +49,7 @@ def test_by_default_it_is_what_the_default_preset_says():
         assert (found.stiffness, found.exponent) == (load_ground().stiffness, load_ground().exponent)
 
 
-def test_the_force_is_that_of_the_presets_ground(soft):
+def test_the_force_comes_from_the_presets_ground(soft):
     """K sum(d^n) on elastic ground, from the trace alone."""
     env = gym.make(FIXED, preset=soft, gait="run", episode_seconds=0.5)
     env.reset(seed=0)

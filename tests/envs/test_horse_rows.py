@@ -88,7 +88,7 @@ def test_the_gait_is_observed_wherever_it_is():
     assert max(shown.values()) == 0
 
 
-def test_the_height_is_that_above_the_ground():
+def test_the_height_counts_from_the_ground():
     envs = make(terrain={"kind": "slope", "angle": 0.1})
     envs.reset(seed=0, options={"x": 50.0})
     assert np.all(np.abs(envs.unwrapped.raw_observation()["height above the ground"] - 1.4) < 0.5)

@@ -231,7 +231,7 @@ def test_a_changed_helper_or_constant_acts_at_the_next_make():
     assert old.step(np.zeros(4, np.float32))[4]["reward_mine"] == 20.0, "what is made stays as it is"
 
 
-def test_what_is_made_measures_with_the_constants_of_its_observation():
+def test_an_environment_measures_with_the_constants_of_its_observation():
     space = {"__name__": "__main__"}
     cell(
         space,

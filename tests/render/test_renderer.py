@@ -420,7 +420,7 @@ def test_the_leg_is_always_in_the_picture(height):
 
 
 @pytest.mark.parametrize("gait", ["run", "walk"])
-def test_stances_and_peaks_are_those_of_the_reward(gait):
+def test_stances_and_peaks_agree_with_the_reward(gait):
     env = gym.make("hoof_env/HorseLeg-v0", render_mode="rgb_array", episode_seconds=4.0).unwrapped
     observation, _ = env.reset(seed=0, options={"gait": gait})
     policy, ended = make_policy(gait, env), False
@@ -474,7 +474,7 @@ def test_rows_that_are_not_finite_are_left_out(run):
     np.testing.assert_array_equal(draw(run[0], broken), draw(run[0], good))
 
 
-def test_what_is_around_a_small_leg_is_as_small():
+def test_surroundings_of_a_small_leg_are_as_small():
     """The trunk of a robot at 0.2 was as long as the whole leg's, over key and panel. The pictures agree up
     to the scale, so that the same leg, made smaller, is drawn as large."""
     from hoof_env.render.outline import USUAL_HIP_M

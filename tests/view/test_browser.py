@@ -255,7 +255,7 @@ def test_buttons_and_keys(tab):
     page.get_by_label("follow").check()
 
 
-def test_the_play_speed_is_that_of_its_slider(tab):
+def test_the_play_speed_follows_its_slider(tab):
     passed = {}
     for speed in ("0.05", "2"):
         tab.set("speed", speed)
