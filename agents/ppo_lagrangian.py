@@ -41,7 +41,7 @@ Floats = NDArray[np.float32]
 
 
 class Constraint(nn.Module):
-    """Multiplier and critic of the costs, whose numbers are saved with the model.
+    """Multiplier and critic of the costs, both saved with the model.
 
     Args:
         numbers: length of an observation.
@@ -64,7 +64,7 @@ class Constraint(nn.Module):
 
 
 class LagrangianPPO(PPO):
-    """PPO with the arguments of Stable-Baselines3, as which its policies are loaded, and a limit.
+    """PPO of Stable-Baselines3 with a limit on the cost; its policies are loaded as PPO's.
 
     Args:
         cost_limit: largest mean cost of an episode, in the unit of `info["cost"]`.
@@ -199,7 +199,7 @@ class LagrangianPPO(PPO):
         return goes_on
 
     def change_multiplier(self, mean_cost: float) -> None:
-        """Raise the multiplier if the mean cost of an episode is above the limit, else lower it."""
+        """Raise the multiplier if the mean cost of an episode is above the limit; lower it otherwise."""
         multiplier = self.constraint.multiplier
         self.multiplier_optimizer.zero_grad()
         (-multiplier * (mean_cost - self.cost_limit)).backward()
@@ -214,7 +214,7 @@ class LagrangianPPO(PPO):
         buffer.reset()
         costs = np.array(self.rollout_costs, np.float32)
         buffer.rewards[:] = costs / self.scale.after(costs, np.array(self.rollout_ends))
-        for step, k, last in self.cut_off:  # costs that a time limit hides, as PPO does it with rewards
+        for step, k, last in self.cut_off:  # costs beyond a time limit, as PPO estimates rewards
             buffer.rewards[step, k] += self.gamma * values(last.reshape(-1))
         flat = rollouts.observations.reshape(*rollouts.rewards.shape, -1)
         buffer.episode_starts[:] = rollouts.episode_starts
