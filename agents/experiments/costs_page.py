@@ -44,8 +44,8 @@ FIGURES = (
     "speed_m_s",
     "failed",
 )
-"""Figures of a row, over the episodes of the final scores: `cost` is that of an episode, `violating_steps`
-its share of the steps, `episodes_within` the share of the episodes that cost `BUDGET` or less."""
+"""Figures of a row, over the episodes of the final scores: `cost` is per episode, `violating_steps` its share
+of the steps, `episodes_within` the share of the episodes that cost `BUDGET` or less."""
 
 COLUMNS = ("env_id", "agent", "seed", "steps", *FIGURES, "commit")
 

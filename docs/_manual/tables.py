@@ -1,4 +1,4 @@
-"""Tables of the pages of docs/environments: those of `hoof_env.envs.manual`, and what only pages show."""
+"""Tables of the pages of docs/environments: the tables of `hoof_env.envs.manual` and some for pages alone."""
 
 from __future__ import annotations
 

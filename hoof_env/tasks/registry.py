@@ -275,7 +275,7 @@ TASKS: Mapping[str, Task] = MappingProxyType(
             " Eq. 8 (42 coordinates, 42 multipliers, Baumgarte) with explicit Euler at 1 ms and samples the"
             " approach speed at the first step inside the ground. Restitution 1 is the paper's elastic"
             " condition, 0 its inelastic one.\n\nBy default nothing is drawn, so all episodes are the same."
-            " This is a reproduction and not a benchmark: a return is that of one deterministic episode, has"
+            " This is a reproduction and not a benchmark: a return belongs to one deterministic episode, has"
             " no interval, and says nothing about what feedback is worth.",
             {
                 "gait": "walk",
@@ -439,7 +439,7 @@ def register(
         contact_law: function of penetration [m], its rate [m/s], inverse approach speed [s/m] and the
             ground's constants, which returns the normal force [N]; see `dynamics.hoof.contact_force`.
         action_map: map from user-defined actions to body actions.
-        start: reset options of every episode, which those of a call replace; None for the base's.
+        start: reset options of every episode, which the options of a call replace; None for the base's.
         defaults: settings, see the manual pages.
 
     Raises:
@@ -461,7 +461,7 @@ def register(
     _check_twice(env_id, [entry.name for entry in (*old.entries, *new_entries)])
     added = {term.name: term for term in new_terms}
     kept = [added.pop(term.name, term) for term in old.terms]
-    law = f" The normal force is that of `{function_name(contact_law)}`." if contact_law else ""
+    law = f" `{function_name(contact_law)}` gives the normal force." if contact_law else ""
     has_more = bool(new_terms or new_entries or contact_law or action_map)
     foreign = " With terms, entries or laws from outside this package." if has_more else ""
     caller = str(sys._getframe(1).f_globals.get("__name__", ""))

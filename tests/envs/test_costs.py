@@ -303,7 +303,7 @@ def own_id():
     return "tests/Sliding-v0"
 
 
-def test_a_cost_of_ones_own_is_no_part_of_the_reward(own_id):
+def test_a_cost_of_ones_own_leaves_the_reward_alone(own_id):
     env, base, limited = gym.make(own_id), gym.make(LEG), gym.make(own_id, cost={"indicator": 700.0})
     for each in (env, base, limited):
         each.reset(seed=2)
