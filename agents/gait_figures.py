@@ -1,9 +1,12 @@
 """Figures of a policy on the horse at a commanded speed: forces, stances, slip, lag, cost of transport.
 
 Most figures come from the engine's sums over all episodes that did not end early. Those that need forces at
-every substep are of such episodes among the first `WATCHED`, for which a record is kept: the lag, the force
-over a stance, and its peaks of braking and propulsion, the highest horizontal force backward and forward of
-each whole stance (0 if there is none), averaged over stances.
+every substep are of such episodes among the first `WATCHED`, for which a record is kept: the lag, the number
+of peaks, normal and horizontal force over a stance, and the peaks of braking and propulsion, the highest
+horizontal force backward and forward of each whole stance (0 if there is none), averaged over stances.
+
+The loading of a pair is the mean of the stances' steepest rises of the normal force. The net force of a pair
+is the mean over time of the horizontal force on its two hooves: positive forward.
 
 Left and right legs of a pair are interchangeable in the plane: the lag is the time from the landing of a hind
 hoof to the next landing of a fore hoof, over the stride and within half of one, so that 0 is a trot or a pace
@@ -34,6 +37,7 @@ SHORTEST = 0.05  # stance [s]
 DIP = 0.05  # least dip next to a peak, over the highest one [-]
 FORCES = ("toe_normal", "heel_normal", "toe_friction", "heel_friction")  # columns of a record that are kept
 HORIZONTAL = ("braking", "propulsion")  # forces backward and forward
+NEEDED = ("loading_rate_increase", "stances", *HORIZONTAL)  # sums of loading and net force
 
 
 @dataclass
@@ -201,6 +205,11 @@ def _from_sums(played: Played, kilograms: float, height: float) -> dict[str, flo
         for name in ("duty", "slip", "stances_per_turn"):
             result[f"{name}_{pair}"] = float(pairs[name][k])
         result[f"peak_over_mean_{pair}"] = result[f"peak_{pair}"] / result[f"mean_{pair}"]
+        legs = slice(2 * k, 2 * k + 2)
+        total = {name: played.sums[name][legs][:, upright].sum(0) for name in NEEDED}
+        result[f"loading_{pair}"] = _mean(total["loading_rate_increase"] / total["stances"]) / kilograms
+        net = total["propulsion"] - total["braking"]
+        result[f"net_{pair}"] = _mean(net) / played.seconds / kilograms
     impulse = played.sums["normal_impulse"][:, upright].reshape(2, -1).sum(1)
     work = played.sums["positive_work"][:, upright].sum(0)
     reached = float(travelled.mean() / played.seconds)
@@ -234,20 +243,27 @@ def _from_stances(played: Played, kilograms: float) -> dict[str, Any]:
     of_pairs = {pair: [stance for stance in stances if stance.leg // 2 == k] for k, pair in enumerate(PAIRS)}
     result: dict[str, Any] = {
         "lag": mean_lag(lags) if lags else float("nan"),
-        "two_peaked": _mean([stance.is_two_peaked for stance in of_pairs["fore"]]),
         "footfall": footfall,
-        "curves": {pair: curve_of(of_pair, kilograms) for pair, of_pair in of_pairs.items()},
+        "curves": {
+            pair: curve_of([stance.force for stance in of_pair], kilograms)
+            for pair, of_pair in of_pairs.items()
+        },
+        "pushes": {
+            pair: curve_of([stance.push for stance in of_pair], kilograms)
+            for pair, of_pair in of_pairs.items()
+        },
     }
     for pair, of_pair in of_pairs.items():
+        result[f"two_peaked_{pair}"] = _mean([stance.is_two_peaked for stance in of_pair])
         for name in HORIZONTAL:
             peaks = [getattr(stance, f"peak_{name}") for stance in of_pair]
             result[f"peak_{name}_{pair}"] = _mean(peaks) / kilograms
     return result
 
 
-def _mean(values: list[Any]) -> float:
+def _mean(values: Any) -> float:
     """Return the mean, NaN without values."""
-    return float(np.mean(values)) if values else float("nan")
+    return float(np.mean(values)) if len(values) else float("nan")
 
 
 def footfall_of(stances: list[Stance], end: float, span: float) -> list[list[float]]:
@@ -275,8 +291,8 @@ def forces_of(records: list[dict[str, Floats]]) -> tuple[Floats, Floats, Floats]
     return time.ravel(), (toe + heel)[..., 0], (toe_push + heel_push)[..., 0]
 
 
-def curve_of(stances: list[Stance], mass: float) -> list[float]:
-    """Return the mean normal force [N/kg] at each hundredth of a stance."""
+def curve_of(forces: list[Floats], mass: float) -> list[float]:
+    """Return the mean [N/kg] of the forces of stances [N] at each hundredth of a stance."""
     grid = np.linspace(0, 1, 101)
-    curves = [np.interp(grid, np.linspace(0, 1, len(stance.force)), stance.force) for stance in stances]
+    curves = [np.interp(grid, np.linspace(0, 1, len(force)), force) for force in forces]
     return [round(float(x), 4) for x in np.mean(curves, 0) / mass] if curves else []

@@ -5,7 +5,11 @@
 
 A policy is what `hoof-env evaluate` takes. It gets one speed after the other, each for a whole episode; the
 first two seconds do not count. `agents/judges.json` has the horse's figures, their sources and the bars;
-nothing in it may enter a reward, a search or a choice of settings.
+nothing in it may enter a reward or a setting.
+
+Rows that are marked `searched` there are given to the search for kinematic gaits (`agents.kinematic_gaits`).
+Of such a gait, and of what is trained around it, they are printed as searched, inside or outside of the bar,
+and never count as met; what it was not given judges it. Of other policies all rows judge.
 
 A horse's figure at a Froude number is compared with that of the gait at the nearest speed. Ours counts only
 if the policy falls in a tenth of the episodes at most and keeps the commanded speed to 15 %, the hooves slip
@@ -34,12 +38,13 @@ from agents.horse_gaits import speed_of
 from agents.judge_pictures import draw
 from agents.judges import of_speeds, read_judges
 from hoof_env._output import markdown_table
+from hoof_env.envs.policies import start_of
 from hoof_env.errors import ParameterError, check_number, count
 from hoof_env.evaluation.episodes import make_rows
 from hoof_env.evaluation.statistics import estimate
 from hoof_env.policies.find import find_policy
 from hoof_env.tasks.horse import HIP_HEIGHT
-from hoof_env.tasks.horse_gaits import PAIRS
+from hoof_env.tasks.horse_gaits import PAIRS, kinematic_speeds
 
 ENV_ID = "hoof_env/Horse-v0"
 TROT = 0.05  # largest lag of a trot or a pace [strides]
@@ -49,6 +54,16 @@ MAX_ERROR = 0.15  # largest difference from the commanded speed, over that [-]
 MAX_SLIP = 0.10  # largest slip of a stance [m]
 TURNS = (0.95, 1.05)  # stances a turn
 NEAR = 0.1  # largest difference between the Froude numbers reached and of the horse
+WALK = (
+    "lag",
+    "duty_fore",
+    "duty_hind",
+    "two_peaked_fore",
+    "stride_over_hip",
+    "peak_fore",
+    "peak_hind",
+)
+"""Figures by which a walk is judged, of which the first five are searched with."""
 
 
 @dataclass
@@ -121,11 +136,15 @@ def trots_of(standing: list[dict[str, Any]]) -> list[dict[str, Any]]:
 
 def pairs_of(name: str) -> Sequence[str]:
     """Return the pairs of legs that a figure is about."""
-    if name == "two_peaked":
-        return PAIRS[:1]
     last_word = name.rpartition("_")[2]
     # The share of the impulse is about both pairs, whatever its name ends in
     return [last_word] if last_word in PAIRS and name != "impulse_fore" else PAIRS
+
+
+def excess(ours: float, bars: Sequence[tuple[float, float]]) -> str:
+    """Return how far a figure is beyond the end of the nearest bar: relative to it, as text."""
+    beyond = min((end for bar in bars for end in bar), key=lambda end: abs(ours - end))
+    return f"{ours / beyond - 1:+.0%}" if beyond else f"{ours:+.2g}"
 
 
 def judged(
@@ -142,7 +161,11 @@ def judged(
     elif bars and why:
         verdict = f"does not count: {why}"
     elif bars:
-        verdict = "met" if any(low <= ours <= high for low, high in bars) else "missed"
+        inside = any(low <= ours <= high for low, high in bars)
+        if judge.get("searched") and gait.figures and gait.figures.get("searched"):
+            verdict = f"searched, {'inside' if inside else 'outside'}"
+        else:
+            verdict = "met" if inside else f"missed by {excess(ours, bars)}"
     else:
         verdict = f"off by {ours / judge['horse'] - 1:+.0%}" + (f", does not count: {why}" if why else "")
     return (
@@ -169,30 +192,44 @@ def verdicts(figures: list[dict[str, Any]]) -> list[tuple[str, ...]]:
 def _walk(judges: dict[str, Any], standing: list[dict[str, Any]]) -> Iterator[tuple[str, ...]]:
     """Yield rows of the walk."""
     walk = at_speed(judges["walk"]["froude"], standing)
-    for name in ("lag", "duty_fore", "duty_hind", "two_peaked", "peak_fore", "peak_hind"):
+    for name in WALK:
         judge = judges["walk"]["duty" if name.startswith("duty") else name]
         yield judged(f"walk: {name}", walk, name, judge, [judge["bar"]])
+    yield from _foals(judges, "walk", walk)
 
 
 def _trot(judges: dict[str, Any], standing: list[dict[str, Any]]) -> Iterator[tuple[str, ...]]:
-    """Yield rows of the trot: peaks, and duty factors at several speeds."""
+    """Yield rows of the trot: peaks and signs at one speed, and duty factors and strides at several."""
     trots = trots_of(standing)
     lowest = judges["reported"]["walk_to_trot"]["horse"]
     # Slower ones would be compared with peaks that no horse has at a walk's speed
     quick = [trot for trot in trots if trot["froude_reached"] >= lowest]
     what = f"trot-like gait from Froude number {lowest:g} on"
     trot = at_speed(judges["trot"]["froude"], quick, what, near=np.inf)
-    for pair in PAIRS:
-        judge = judges["trot"][f"peak_{pair}"]
-        yield judged(f"trot-like: peak_{pair} [N/kg]", trot, f"peak_{pair}", judge, [judge["bar"]])
-    source = judges["duty"]["source"]
-    for froude, judge in of_speeds(judges["duty"]):
-        gait = at_speed(froude, trots, "trot-like gait")
-        # Published mean of each source, plus and minus the spread
-        bars = [(x - judge["bar"], x + judge["bar"]) for x in judge["horse"]]
-        for pair in PAIRS:
-            title = f"trot-like at {froude}: duty_{pair}"
-            yield judged(title, gait, f"duty_{pair}", judge | {"source": source}, bars)
+    for name, judge in judges["trot"].items():
+        if name not in ("froude", "lag"):
+            unit = " [N/kg]" if name.startswith(("peak", "net")) else ""
+            of_name = name.removesuffix("_2")
+            yield judged(f"trot-like: {name}{unit}", trot, of_name, judge, [judge["bar"]])
+    for group, names in (("duty", ("duty_fore", "duty_hind")), ("stride_over_hip", ("stride_over_hip",))):
+        also = {key: judges[group][key] for key in ("source", "searched")}
+        for froude, judge in of_speeds(judges[group]):
+            gait = at_speed(froude, trots, "trot-like gait")
+            # Published mean of each source, plus and minus the spread
+            bars = [(x - judge["bar"], x + judge["bar"]) for x in judge["horse"]]
+            for name in names:
+                yield judged(f"trot-like at {froude}: {name}", gait, name, judge | also, bars)
+    yield from _foals(judges, "trot", trot)
+
+
+def _foals(judges: dict[str, Any], kind: str, gait: Gait) -> Iterator[tuple[str, ...]]:
+    """Yield rows of foals at the Froude number that a gait reaches."""
+    foals = judges["foals"]
+    froude = float((gait.figures or {}).get("froude_reached", "nan"))
+    for name, (intercept, slope) in foals[kind].items():
+        expected = round(intercept + slope * froude, 2) if np.isfinite(froude) else "-"
+        title = f"foals, {kind}: {name} [N/kg]"
+        yield judged(title, gait, name, {"horse": expected, "source": foals["source"]}, [])
 
 
 def _reported(judges: dict[str, Any], standing: list[dict[str, Any]]) -> Iterator[tuple[str, ...]]:
@@ -223,7 +260,8 @@ SHOWN = (
     "slip_fore",
     "slip_hind",
     "lag",
-    "two_peaked",
+    "two_peaked_fore",
+    "two_peaked_hind",
     "peak_braking_fore",
     "peak_propulsion_fore",
     "peak_braking_hind",
@@ -232,6 +270,10 @@ SHOWN = (
     "mean_propulsion_fore",
     "mean_braking_hind",
     "mean_propulsion_hind",
+    "net_fore",
+    "net_hind",
+    "loading_fore",
+    "loading_hind",
     "stride_over_hip",
     "impulse_fore",
     "transport",
@@ -275,8 +317,14 @@ def table_of(name: str, figures: list[dict[str, Any]]) -> str:
             ours.append(gait.get("intervals", {}).get(key) or measured)
         body.append((key, *ours, str(reported.get(key, {}).get("horse", ""))))
     verdict = markdown_table(HEAD, verdicts(figures))
-    units = "Forces in N/kg, slip in m, lag in strides."
+    units = "Forces in N/kg, loading in N/kg/s, slip in m, lag in strides."
     return f"# {name}\n\n{verdict}\n\n{units}\n\n{markdown_table(head, body)}\n"
+
+
+def is_searched(envs: Any, policy: Any) -> bool:
+    """Return True if a policy plays a kinematic gait, or offsets from one."""
+    gaits = (envs.settings.gait, start_of(policy).get("gait"))
+    return any(isinstance(gait, str) and gait in kinematic_speeds() for gait in gaits)
 
 
 def main(argv: list[str] | None = None) -> None:
@@ -304,7 +352,8 @@ def main(argv: list[str] | None = None) -> None:
         for name in args.policies:
             policy = find_policy(name, env, ENV_ID)
             speeds = [speed_of(froude) * pace**0.5 for froude in args.froude]
-            figures[name] = [play(envs, policy, speed) for speed in speeds]
+            searched = is_searched(envs, policy)
+            figures[name] = [play(envs, policy, speed) | {"searched": searched} for speed in speeds]
             text.append(table_of(name, figures[name]))
             print(text[-1])
     if len(figures) > 1:

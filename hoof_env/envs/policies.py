@@ -141,7 +141,8 @@ def make_policy(name: str, env: Any, seed: int = 0) -> Scripted:
     swing; "random" draws a new action in every step; "bang-bang" switches all actions between their limits
     every quarter of a second; "drag" turns the hoof to the ground, stops there and moves it back and forth
     with the swing; "airborne" turns it to its highest position and stops there. For a horse, "reference" is
-    the zero action: the gait from which actions make offsets.
+    the zero action: the gait from which actions make offsets. "kinematic-walk" and "kinematic-trot" are zero
+    actions in the stored gait of this name, at its own speed.
 
     >>> import gymnasium as gym, hoof_env
     >>> env = gym.make("hoof_env/HorseLeg-v0")
@@ -183,6 +184,9 @@ def _scripted(name: str, env: Any, leg: Any, seed: int) -> Scripted:
         return Scripted(lambda observation, time: generator.uniform(-1, 1, (*np.shape(time), count)), leg.dt)
     if name == "bang-bang":
         return Scripted(partial(_bang_bang, count), leg.dt)
+    if name in leg.body.policy_starts:
+        zeros = np.zeros(count, np.float32)
+        return Scripted(lambda observation, time: zeros, leg.dt, leg.body.policy_starts[name])
     if name in leg.gaits:
         return constant_gait(leg.gaits[name], env, starts_in_it=True)
     offsets = [gait.swing_offset for gait in paper_gaits(leg.gaits).values()]

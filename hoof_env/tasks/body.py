@@ -57,6 +57,8 @@ class Body(Protocol):
             which is "" for a single leg.
         picture: kind of its picture, a key of `render.picture.PICTURES`.
         gaits: gaits by name.
+        policy_starts: reset options of the scripted policies that are zero actions in a stored gait at its
+            own speed, by name.
         harmonics, filters, limits, step_error: arguments of the engine.
         command_step: largest change from one commanded speed to the next [m/s].
         start_names, gait_names: names of the numbers with which infos describe an episode's start.
@@ -71,6 +73,7 @@ class Body(Protocol):
     hips: Hips
     picture: str
     gaits: Mapping[str, Any]
+    policy_starts: Mapping[str, dict[str, Any]]
     harmonics: int
     filters: FilterSettings
     limits: Limits | None

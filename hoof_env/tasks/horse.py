@@ -52,6 +52,7 @@ from hoof_env.tasks.horse_gaits import (
     crank_angles,
     gait_numbers,
     horse_gaits,
+    kinematic_speeds,
     rates,
     refer_to_target,
     reference_constants,
@@ -163,6 +164,7 @@ class Horse:
         size: length relative to a horse of 475 kg [-].
         speed_scale: speed relative to a horse of 475 kg, the root of the size [-].
         gaits: stored gaits by name, converted to the size of the animal.
+        policy_starts: see `body.Body`; of kinematic gaits.
         gait: gait to which actions add offsets at all commanded speeds; None for `reference_gaits`.
         lowest, highest: heights of the trunk beyond which the animal has fallen [m].
 
@@ -190,6 +192,10 @@ class Horse:
         self.hips: Hips = {f"{leg}_": (HIPS[leg.partition("_")[2]] * self.size, 0.0) for leg in LEGS}
         self.gaits: Mapping[str, Any] = {
             name: gait.of_size(self.size) for name, gait in horse_gaits().items()
+        }
+        self.policy_starts: Mapping[str, dict[str, Any]] = {
+            name: {"gait": name, "target_speed": speed * self.speed_scale}
+            for name, speed in kinematic_speeds().items()
         }
         self.gait = None if s.gait is None else self.gaits[check_choice("gait", s.gait, self.gaits)]
         self.harmonics = 2 if s.harmonics is None else count("harmonics", s.harmonics, most=2)
@@ -362,8 +368,8 @@ class Horse:
 
     @property
     def policy_names(self) -> list[str]:
-        """Names of the scripted policies."""
-        return list(POLICIES)
+        """Names of the scripted policies: `POLICIES`, then the kinematic gaits."""
+        return [*POLICIES, *self.policy_starts]
 
     def begin_episodes(self, episode: Any, which: NDArray[np.int64], start: Start) -> None:
         """Write the gaits from which actions make offsets, and offsets of 0."""

@@ -157,15 +157,26 @@ def bounds(size: float = 1.0) -> Floats:
 
 
 @cache
-def _data() -> dict[str, Any]:
-    """Read the stored gaits and reference gaits."""
-    file = resources.files("hoof_env").joinpath("data", "horse", "gaits.json")
+def _data(name: str = "gaits") -> dict[str, Any]:
+    """Read a file of stored gaits: "gaits", with the reference gaits, or "kinematic"."""
+    file = resources.files("hoof_env").joinpath("data", "horse", f"{name}.json")
     return dict(json.loads(file.read_text(encoding="utf-8")))
 
 
 def horse_gaits() -> dict[str, HorseGait]:
-    """Return the stored gaits, which are for a horse of 475 kg, by name."""
-    return {name: HorseGait.from_array(values) for name, values in _data()["gaits"].items()}
+    """Return the stored gaits, which are for a horse of 475 kg, by name: those found by the return alone,
+    then kinematic ones."""
+    kinematic = {name: found["gait"] for name, found in _data("kinematic").items()}
+    return {name: HorseGait.from_array(values) for name, values in (_data()["gaits"] | kinematic).items()}
+
+
+def kinematic_speeds() -> dict[str, float]:
+    """Return the speeds [m/s] of the kinematic gaits of a horse of 475 kg by name.
+
+    These were searched for with lag, duty factors, number of force peaks and stride of living horses; see
+    `agents.kinematic_gaits`.
+    """
+    return {name: float(found["speed"]) for name, found in _data("kinematic").items()}
 
 
 def gait_numbers(name: str, given: Any, gaits: Mapping[str, HorseGait], size: float) -> Floats:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
+from types import MappingProxyType
 from typing import Any
 
 import numpy as np
@@ -188,6 +189,7 @@ class OneLeg:
     limits: Limits | None = None
     action_names: tuple[str, ...] = tuple(f"rate_of_{name}" for name in PARAMETERS)
     action_form = "rates"
+    policy_starts: Mapping[str, dict[str, Any]] = MappingProxyType({})
     hips: Hips = ONE_HIP
     picture = "leg"
     step_error = 0.01

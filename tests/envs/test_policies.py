@@ -12,6 +12,7 @@ from hoof_env.envs.policies import make_policy, policy_names, start_of
 from hoof_env.errors import ParameterError
 from hoof_env.gait import PARAMETERS, GaitParameters, load_gait
 from hoof_env.tasks import horse as horse_body
+from hoof_env.tasks.horse_gaits import horse_gaits, kinematic_speeds
 from hoof_env.tasks.observation import HALF_RANGE, HIGH, LOW, MIDDLE
 from hoof_env.tasks.one_leg import POLICIES
 
@@ -103,9 +104,29 @@ def test_a_policy_acts_on_what_it_sees_as_action_for_does_on_the_state(env):
 
 def test_a_horse_has_no_gait_to_go_to():
     horse = gym.make("hoof_env/Horse-v0")
-    assert policy_names(horse) == list(horse_body.POLICIES)
+    assert policy_names(horse) == [*horse_body.POLICIES, *kinematic_speeds()]
     action, _ = make_policy("reference", horse).predict(np.zeros(66))
     np.testing.assert_array_equal(action, np.zeros(16))
+
+
+@pytest.mark.parametrize("size", [1.0, 0.5])
+@pytest.mark.parametrize("name", kinematic_speeds())
+def test_a_kinematic_gait_of_a_horse_plays_at_its_own_speed(name, size):
+    """And at a similar animal's, which is the same Froude number."""
+    horse = gym.make("hoof_env/Horse-v0", size=size)
+    policy = make_policy(name, horse)
+    horse.reset(seed=3, options=policy.start)
+    speed = kinematic_speeds()[name] * size**0.5
+    rows = horse.unwrapped.batch.rows.named
+    assert rows.target[0] == pytest.approx(speed)
+    np.testing.assert_allclose(rows.gait[:, 0], horse_gaits()[name].of_size(size).to_array())
+    places = []
+    for _ in range(400):
+        _, _, failed, _, _ = horse.step(policy.predict(np.zeros(66))[0])
+        assert not failed
+        places.append(float(horse.unwrapped.record()["x"][-1, 0]))
+    reached = (places[-1] - places[99]) / (300 * horse.unwrapped.dt)
+    assert reached == pytest.approx(speed, rel=0.05)
 
 
 def test_the_clock_of_one_restarts_and_the_others_go_on(env):

@@ -1,0 +1,145 @@
+"""The search for kinematic gaits: what it asks for, what it measures, and what it finds."""
+
+import json
+
+import numpy as np
+import pytest
+
+from agents import kinematic_gaits as search
+from agents.gait_figures import play
+from agents.horse_gaits import speed_of
+from agents.judges import searched_bars
+from hoof_env.envs.policies import make_policy
+from hoof_env.evaluation.episodes import make_rows
+from hoof_env.tasks.horse_gaits import bounds, horse_gaits, kinematic_speeds
+
+TURN = np.arange(search.BINS) / search.BINS
+
+
+def curve(*peaks, width=0.08):
+    """Force over a turn with peaks (place, height)."""
+    return sum(high * np.exp(-(((TURN - at) / width) ** 2)) for at, high in peaks)
+
+
+def test_points_of_the_box_are_gaits_that_a_horse_takes():
+    points = np.random.default_rng(0).uniform(-1, 1, (50, 16))
+    gaits = search.decode(points)
+    low, high = bounds()
+    assert ((gaits >= low) & (gaits <= high)).all()
+    np.testing.assert_allclose(search.encode(gaits), points, atol=1e-12)
+
+
+@pytest.mark.parametrize("kind", ["walk", "trot"])
+@pytest.mark.parametrize("stride", search.STRIDES)
+def test_a_search_begins_with_the_stride_that_is_asked_for(kind, stride):
+    """A crank turns once a stride: hooves that do not slip move by one stride in that time."""
+    speed = speed_of(0.25)
+    gaits = search.first_gaits(kind, speed, stride)
+    np.testing.assert_allclose(speed * 2 * np.pi / gaits[:, 0] / 1.4, stride)
+    assert len(np.unique(gaits[:, 1])) == len(search.LEADS)
+
+
+def test_a_dip_is_as_deep_as_between_two_peaks():
+    one = curve((0.5, 1.0), width=0.15)
+    two = curve((0.4, 1.0), (0.65, 0.8))
+    shoulder = curve((0.5, 1.0), (0.55, 0.3), width=0.15)
+    found = search.dips(np.stack([one, two, shoulder, np.roll(two, 17)], 1))
+    assert found[0] == found[2] == 0.0
+    between = two[(TURN > 0.4) & (TURN < 0.65)].min()
+    assert found[1] == pytest.approx((two[TURN > 0.55].max() - between) / two.max())
+    assert found[3] == pytest.approx(found[1])
+
+
+def test_a_lag_of_nearly_half_a_stride_is_as_near_to_a_trot_as_one_of_nearly_none():
+    lags = np.array([0.01, 0.49, 0.25, 0.06, 0.44])
+    apart = search.distance(lags, -0.05, 0.05, 0.02, is_lag=True)
+    assert apart[0] == apart[1] == 0.0
+    assert apart[2] == max(apart)
+    assert apart[3] == pytest.approx(apart[4])
+
+
+def test_a_figure_costs_nothing_within_its_bar_and_one_for_each_scale_beyond():
+    values = np.array([0.62, 0.58, 0.56, 0.9])
+    apart = search.distance(values, 0.58, 1.0, 0.02, is_lag=False)
+    assert apart[0] == apart[3] == 0.0
+    assert apart[2] - apart[1] == pytest.approx(1.0)
+    nearest = search.distance(np.array([1.0]), 0.0, 0.09, 0.02, is_lag=False)
+    assert nearest[0] > 40
+
+
+def figures_of(gaits, speed, starts):
+    return search.Rig(len(gaits) * starts).play(np.array(gaits), speed, 0, starts)
+
+
+def test_the_rig_measures_what_the_judges_measure():
+    """By other means: 20 ms apart and over a turn of the crank instead of at every substep."""
+    envs = make_rows("hoof_env/Horse-v0", 16)
+    zero = make_policy("reference", envs)
+    for name, speed in (("walk", speed_of(0.25)), ("trot-like", 3.6)):
+        gait = horse_gaits()[name].to_array()
+        found = figures_of([gait, gait], speed, 8)
+        judged = play(envs, zero, speed, gait)
+        for pair in ("fore", "hind"):
+            assert found[f"duty_{pair}"][0] == pytest.approx(judged[f"duty_{pair}"], abs=0.02)
+            assert found[f"slip_{pair}"][0] == pytest.approx(judged[f"slip_{pair}"], abs=0.02)
+        assert (found["lag"][0] - judged["lag"] + 0.25) % 0.5 - 0.25 == pytest.approx(0, abs=0.02)
+        assert found["stride_over_hip"][0] == pytest.approx(judged["stride_over_hip"], rel=0.02)
+        assert found["transport"][0] == pytest.approx(judged["transport"], rel=0.03)
+        assert found["reached"][0] == pytest.approx(judged["reached"], rel=0.02)
+
+
+def test_gaits_do_not_share_their_figures():
+    walk, fast = (horse_gaits()[name].to_array() for name in ("walk", "fast"))
+    both = figures_of([walk, fast], 1.85, 2)
+    alone = figures_of([fast], 1.85, 2)
+    for name, values in both.items():
+        assert values[1] == pytest.approx(alone[name][0], nan_ok=True), name
+
+
+def test_a_gait_that_falls_costs_more_than_any_that_stands():
+    walk = horse_gaits()["walk"].to_array()
+    still = walk.copy()
+    still[[4, 11]] = 0.3, 1.7  # legs that lie back
+    figures = figures_of([walk, still], 1.85, 2)
+    assert figures["fell"].tolist() == [0.0, 1.0]
+    bars = search.peaked(searched_bars("walk", 0.2))
+    costs = search.costs_of(figures, bars)
+    assert np.isfinite(costs).all()
+    assert costs[1] > costs[0] + search.FALL
+
+
+def test_the_command_finds_a_gait_and_goes_on_where_it_stopped(tmp_path, monkeypatch, capsys):
+    monkeypatch.setattr(search, "STRIDES", (1.6,))
+    monkeypatch.setattr(search, "STARTS", 1)
+    monkeypatch.setattr(search, "SECONDS", 3.0)
+    out, shipped = tmp_path / "found.json", tmp_path / "shipped.json"
+    argv = ["--gaits", "walk", "--froude", "0.2", "--first", "2", "--more", "1", "--out", str(out)]
+    search.main([*argv, "--shipped", str(shipped)])
+    found = json.loads(out.read_text())["searches"]
+    assert list(found) == [
+        "walk at 0.2 by work, seed 0, stride 1.6", "walk at 0.2 by work, seed 0, best"
+    ]  # fmt: skip
+    (one,) = json.loads(shipped.read_text()).values()
+    assert one["gait"] == found["walk at 0.2 by work, seed 0, best"]["gait"]
+    before = out.read_text()
+    search.main([*argv, "--shipped", str(shipped)])
+    assert out.read_text() == before
+    capsys.readouterr()
+
+
+@pytest.mark.parametrize("name", kinematic_speeds())
+def test_gaits_that_ship_have_what_they_were_searched_with(name):
+    """And what figures need to count; `docs/evidence/horse_gaits.md` has 1,000 starts."""
+    envs = make_rows("hoof_env/Horse-v0", 32)
+    speed = kinematic_speeds()[name]
+    found = play(envs, make_policy(name, envs), speed, horse_gaits()[name].to_array())
+    assert found["fell"] == 0.0
+    for pair in ("fore", "hind"):
+        assert found[f"slip_{pair}"] < 0.10
+        assert 0.95 <= found[f"stances_per_turn_{pair}"] <= 1.05
+    for figure, bars in searched_bars(name.removeprefix("kinematic-"), found["froude_reached"]).items():
+        ours = found[figure]
+        if figure == "lag":
+            middle = sum(bars[0]) / 2
+            ours = middle + (ours - middle + 0.25) % 0.5 - 0.25
+        assert any(low <= ours <= high for low, high in bars), (figure, ours)
