@@ -257,7 +257,7 @@ Numbers are means over trainings, in brackets the lowest and the highest. The co
 steps in violation; an agent keeps the limit if its mean is {budget:.0f} or less. Trained by the code of
 {commits}.
 
-* **PPO** is not given the cost, and neither is **PPO, free**, which was trained for fewer steps and from which
+* **PPO** is not given the cost. Neither is **PPO, free**, which was trained for fewer steps and from which
   the limits come.
 * **PPO, penalised** pays for forces as on `HorseLeg-v0` and `Horse-v0`, by the weights of their terms.
 * **PPO-Lagrangian** ([agents/ppo_lagrangian.py](../../agents/ppo_lagrangian.py)) has a multiplier for costs.
