@@ -117,10 +117,10 @@ def test_the_command_finds_a_gait_and_goes_on_where_it_stopped(tmp_path, monkeyp
     search.main([*argv, "--shipped", str(shipped)])
     found = json.loads(out.read_text())["searches"]
     assert list(found) == [
-        "walk at 0.2 by work, seed 0, stride 1.6", "walk at 0.2 by work, seed 0, best"
+        "walk at 0.2 by force, seed 0, stride 1.6", "walk at 0.2 by force, seed 0, best"
     ]  # fmt: skip
     (one,) = json.loads(shipped.read_text()).values()
-    assert one["gait"] == found["walk at 0.2 by work, seed 0, best"]["gait"]
+    assert one["gait"] == found["walk at 0.2 by force, seed 0, best"]["gait"]
     before = out.read_text()
     search.main([*argv, "--shipped", str(shipped)])
     assert out.read_text() == before
