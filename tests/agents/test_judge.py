@@ -385,6 +385,8 @@ class Toy:
         return {
             "time": time, "toe_normal": normal[..., None] / 4, "heel_normal": normal[..., None] * 3 / 4,
             "toe_friction": push[..., None] / 4, "heel_friction": push[..., None] * 3 / 4,
+            "toe_deflection_normal": 1e-5 * normal[..., None],
+            "heel_deflection_normal": 0 * normal[..., None],
         }  # fmt: skip
 
 
@@ -427,6 +429,8 @@ def test_horizontal_forces_are_judged_by_their_peaks_in_a_stance():
         assert one[f"peak_braking_{pair}"] == pytest.approx(0.3 * by, rel=1e-3)
         assert one[f"peak_propulsion_{pair}"] == pytest.approx(0.7 * by, rel=1e-3)
     assert one["lag"] == pytest.approx(0.25, abs=0.01)
+    deepest = 1e-5 * (2e3 + 0.9 * LIFT_OFF * WEIGHT / 4)
+    assert one["depth_fore"] == one["depth_hind"] == pytest.approx(deepest, rel=1e-3)
     assert len(one["footfall"]) >= 8  # with a higher load that counts, or a lower one, hooves never lift
 
 
