@@ -32,7 +32,7 @@ from agents.horse_gaits import landings, speed_of
 from agents.judges import Bars, searched_bars
 from hoof_env.dynamics.layout import Features, stride_sums
 from hoof_env.dynamics.observables import stance_figures
-from hoof_env.errors import parse_json
+from hoof_env.errors import check_choice, parse_json
 from hoof_env.evaluation.episodes import make_rows
 from hoof_env.simd.threads import limit_threads
 from hoof_env.tasks.horse import HIP_HEIGHT
@@ -273,7 +273,7 @@ class Rig:
         count = np.maximum(ok.sum(1), 1)
         means = {}
         for name, values in figures.items():
-            each = np.where(ok, np.nan_to_num(values[:size].reshape(m, starts), nan=1e3), 0.0)
+            each = np.where(ok, np.nan_to_num(values[:size].reshape(m, starts), nan=1e3, posinf=1e3), 0.0)
             means[name] = np.where(ok.any(1), each.sum(1) / count, np.nan)
         lag = np.where(ok, lags[:size].reshape(m, starts), 0.0).sum(1)
         means["lag"] = np.where(ok.any(1), np.angle(lag) / (4 * np.pi) % 0.5, np.nan)
@@ -335,6 +335,8 @@ class Args:
     """what was found; one that exists is gone on with"""
     shipped: Path = Path("runs/kinematic-gaits.json")
     """what of it comes with the package, as hoof_env/data/horse/kinematic.json"""
+    begin: Path | None = None
+    """gaits from which searches go on in place of those of several strides, as `shipped` has them"""
     first: int = 120
     """generations from each stride"""
     more: int = 300
@@ -444,6 +446,10 @@ def find(kind: str, froude: float, args: Args, records: Records) -> dict[str, An
     def improve(first: Floats, spread: float, count: int) -> Any:
         return lambda tick: finder.check(finder.improve(first, spread, count, tick))
 
+    if args.begin is not None:
+        known = parse_json(args.begin.read_text(encoding="utf-8"))
+        best = np.array(known[check_choice("gait", f"kinematic-{kind}", known)]["gait"])
+        return records.keep(f"{title}, from {args.begin.name}", improve(best, AGAIN, args.more))
     begun = [
         records.keep(f"{title}, stride {stride:g}", improve(finder.begin(stride), SPREAD, args.first))
         for stride in STRIDES
