@@ -6,7 +6,9 @@ of peaks, normal and horizontal force over a stance, and the peaks of braking an
 horizontal force backward and forward of each whole stance (0 if there is none), averaged over stances.
 
 The loading of a pair is the mean of the stances' steepest rises of the normal force. The net force of a pair
-is the mean over time of the horizontal force on its two hooves: positive forward.
+is the mean over time of the horizontal force on its two hooves: positive forward. The depth is the mean over
+hooves and episodes of the deepest that a toe or heel gives way on its spring, as deep as pictures show it in
+the ground; NaN of rigid hooves.
 
 Left and right legs of a pair are interchangeable in the plane: the lag is the time from the landing of a hind
 hoof to the next landing of a fore hoof, over the stride and within half of one, so that 0 is a trot or a pace
@@ -36,6 +38,7 @@ WATCHED = 8  # episodes whose forces are kept at every substep
 SHORTEST = 0.05  # stance [s]
 DIP = 0.05  # least dip next to a peak, over the highest one [-]
 FORCES = ("toe_normal", "heel_normal", "toe_friction", "heel_friction")  # columns of a record that are kept
+DEPTHS = ("toe_deflection_normal", "heel_deflection_normal")  # columns that compliant hooves add
 HORIZONTAL = ("braking", "propulsion")  # forces backward and forward
 NEEDED = ("loading_rate_increase", "stances", *HORIZONTAL)  # sums of loading and net force
 
@@ -156,7 +159,8 @@ def watch(envs: Any, policy: Any, speed: float, gait: Floats | None = None) -> P
             last = _place(measured)
             for env, kept in enumerate(watched):
                 record = envs.record(env)
-                kept.append({name: record[name] for name in ("time", *FORCES)})
+                names = ("time", *FORCES, *(name for name in DEPTHS if name in record))
+                kept.append({name: record[name] for name in names})
     moved = last - began
     return Played((steps - 1 - settled) * dt, sums, moved[0], moved[1:] / (2 * np.pi), upright, watched)
 
@@ -230,6 +234,7 @@ def _from_stances(played: Played, kilograms: float) -> dict[str, Any]:
     lift_off = LIFT_OFF * kilograms * GRAVITY / len(LEGS)
     stances = []
     lags = []
+    depths = []
     footfall: list[list[float]] = []
     for env, records in enumerate(played.watched):
         if not played.upright[env]:
@@ -238,6 +243,8 @@ def _from_stances(played: Played, kilograms: float) -> dict[str, Any]:
         of_episode = stances_of(time, forces, pushes, lift_off)
         stances += of_episode
         lags.append(lag_of(of_episode, period))
+        if DEPTHS[0] in records[0]:
+            depths.append(np.max([record[name].max(0) for record in records for name in DEPTHS], axis=0))
         # Of the first upright episode
         footfall = footfall or footfall_of(of_episode, time[-1], 2 * period)
     of_pairs = {pair: [stance for stance in stances if stance.leg // 2 == k] for k, pair in enumerate(PAIRS)}
@@ -254,6 +261,8 @@ def _from_stances(played: Played, kilograms: float) -> dict[str, Any]:
         },
     }
     for pair, of_pair in of_pairs.items():
+        k = PAIRS.index(pair)
+        result[f"depth_{pair}"] = _mean([depth[2 * k : 2 * k + 2].mean() for depth in depths])
         result[f"two_peaked_{pair}"] = _mean([stance.is_two_peaked for stance in of_pair])
         for name in HORIZONTAL:
             peaks = [getattr(stance, f"peak_{name}") for stance in of_pair]

@@ -259,6 +259,8 @@ SHOWN = (
     "stances_per_turn_hind",
     "slip_fore",
     "slip_hind",
+    "depth_fore",
+    "depth_hind",
     "lag",
     "two_peaked_fore",
     "two_peaked_hind",
@@ -317,7 +319,7 @@ def table_of(name: str, figures: list[dict[str, Any]]) -> str:
             ours.append(gait.get("intervals", {}).get(key) or measured)
         body.append((key, *ours, str(reported.get(key, {}).get("horse", ""))))
     verdict = markdown_table(HEAD, verdicts(figures))
-    units = "Forces in N/kg, loading in N/kg/s, slip in m, lag in strides."
+    units = "Forces in N/kg, loading in N/kg/s, slip and depth in m, lag in strides."
     return f"# {name}\n\n{verdict}\n\n{units}\n\n{markdown_table(head, body)}\n"
 
 

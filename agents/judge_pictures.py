@@ -1,4 +1,7 @@
-"""Pictures of the judges: force curves, footfall, and figures over speed beside horses'."""
+"""Pictures of the judges: force curves, footfall, and figures over speed beside horses'.
+
+Pictures are 800 pixels wide, as front pages show them, and have letters of 12 pixels at least.
+"""
 
 from __future__ import annotations
 
@@ -13,6 +16,60 @@ from hoof_env.tasks.horse_gaits import LEGS, PAIRS
 
 Floats = NDArray[np.float64]
 Figures = dict[str, list[dict[str, Any]]]
+
+WIDTH = 800  # [pixels]
+DPI = 100
+LETTERS = 12 * 72 / DPI  # 12 pixels [points]
+ABREAST = 4  # gaits side by side at most
+COLOURS = {"fore": "#0072B2", "hind": "#CC79A7"}
+
+
+def ranges_of(kind: str, froude: float) -> dict[str, dict[str, Any]]:
+    """Return published ranges of a walk's or a trot's stance peaks, by pair: "bands", pairs of values of the
+    normal force, and "lines", values of the horizontal force, negative ones braking [N/kg].
+
+    A walk's lines are those of foals at the Froude number; of hind legs there is none.
+    """
+    judges = read_judges()
+    found: dict[str, dict[str, Any]] = {pair: {"bands": [], "lines": []} for pair in PAIRS}
+    for name, judge in judges[kind].items():
+        pair = name.removeprefix("peak_").removesuffix("_2")
+        if name.startswith("peak_") and pair in PAIRS:
+            found[pair]["bands"].append(judge["bar"])
+    for sign, what in ((-1, "braking"), (1, "propulsion")):
+        if kind == "trot":
+            for pair in PAIRS:
+                found[pair]["lines"].append(sign * judges["reported"][f"peak_{what}_{pair}"]["horse"])
+        else:
+            intercept, slope = judges["foals"]["walk"][f"peak_{what}_fore"]
+            found["fore"]["lines"].append(sign * (intercept + slope * froude))
+    return found
+
+
+def kind_of(gait: dict[str, Any]) -> str:
+    """Return "trot" for a gait with the lag of a trot at a speed at which horses trot, else "walk"."""
+    slowest = read_judges()["reported"]["walk_to_trot"]["horse"]
+    is_trot = min(gait["lag"], 0.5 - gait["lag"]) < 0.05 and gait["froude_reached"] >= slowest
+    return "trot" if is_trot else "walk"
+
+
+def panels(shown: list[dict[str, Any]], rows: int, height: float, **shared: Any) -> tuple[Any, list[Any]]:
+    """Return a figure and the axes of each gait, shape (rows,); `height` is that of a row [inches]."""
+    from matplotlib.figure import Figure
+
+    blocks = -(-len(shown) // ABREAST)
+    picture = Figure((WIDTH / DPI, height * rows * blocks), dpi=DPI, layout="constrained")
+    columns = min(len(shown), ABREAST)
+    axes = picture.subplots(rows * blocks, columns, squeeze=False, **shared)
+    of_gaits = []
+    for k in range(columns * blocks):
+        block, column = divmod(k, columns)
+        of_gait = axes[block * rows : (block + 1) * rows, column]
+        for axis in of_gait:
+            axis.tick_params(labelsize=LETTERS)
+            axis.set_visible(k < len(shown))
+        of_gaits.append(of_gait)
+    return picture, of_gaits[: len(shown)]
 
 
 def shape_of(froude: float, pair: str) -> Floats | None:
@@ -32,43 +89,57 @@ def shape_of(froude: float, pair: str) -> Floats | None:
 
 
 def forces(figures: Figures, shown: list[dict[str, Any]]) -> Any:
-    """Draw the normal force over the stance of all policies, at each speed that is shown."""
-    from matplotlib.figure import Figure
+    """Draw normal and horizontal force over the stance of all policies, at each speed that is shown.
 
-    picture = Figure((3.0 * len(shown), 5.2), layout="constrained")
-    axes = picture.subplots(2, len(shown), sharex=True, sharey=True, squeeze=False)
-    for column, gait in enumerate(shown):
-        for row, pair in enumerate(PAIRS):
-            for gaits in figures.values():
-                # A policy that falls at this speed has no curves
-                match = next((g for g in gaits if g["speed"] == gait["speed"] and "curves" in g), None)
-                if match and match["curves"][pair]:
-                    axes[row, column].plot(match["curves"][pair], lw=1.2, color=f"C{row}", alpha=0.8)
+    Bands are published ranges of stance peaks, dashed lines published peaks without a spread, and dotted
+    curves idealised ones of horses.
+    """
+    picture, each = panels(shown, 2, 2.1, sharex=True, sharey="row")
+    for k, (gait, (up, forward)) in enumerate(zip(shown, each, strict=True)):
+        for gaits in figures.values():
+            # A policy that falls at this speed has no curves
+            match = next((g for g in gaits if g["speed"] == gait["speed"] and "curves" in g), None)
+            for axis, name in ((up, "curves"), (forward, "pushes")):
+                for pair in PAIRS:
+                    if match and match.get(name, {}).get(pair):
+                        axis.plot(match[name][pair], lw=1.4, color=COLOURS[pair], label=pair)
+        if "froude_reached" in gait:
+            ranges = ranges_of(kind_of(gait), gait["froude_reached"])
+            for pair in PAIRS:
+                for low, high in ranges[pair]["bands"]:
+                    up.axhspan(low, high, color=COLOURS[pair], alpha=0.15, lw=0)
+                for value in ranges[pair]["lines"]:
+                    forward.axhline(value, color=COLOURS[pair], ls="--", lw=1)
+        for pair in PAIRS:
             if (shape := shape_of(gait["froude"], pair)) is not None:
-                axes[row, column].plot(shape, "k--", lw=1, label="horse, idealised")
-                axes[row, column].legend(fontsize=7)
-            axes[row, column].grid(alpha=0.3)
-        duty = f", duty {gait['duty_fore']:.2f} / {gait['duty_hind']:.2f}" if len(figures) == 1 else ""
-        axes[0, column].set_title(f"Fr {gait['froude']:.2f}{duty}", fontsize=9)
-        axes[1, column].set_xlabel("stance [%]")
-    for row, pair in enumerate(PAIRS):
-        axes[row, 0].set_ylabel(f"{pair}: normal force [N/kg]")
+                up.plot(shape, ":", lw=1.2, color=COLOURS[pair])
+        for axis in (up, forward):
+            axis.grid(alpha=0.3)
+        duty = f"\nduty {gait['duty_fore']:.2f}, {gait['duty_hind']:.2f}" if len(figures) == 1 else ""
+        up.set_title(f"Fr {gait.get('froude_reached', gait['froude']):.2f}{duty}", fontsize=LETTERS)
+        forward.set_xlabel("stance [%]", fontsize=LETTERS)
+        if k % ABREAST == 0:
+            up.set_ylabel("up [N/kg]", fontsize=LETTERS)
+            forward.set_ylabel("forward [N/kg]", fontsize=LETTERS)
+    handles, labels = each[0][0].get_legend_handles_labels()
+    named = dict(zip(labels, handles, strict=True))
+    picture.legend(named.values(), named, loc="outside lower center", ncols=2, fontsize=LETTERS)
     return picture
 
 
 def footfall(shown: list[dict[str, Any]]) -> Any:
     """Draw the stances of each leg over two strides."""
-    from matplotlib.figure import Figure
-
-    picture = Figure((2.6 * len(shown), 1.9), layout="constrained")
-    for axis, gait in zip(picture.subplots(1, len(shown), squeeze=False)[0], shown, strict=True):
+    picture, each = panels(shown, 1, 1.9)
+    for k, (gait, (axis,)) in enumerate(zip(shown, each, strict=True)):
         for leg, began, ended in gait["footfall"]:
             # The first leg on top, as the labels are
-            axis.barh(len(LEGS) - leg, ended - began, left=began, height=0.6, color=f"C{leg // 2}")
-        axis.set_yticks(range(len(LEGS), 0, -1), [name.replace("_", " ") for name in LEGS], fontsize=8)
+            colour = COLOURS[PAIRS[leg // 2]]
+            axis.barh(len(LEGS) - leg, ended - began, left=began, height=0.6, color=colour)
+        letters = ["".join(word[0].upper() for word in name.split("_")) for name in LEGS]
+        axis.set_yticks(range(len(LEGS), 0, -1), letters if k % ABREAST == 0 else [""] * len(LEGS))
         axis.set_ylim(0.4, len(LEGS) + 0.6)
-        axis.set_title(f"Fr {gait['froude']:.2f}", fontsize=9)
-        axis.set_xlabel("time [s]")
+        axis.set_title(f"Fr {gait.get('froude_reached', gait['froude']):.2f}", fontsize=LETTERS)
+        axis.set_xlabel("time [s]", fontsize=LETTERS)
     return picture
 
 
@@ -76,7 +147,7 @@ def speeds(figures: Figures) -> Any:
     """Draw lag, duty factor and cost of transport over the Froude number reached."""
     from matplotlib.figure import Figure
 
-    picture = Figure((10, 3.2), layout="constrained")
+    picture = Figure((WIDTH / DPI, 3.2), dpi=DPI, layout="constrained")
     lag, duty, cost = picture.subplots(1, 3)
     for name, gaits in figures.items():
         good = [gait for gait in gaits if "lag" in gait]
@@ -92,14 +163,15 @@ def speeds(figures: Figures) -> Any:
     duty.plot([at for at, _ in trots], [judge["horse"][0] for _, judge in trots], "k*", label="horses, trot")
     lag.plot([walk["froude"]], [walk["lag"]["horse"]], "k*", label="horses, walk")
     duty.plot([walk["froude"]], [walk["duty"]["horse"]], "k^", label="horses, walk")
-    names = {lag: "lag of hind to fore [strides]", duty: "duty factor [-]", cost: "cost of transport [-]"}
+    names = {lag: "lag of hind to fore [strides]", duty: "duty factor [-]", cost: "mechanical transport [-]"}
     for panel, label in names.items():
-        panel.set_xlabel("Froude number reached [-]")
-        panel.set_ylabel(label)
+        panel.set_xlabel("Froude number", fontsize=LETTERS)
+        panel.set_ylabel(label, fontsize=LETTERS)
+        panel.tick_params(labelsize=LETTERS)
         panel.grid(alpha=0.3)
     if len(figures) <= 3:
-        lag.legend(fontsize=7)
-        duty.legend(fontsize=7)
+        lag.legend(fontsize=LETTERS)
+        duty.legend(fontsize=LETTERS)
     return picture
 
 
@@ -111,4 +183,4 @@ def draw(figures: Figures, out: Path) -> None:
         return print("no pictures: the first policy falls at every speed")
     pictures = {"forces": forces(figures, shown), "footfall": footfall(shown), "speeds": speeds(figures)}
     for name, picture in pictures.items():
-        picture.savefig(out / f"{name}.png", dpi=110)
+        picture.savefig(out / f"{name}.png", dpi=DPI)

@@ -2,9 +2,11 @@
 
 The searches of `agents.horse_gaits` know the return alone. These are also given the kinematics of living
 horses: the rows of `agents/judges.json` that are marked `searched`, which are lag, duty factors, number of
-force peaks and length of the stride. Of gaits that have them the one that needs the least work a metre is
-wanted, or by `--criterion` the one with the highest return, the lowest peaks or the slowest loading, of which
-no figure of a horse is given. What these gaits are judged by, peaks, braking, propulsion, impulses and
+force peaks and length of the stride. Of gaits that have them the one is wanted with the least mean square of
+the forces on the hooves, which is high where a peak is or where legs pull against each other. By
+`--criterion` it is the least positive work of single limbs on the centre of mass (Donelan, Kram and Kuo 2002,
+J. Biomech. 35:117) or of the drives, the highest return, the lowest peaks or the slowest loading. None of
+these has a figure of a horse, and what the gaits are judged by, peaks, braking, propulsion, impulses and
 loading of horses, is not known to the search.
 
 A search begins with the reference gait of its speed, with a stride of 1.3 to 2.3 hip heights and several
@@ -30,7 +32,7 @@ from agents.horse_gaits import landings, speed_of
 from agents.judges import Bars, searched_bars
 from hoof_env.dynamics.layout import Features, stride_sums
 from hoof_env.dynamics.observables import stance_figures
-from hoof_env.errors import parse_json
+from hoof_env.errors import check_choice, parse_json
 from hoof_env.evaluation.episodes import make_rows
 from hoof_env.simd.threads import limit_threads
 from hoof_env.tasks.horse import HIP_HEIGHT
@@ -71,7 +73,7 @@ SCALES = {
     "stances_per_turn_hind": 0.03,
     "speed_ratio": 0.03,
 }
-"""Distance from a bar that costs 1, by figure."""
+"""Scale of the distance from a bar, by figure."""
 MARGIN = 0.25  # distance within a bar from which on it costs nothing, in these
 NEEDED: Bars = {
     "slip_fore": [(0.0, 0.09)],
@@ -81,16 +83,22 @@ NEEDED: Bars = {
     "speed_ratio": [(0.95, 1.05)],
 }
 """What a gait needs so that its figures count; see `agents.judge`."""
-FALL = 20.0  # cost of a gait that always falls
+MISS = 4.0  # cost of a scale beyond a bar
+FALL = 60.0  # cost of a gait that always falls
 CRITERIA = {
+    "force": ("force", 40.0),
+    "limbs": ("limb_work", 20.0),
     "work": ("transport", 4.0),
     "return": ("return", -0.02),
     "peak": ("peak", 4.0),
     "loading": ("loading", 0.1),
 }
-"""Figure that decides between gaits with the wanted kinematics, and the cost of 1 of it, by criterion: work
-over weight and distance [-], return of `SECONDS`, mean of the stances' peaks over the weight [-] and of their
-steepest rises [1/s]."""
+"""Figure that decides between gaits with the wanted kinematics, and the cost of 1 of it, by criterion.
+
+They are the mean square of the forces on all hooves over the weight [-], positive work of single limbs on the
+centre of mass or of the drives over weight and distance [-], return of `SECONDS`, mean of the stances' peaks
+over the weight [-] and of their steepest rises [1/s].
+"""
 TWO_PEAKED = (0.12, 1.0)
 ONE_PEAKED = (0.0, 0.02)
 """Depth of the dip between two peaks, over the higher one, of a force with two and of one with one."""
@@ -199,6 +207,8 @@ class Rig:
         forces = np.zeros((len(PAIRS), BINS, n))
         counts = np.full((len(PAIRS), BINS, n), 1e-9)
         column = np.arange(n)
+        limb_work = np.zeros(n)
+        squares = np.zeros(n)
         settled = round(SETTLED / envs.dt)
         steps = round(SECONDS / envs.dt)
         for k in range(steps):
@@ -212,16 +222,24 @@ class Rig:
             if k >= settled:
                 for name, total in sums.items():
                     total += np.array([measured[f"{leg}_{name}"] for leg in LEGS])
+                for leg in LEGS:
+                    forward = measured[f"{leg}_propulsion"] - measured[f"{leg}_braking"]
+                    up = measured[f"{leg}_normal_impulse"]
+                    squares += forward**2 + up**2
+                    work = forward * measured["vx"] + up * measured["vy"]
+                    limb_work += np.maximum(work, 0.0)
                 lags += landings(rows, np.array([measured[f"{leg}_stance_began"] for leg in LEGS]))
                 at = (place[1:] / (2 * np.pi) * BINS).astype(int) % BINS
-                for leg in range(len(LEGS)):
+                for i, leg in enumerate(LEGS):
                     # The mean force over the step, but for a factor
-                    forces[leg // 2, at[leg], column] += measured[f"{LEGS[leg]}_normal_impulse"]
-                    counts[leg // 2, at[leg], column] += 1
+                    forces[i // 2, at[i], column] += measured[f"{leg}_normal_impulse"]
+                    counts[i // 2, at[i], column] += 1
         seconds = (steps - settled) * envs.dt
         moved = place - began
         turns = moved[1:] / (2 * np.pi)
         figures = self._figures(sums, seconds, moved[0], turns)
+        figures["force"] = squares / envs.dt**2 / (steps - settled) / envs.weight**2
+        figures["limb_work"] = limb_work / (envs.weight * np.abs(moved[0]))
         for k, pair in enumerate(PAIRS):
             figures[f"dip_{pair}"] = dips(forces[k] / counts[k])
         figures["speed_ratio"] = figures["reached"] / speed
@@ -255,7 +273,7 @@ class Rig:
         count = np.maximum(ok.sum(1), 1)
         means = {}
         for name, values in figures.items():
-            each = np.where(ok, np.nan_to_num(values[:size].reshape(m, starts), nan=1e3), 0.0)
+            each = np.where(ok, np.nan_to_num(values[:size].reshape(m, starts), nan=1e3, posinf=1e3), 0.0)
             means[name] = np.where(ok.any(1), each.sum(1) / count, np.nan)
         lag = np.where(ok, lags[:size].reshape(m, starts), 0.0).sum(1)
         means["lag"] = np.where(ok.any(1), np.angle(lag) / (4 * np.pi) % 0.5, np.nan)
@@ -264,7 +282,7 @@ class Rig:
         return means
 
 
-def costs_of(figures: dict[str, Floats], bars: Bars, criterion: str = "work") -> Floats:
+def costs_of(figures: dict[str, Floats], bars: Bars, criterion: str = "force") -> Floats:
     """Return the cost of gaits, shape (m,): distances from bars over `SCALES`, falls, and one of
     `CRITERIA`."""
     cost = np.zeros(len(figures["fell"]))
@@ -273,7 +291,7 @@ def costs_of(figures: dict[str, Floats], bars: Bars, criterion: str = "work") ->
         distances = [distance(figures[name], low, high, scale, name == "lag") for low, high in of_name]
         far = np.min(distances, axis=0)
         # Far from the bar a cost grows more slowly, so that no figure hides all others
-        cost += np.where(np.isfinite(far), far / (1 + far / 20), 20.0)
+        cost += MISS * np.where(np.isfinite(far), far / (1 + far / 20), 20.0)
     name, price = CRITERIA[criterion]
     total: Floats = cost + FALL * figures["fell"] + price * np.nan_to_num(figures[name], nan=10.0)
     return total
@@ -311,12 +329,14 @@ class Args:
     """what is searched for: walk, trot"""
     froude: tuple[float, ...] = (0.2, 0.85)
     """Froude number of each"""
-    criterion: str = "work"
-    """what decides between gaits with the wanted kinematics: work, return, peak or loading"""
+    criterion: str = "force"
+    """what decides between gaits with the wanted kinematics: force, limbs, work, return, peak or loading"""
     out: Path = Path("runs/kinematic.json")
     """what was found; one that exists is gone on with"""
     shipped: Path = Path("runs/kinematic-gaits.json")
     """what of it comes with the package, as hoof_env/data/horse/kinematic.json"""
+    begin: Path | None = None
+    """gaits from which searches go on in place of those of several strides, as `shipped` has them"""
     first: int = 120
     """generations from each stride"""
     more: int = 300
@@ -336,7 +356,9 @@ class Finder:
         **settings: arguments of the environment.
     """
 
-    def __init__(self, kind: str, froude: float, seed: int, criterion: str = "work", **settings: Any) -> None:
+    def __init__(
+        self, kind: str, froude: float, seed: int, criterion: str = "force", **settings: Any
+    ) -> None:
         require("agents.kinematic_gaits", "cma")
         self.kind = kind
         self.speed = speed_of(froude)
@@ -424,6 +446,10 @@ def find(kind: str, froude: float, args: Args, records: Records) -> dict[str, An
     def improve(first: Floats, spread: float, count: int) -> Any:
         return lambda tick: finder.check(finder.improve(first, spread, count, tick))
 
+    if args.begin is not None:
+        known = parse_json(args.begin.read_text(encoding="utf-8"))
+        best = np.array(known[check_choice("gait", f"kinematic-{kind}", known)]["gait"])
+        return records.keep(f"{title}, from {args.begin.name}", improve(best, AGAIN, args.more))
     begun = [
         records.keep(f"{title}, stride {stride:g}", improve(finder.begin(stride), SPREAD, args.first))
         for stride in STRIDES

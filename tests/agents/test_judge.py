@@ -251,9 +251,45 @@ def test_of_all_policies_there_are_means_and_intervals():
 def test_only_the_forces_of_one_policy_are_titled_with_its_duty_factors():
     curves = {"fore": [0.0] * 101, "hind": [0.0] * 101}
     one = {"speed": 1.85, "froude": 0.25, "duty_fore": 0.46, "duty_hind": 0.5, "curves": curves}
-    for names, title in (("a", "Fr 0.25, duty 0.46 / 0.50"), ("ab", "Fr 0.25")):
+    for names, title in (("a", "Fr 0.25\nduty 0.46, 0.50"), ("ab", "Fr 0.25")):
         picture = judge_pictures.forces({name: [one] for name in names}, [one])
         assert picture.axes[0].get_title() == title
+
+
+def letters_of(picture):
+    """Sizes of all texts that are seen [pixels]."""
+    picture.draw_without_rendering()
+    texts = picture.findobj(lambda one: hasattr(one, "get_fontsize") and one.get_text().strip())
+    return [one.get_fontsize() * picture.dpi / 72 for one in texts if one.get_visible()]
+
+
+@pytest.mark.parametrize("count", [1, 2, 5])
+def test_letters_of_pictures_are_large_enough_for_a_front_page(count):
+    """12 pixels where the picture is shown 800 pixels wide."""
+    flat = {"fore": [0.0] * 101, "hind": [0.0] * 101}
+    shown = [
+        {**one, "curves": flat, "pushes": flat, "footfall": [[0, 0.0, 0.3]], "transport": 1.0}
+        for one in (figures(), TROT, *[figures()] * 3)[:count]
+    ]
+    for picture in (
+        judge_pictures.forces({"a": shown}, shown),
+        judge_pictures.footfall(shown),
+        judge_pictures.speeds({"a": shown}),
+    ):
+        assert picture.get_figwidth() * picture.dpi == pytest.approx(800)
+        assert min(letters_of(picture)) >= 12 - 1e-9
+
+
+def test_peaks_of_horses_are_drawn_beside_a_walk_and_a_trot():
+    flat = {"fore": [0.0] * 101, "hind": [0.0] * 101}
+    shown = [{**one, "curves": flat, "pushes": flat} for one in (figures(), TROT)]
+    picture = judge_pictures.forces({"a": shown}, shown)
+    up, trot_up, _, trot_forward = picture.axes
+    bands = [[patch.get_y(), patch.get_y() + patch.get_height()] for patch in up.patches]
+    np.testing.assert_allclose(bands, [[4.96, 7.44], [3.84, 5.76]])
+    assert len(trot_up.patches) == 3  # two sources of the fore peak, one of the hind one
+    lines = sorted(line.get_ydata()[0] for line in trot_forward.lines if line.get_linestyle() == "--")
+    assert lines == [-1.13, -0.79, 0.84, 1.17]
 
 
 def test_the_command_writes_figures_a_table_and_pictures(tmp_path, capsys):
@@ -349,6 +385,8 @@ class Toy:
         return {
             "time": time, "toe_normal": normal[..., None] / 4, "heel_normal": normal[..., None] * 3 / 4,
             "toe_friction": push[..., None] / 4, "heel_friction": push[..., None] * 3 / 4,
+            "toe_deflection_normal": 1e-5 * normal[..., None],
+            "heel_deflection_normal": 0 * normal[..., None],
         }  # fmt: skip
 
 
@@ -391,6 +429,8 @@ def test_horizontal_forces_are_judged_by_their_peaks_in_a_stance():
         assert one[f"peak_braking_{pair}"] == pytest.approx(0.3 * by, rel=1e-3)
         assert one[f"peak_propulsion_{pair}"] == pytest.approx(0.7 * by, rel=1e-3)
     assert one["lag"] == pytest.approx(0.25, abs=0.01)
+    deepest = 1e-5 * (2e3 + 0.9 * LIFT_OFF * WEIGHT / 4)
+    assert one["depth_fore"] == one["depth_hind"] == pytest.approx(deepest, rel=1e-3)
     assert len(one["footfall"]) >= 8  # with a higher load that counts, or a lower one, hooves never lift
 
 

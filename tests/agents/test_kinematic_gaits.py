@@ -10,6 +10,7 @@ from agents.gait_figures import play
 from agents.horse_gaits import speed_of
 from agents.judges import searched_bars
 from hoof_env.envs.policies import make_policy
+from hoof_env.errors import ParameterError
 from hoof_env.evaluation.episodes import make_rows
 from hoof_env.tasks.horse_gaits import bounds, horse_gaits, kinematic_speeds
 
@@ -117,13 +118,19 @@ def test_the_command_finds_a_gait_and_goes_on_where_it_stopped(tmp_path, monkeyp
     search.main([*argv, "--shipped", str(shipped)])
     found = json.loads(out.read_text())["searches"]
     assert list(found) == [
-        "walk at 0.2 by work, seed 0, stride 1.6", "walk at 0.2 by work, seed 0, best"
+        "walk at 0.2 by force, seed 0, stride 1.6", "walk at 0.2 by force, seed 0, best"
     ]  # fmt: skip
     (one,) = json.loads(shipped.read_text()).values()
-    assert one["gait"] == found["walk at 0.2 by work, seed 0, best"]["gait"]
+    assert one["gait"] == found["walk at 0.2 by force, seed 0, best"]["gait"]
     before = out.read_text()
     search.main([*argv, "--shipped", str(shipped)])
     assert out.read_text() == before
+    search.main([*argv, "--begin", str(shipped), "--shipped", str(tmp_path / "again.json")])
+    assert list(json.loads(out.read_text())["searches"])[2:] == [
+        "walk at 0.2 by force, seed 0, from shipped.json"
+    ]
+    with pytest.raises(ParameterError, match=r"kinematic-walk"):
+        search.main(["--gaits", "trot", "--froude", "1", "--begin", str(shipped), "--out", str(out)])
     capsys.readouterr()
 
 

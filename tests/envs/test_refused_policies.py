@@ -47,7 +47,7 @@ CALLS = [
     ),
     (
         lambda: make_policy("idle", horse()),
-        "policy: expected .*bang-bang, random, reference, zero, got 'idle'",
+        "policy: expected .*bang-bang, kinematic-.*, random, reference, zero, got 'idle'",
     ),
     (lambda: make_policy(made(), "run"), NO_ENV),
     (lambda: make_policy("run", "walk"), NO_ENV),
