@@ -1,6 +1,7 @@
-"""Reward and observation of a leg that carries itself, as `reward.TERMS` and `observation.ENTRIES` of the other
-ids of one leg. The reward pays for travel and charges force, work, slip and a fall; nothing is paid for
-bearing weight, which this leg cannot avoid."""
+"""Reward and observation of a leg that carries itself, in place of `reward.TERMS` and `observation.ENTRIES`.
+
+The reward pays for travel and charges force, work, slip and a fall. Nothing is paid for bearing weight, which
+this leg cannot avoid."""
 
 from __future__ import annotations
 
@@ -12,8 +13,8 @@ from hoof_env.tasks.reward import Outcome, Term, energy, failure, loading, progr
 def peak(step: Outcome, weight: Number) -> Lanes:
     """Return the charge for the increase of the square of the stance's peak GRF, in units of the weight.
 
-    The square, because the sum of the peaks themselves orders nothing: a leg that must bear its weight in half
-    as many stances has peaks twice as high, and their sum is the same.
+    The square, because the sum of the peaks themselves orders nothing: a leg that bears its weight in half as
+    many stances has peaks twice as high, and their sum is the same.
     """
     rise = step.sums.peak_grf_increase
     # A step in which the peak rises ends that rise at its highest force: b^2 - a^2 = (b - a) (2 b - (b - a))

@@ -274,12 +274,12 @@ TASKS: Mapping[str, Task] = MappingProxyType(
         "hop": Task(
             "HorseLegHop",
             "A horse's leg that carries itself: it hops.",
-            "The trunk is on a boom, free to move forward and up and down, while its pitch is held: there is no"
-            " suspension, and the ground bears the whole weight through this one leg. A motor drives the"
-            " crank, so that the ground slows it down. The pastern is a spring between the leg's hoof points"
-            " and the soles, which sink into the ground by 1 cm. An episode begins near the apex of a hop, at"
-            " any speed up to 4 m/s. The boom also bears the moment that the hip's torque would turn a trunk"
-            " with, which no horse is spared.",
+            "The trunk is on a boom, free to move forward and up and down, while its pitch is held. There"
+            " is no suspension: the ground bears the whole weight through this one leg. A motor drives the"
+            " crank, which the ground slows down. The pastern is a spring between the leg's hoof points"
+            " and the soles, which sink into the ground by 1 cm. An episode begins near the apex of a hop,"
+            " at any speed up to 4 m/s. The boom also takes the torque of the hip, with which a horse"
+            " would have to turn its trunk.",
             {
                 "trunk": "boom",
                 "drive": "motor",
