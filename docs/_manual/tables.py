@@ -105,6 +105,7 @@ def features(name: str) -> Features:
 def quantities(name: str) -> Table:
     """Return what is measured and recorded."""
     words = WORDS["quantities"] | (WORDS["horse_quantities"] if is_horse(name) else {})
+    words |= WORDS["spring_quantities"] if features(name).has_springs else {}
     rows: list[tuple[str, ...]] = [(names, *cells) for names, cells in words.items()]
     sums = {field: StrideSums.notes[field] for field in stride_sums(features(name))}
     rows += [(field, "measured", quantity.unit, quantity.text) for field, quantity in sums.items()]
