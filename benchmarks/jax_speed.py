@@ -22,9 +22,11 @@ import numpy as np
 from jax.experimental import io_callback
 
 import hoof_env  # noqa: F401 - registers the environments
+from hoof_env._output import markdown_table
 
 ID = "hoof_env/HorseLeg-v0"
 COUNTS = 16, 128, 1024
+NAMES = LOOP, XLA, _ = "Python loop", "`envs.xla()`", "`io_callback`"
 STEPS = 200
 ROUNDS = 9
 
@@ -93,10 +95,9 @@ def by_callback(count: int, weights: Any) -> Callable[[], None]:
     return run
 
 
-def main() -> None:
-    """Print the table."""
-    print(f"jax {jax.__version__}, {ID}, microseconds of processor (of wall clock) a vector step")
-    print("| rows | Python loop | `envs.xla()` | `io_callback` | loop / xla |\n|---|---|---|---|---|")
+def measure() -> dict[str, Any]:
+    """Return microseconds of processor and of wall clock of a vector step, for each number of rows."""
+    rows = []
     for count in COUNTS:
         envs = new_envs(count)
         shape = envs.single_observation_space.shape[0], envs.single_action_space.shape[0]
@@ -109,9 +110,20 @@ def main() -> None:
                 run()
                 each[k] = time.process_time() - start[0], time.perf_counter() - start[1]
         least = times[1:].min(axis=0) / STEPS * 1e6
-        cells = [f"{cpu:.0f} ({wall:.0f})" for cpu, wall in least]
-        print(f"| {count:,} | {' | '.join(cells)} | {least[0, 0] / least[1, 0]:.1f} |", flush=True)
+        rows.append({"rows": count, **dict(zip(NAMES, least.tolist(), strict=True))})
+    return {"id": ID, "rows": rows}
+
+
+def table(rows: list[dict[str, Any]]) -> str:
+    """Return the table of `measure`."""
+    cells = [
+        [f"{row['rows']:,}", *(f"{row[name][0]:.0f} ({row[name][1]:.0f})" for name in NAMES)]
+        + [f"{row[LOOP][0] / row[XLA][0]:.2f}", f"{row[LOOP][1] / row[XLA][1]:.2f}"]
+        for row in rows
+    ]
+    return markdown_table(("rows", *NAMES, "loop / xla", "by wall clock"), cells)
 
 
 if __name__ == "__main__":
-    main()
+    print(f"jax {jax.__version__}, {ID}, microseconds of processor (of wall clock) a vector step")
+    print(table(measure()["rows"]))
