@@ -32,7 +32,11 @@ FOLDER = Path(__file__).parents[1] / "docs" / "evidence" / "jax"
 def derivatives() -> dict[str, Any]:
     """Return the table of derivatives by windows of a leg and of a horse."""
     ids = {"leg": "hoof_env/HorseLeg-v0", "horse": "hoof_env/Horse-v0"}
-    return {name: jax_gradient.compare(id, 16) for name, id in ids.items()}
+    jax.config.update("jax_enable_x64", True)
+    try:
+        return {name: jax_gradient.compare(id, 16) for name, id in ids.items()}
+    finally:
+        jax.config.update("jax_enable_x64", False)
 
 
 PARTS: dict[str, Callable[[], Any]] = {

@@ -33,8 +33,10 @@ class Judge:
     """Scores of policies: the mean return of the same episodes of the compiled environment."""
 
     def __init__(self, id: str = ID) -> None:
-        self.envs: Any = make_rows(id, len(STARTS))
-        self.dt = self.envs.dt
+        envs = make_rows(id, len(STARTS))
+        assert envs is not None
+        self.envs: Any = envs
+        self.dt = envs.dt
 
     def score(self, policy: Any) -> float:
         """Return the mean return of a policy with `predict`."""

@@ -30,8 +30,7 @@ SMALL = 1e-3
 
 def compare(id: str, starts: int) -> list[dict[str, float]]:
     """Return for each window its length [s], the size of the derivative and its distance from the difference,
-    medians of the starts."""
-    jax.config.update("jax_enable_x64", True)
+    medians of the starts. Asks for doubles in JAX."""
     env, params = hoof_env.jax.make(id, starts=starts)
     key = jax.random.key(0)
     action = 0.2 * jax.random.normal(key, (env.num_actions,))
@@ -68,6 +67,7 @@ if __name__ == "__main__":
     parser.add_argument("--env-id", default="hoof_env/HorseLeg-v0", help="id of an environment")
     parser.add_argument("--starts", type=int, default=16, help="number of starts")
     given = parser.parse_args()
+    jax.config.update("jax_enable_x64", True)
     print("| window [s] | size of the derivative | distance from the difference |\n|---|---|---|")
     for row in compare(given.env_id, given.starts):
         print(f"| {row['seconds']:g} | {row['size']:.3g} | {row['apart']:.2g} |")

@@ -25,6 +25,9 @@ ACTOR_RATE, CRITIC_RATE = 2e-3, 2e-3
 SPREAD = -1.0
 """First logarithm of the standard deviation of what is added to actions."""
 
+SCALE = 20.0
+"""Unit of the critic's output: about what rewards of a few tenths add up to under `GAMMA`."""
+
 VISITS, BATCHES = 16, 4
 """Epochs and batches of the critic after each window."""
 
@@ -89,7 +92,7 @@ class Shac:
             after, states, rewards, done, info = jax.vmap(self.env.step, (0, 0, 0, None))(
                 keys, states, jnp.tanh(means + noise), self.params
             )
-            value = answer(target, info["final_obs"])[:, 0]
+            value = SCALE * answer(target, info["final_obs"])[:, 0]
             value = jnp.where(info["terminated"], 0.0, value)
             total = total + weight * (rewards + jnp.where(done, GAMMA * value, 0.0))
             weight = jnp.where(done, 1.0, GAMMA * weight)
@@ -97,7 +100,7 @@ class Shac:
 
         first = (*begin, jnp.ones(ENVS), jnp.zeros(ENVS))
         (observations, states, weight, total), seen = jax.lax.scan(step, first, jax.random.split(key, WINDOW))
-        total = total + weight * answer(target, observations)[:, 0]
+        total = total + weight * SCALE * answer(target, observations)[:, 0]
         return -total.mean() / WINDOW, ((observations, states), seen)
 
     def _fit(self, critic: Any, moments: Any, target: Any, seen: Any, key: Any, rate: Any) -> Any:
@@ -114,7 +117,7 @@ class Shac:
         order = [jax.random.permutation(k, ENVS * WINDOW) for k in jax.random.split(key, VISITS)]
 
         def error(critic: Any, x: Any, y: Any) -> Any:
-            return ((answer(critic, x)[:, 0] - y) ** 2).mean()
+            return ((answer(critic, x)[:, 0] - y / SCALE) ** 2).mean()
 
         def learn(carry: Any, rows: Any) -> Any:
             critic, moments = carry
