@@ -136,8 +136,10 @@ def publish(plan: Sequence[Entry], folder: Path, out: Path) -> list[dict[str, st
     for one in (Run(entry, seed) for entry in plan for seed in range(entry.seeds)):
         entry = one.entry
         key = played_on(entry), name_of(entry), str(one.seed)
-        if is_done(one, folder) and key not in rows:
-            outcome = read_outcome(one, folder)
+        if not is_done(one, folder):
+            continue
+        outcome = read_outcome(one, folder)
+        if key not in rows or int(rows[key]["steps"]) != int(outcome.final["steps"]):
             commit = runs.read_record(outcome.folder)["versions"].get("commit", "")
             more = {"steps": int(outcome.final["steps"]), "commit": commit}
             agent = agent_in(outcome.folder, entry.env_id, entry.env_kwargs)
@@ -274,8 +276,9 @@ steps in violation; an agent keeps the limit if its mean is {budget:.0f} or less
 
 The limit of Safety-Gymnasium's velocity tasks is half of the highest speed of an unconstrained PPO agent.
 Here it is three quarters of the highest force of such agents, to a hundred newtons: of each agent the median
-over the episodes, of these the median. The limit of `leaning`, 0.8, is `trunk_share` of the task, which these
-agents bear without being asked to.
+over the episodes, of these the median. They were set after a first round of these trainings, which gave
+2157 N and 4468 N; the table is of a second round. The limit of `leaning`, 0.8, is `trunk_share` of the task,
+which these agents bear without being asked to.
 """
 
 
