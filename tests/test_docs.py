@@ -174,6 +174,7 @@ def test_every_frozen_page_says_of_which_commit_it_is():
             "ecosystem.md",
             "front.md",
             "costs.md",
+            "hop.md",
             "jax.md",
         ):  # commands write these
             stamp = page.read_text(encoding="utf-8").split("\n")[2]

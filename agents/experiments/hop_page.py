@@ -232,8 +232,8 @@ def passed(data: Mapping[str, Any], key: str) -> str:
     upright = sum(seed["failed"] < 0.1 for seed in seeds)
     return (
         f"In {gained} of {len(seeds)} trainings {NAMES[key]} gains two thirds or more of what the best"
-        " policy without feedback gains over the zero action. It falls in under a tenth of the episodes in"
-        f" {upright} of {len(seeds)}."
+        f" policy without feedback gains over the zero action. It falls in under a tenth of the episodes"
+        f" in {upright} of {len(seeds)}."
     )
 
 

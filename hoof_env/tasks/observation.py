@@ -334,6 +334,7 @@ ABSENT = {
         "share of the weight to bear",
     ),
     "rail": ("vertical speed", "height", "bearing allowance", "share of the weight to bear"),
+    "boom": ("share of the weight to bear",),
 }
 """Names of entries that are constant on a kind of trunk, and are therefore not observed there."""
 

@@ -118,7 +118,10 @@ def test_tables_match_the_spaces(task):
 @pytest.mark.parametrize("task", OF_LEGS)
 def test_actions_change_the_gait_as_the_table_says(task):
     """From one end of the limits to the other, at the rates of the table once the filters follow."""
-    env = gym.make(TASKS[task].id, episode_seconds=4.0)
+    # A leg that carries itself would fall
+    held = {"trunk": "suspended"} if TASKS[task].settings({}).trunk == "boom" else {}
+    env = gym.make(TASKS[task].id, episode_seconds=4.0, **held)
+    near = 0.07 if held else 0.02  # the bound of the filters, which is its rate, is approached from below
     leg = env.unwrapped
     table = manual.actions(TASKS[task]).rows
     limits = np.array([re.fullmatch(r"(\S+) to (\S+) \S+", row[5]).groups() for row in table], float)
@@ -130,7 +133,7 @@ def test_actions_change_the_gait_as_the_table_says(task):
             _, _, failed, _, info = env.step(np.full(4, action, np.float32))
             assert not failed
             gaits.append([info["measured"][name] for name in LIMITS])
-        assert (np.array(gaits[30]) - gaits[25]) / (5 * leg.dt) == pytest.approx(rates, rel=0.02)
+        assert (np.array(gaits[30]) - gaits[25]) / (5 * leg.dt) == pytest.approx(rates, rel=near)
         assert gaits[-1] == pytest.approx(limits[:, end], abs=1e-3)
     assert [row[4] for row in table] == ["rad/s^2", "rad/s", "rad/s", "rad/s"]
 
@@ -179,6 +182,7 @@ def test_observations_are_scaled_as_the_table_says(task):
             "rate of crank speed": now["crank_speed_rate"], "rate of swing offset": now["swing_offset_rate"],
             "rate of swing sine coefficient": now["swing_sin_rate"],
             "rate of swing cosine coefficient": now["swing_cos_rate"],
+            "true rate of the crank": now["crank_angle_rate"],
             "sin(crank angle)": math.sin(now["crank_angle"]),
             "cos(crank angle)": math.cos(now["crank_angle"]),
             "bearing allowance": allowance, "running peak force": measured["running_peak"],
@@ -195,7 +199,7 @@ def test_observations_are_scaled_as_the_table_says(task):
         for place, (name, scaling) in enumerate(table.items()):
             if name in there:
                 checked.add(name)
-                expected = scaled(scaling, float(there[name]), leg)
+                expected = np.clip(scaled(scaling, float(there[name]), leg), -1.0, 1.0)
                 assert observation[place] == pytest.approx(expected, abs=2e-6), name
     assert landed
     assert set(table) - checked <= {"commanded speed"}

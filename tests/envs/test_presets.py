@@ -26,11 +26,12 @@ def test_every_id_of_one_leg_steps_with_every_preset(env_id, preset):
         action, _ = policy.predict(observation, episode_start=k == 0)
         observation, reward, terminated, truncated, _ = env.step(action)
         assert np.isfinite(reward).all()
-        assert not terminated
+        falls = env.unwrapped.settings.trunk == "boom"
+        assert falls or not terminated
         report = env.unwrapped.engine.report
         pressed = max(pressed, report["toe_normal"].item())
         assert report["heel_normal"].item() == 0.0
-        if truncated:
+        if terminated or truncated:
             break
     assert pressed > 50
 

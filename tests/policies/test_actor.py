@@ -215,7 +215,6 @@ ASKS = {
     "agents/export.py": "compares two policies over drawn observations",
     "agents/levels.py": "hands on what a policy returns, some of it replaced by random actions",
     "agents/ship.py": "hands on what a policy returns, with noise",
-    "examples/hop.py": "plays one agent of PPO, which has no memory",
 }
 """Files that ask a policy for actions, and what for."""
 

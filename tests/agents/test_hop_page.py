@@ -1,0 +1,71 @@
+"""The page of a leg that carries itself is of its figures, and the return orders gaits as was meant."""
+
+import numpy as np
+import pytest
+
+from agents import order
+from agents.experiments import hop_page
+from agents.experiments.plans import load_plan
+from hoof_env.errors import ParameterError
+
+DATA = hop_page.read_data(hop_page.PUBLISHED)
+
+
+def test_the_published_page_is_of_the_published_figures(tmp_path):
+    page = hop_page.write(tmp_path, DATA).read_text(encoding="utf-8")
+    assert page == (hop_page.PUBLISHED / hop_page.PAGE_FILE).read_text(encoding="utf-8")
+    assert {hop_page.key_of(entry) for entry in load_plan("hop")} >= set(DATA["learners"])
+
+
+def test_a_gain_is_0_for_the_zero_action_and_1_for_the_best_policy_without_feedback():
+    names = [cell.strip() for cell in hop_page.table(DATA).splitlines()[0].split("|")[1:-1]]
+    rows = {}
+    for line in hop_page.table(DATA).splitlines()[2:]:
+        title, *cells = (cell.strip() for cell in line.split("|")[1:-1])
+        rows[title] = dict(zip(names[1:], cells, strict=True))
+    assert rows["zero action"]["gain"] == "0.00"
+    assert max(float(rows[f"best {gait}"]["gain"]) for gait in ("constant gait", "gait with a clock")) == 1.0
+
+
+def test_published_gaits_have_the_figures_of_a_replay():
+    played = hop_page.score_vector("open-loop", hop_page.ID, hop_page.FINAL_SEEDS)
+    again = hop_page.figures_of(played)
+    np.testing.assert_allclose(
+        [DATA["gaits"]["open-loop"][name] for name in again], [*again.values()], rtol=1e-3
+    )
+
+
+def test_a_correlation_at_a_given_third_figure():
+    """Of two figures that depend on a third one alone there is none, and of opposite remainders it is -1."""
+    generator = np.random.default_rng(0)
+    given, one, other = generator.normal(size=(3, 4000))
+    assert abs(order.partial_rank_correlation(given + 0.1 * one, given + 0.1 * other, given)) < 0.1
+    assert order.partial_rank_correlation(given + one, given - one, given) < -0.9
+
+
+def test_the_return_prefers_small_peaks_and_slow_rises_at_a_given_speed():
+    found = order.correlations(order.travelling_gaits(hop_page.ID, 384, 7))
+    assert found["stance_peak_n"] < -0.5
+    assert found["loading_rate_n_s"] < -0.5
+    assert found["slip_m"] < -0.3
+
+
+def test_sliding_is_not_travelling():
+    episode = {"failed": 0.0, "speed_m_s": 1.0, "distance_m": 10.0, "slip_m": 0.05, "stances": 10.0}
+    assert order.travels(episode)
+    assert not order.travels(episode | {"slip_m": 0.2})
+    assert not order.travels(episode | {"failed": 1.0})
+    assert not order.travels(episode | {"speed_m_s": 0.1})
+
+
+def test_an_id_on_which_no_gait_travels_is_named(monkeypatch):
+    monkeypatch.setattr(order, "travels", lambda *_: False)
+    monkeypatch.setattr(order, "play_rows", lambda *_: [])
+    with pytest.raises(ParameterError, match="gaits travel, got 0"):
+        order.travelling_gaits(hop_page.ID, 4, 0)
+
+
+def test_malformed_figures_are_named(tmp_path):
+    (tmp_path / hop_page.DATA).write_text("{")
+    with pytest.raises(hop_page.DataFileError, match=r"hop\.json"):
+        hop_page.read_data(tmp_path)
