@@ -63,8 +63,8 @@ constant action, and its distance from the central difference of 0.001, relative
 SPEED = """\
 ## Steps inside `jax.jit`
 
-`python -m benchmarks.jax_speed` on `{id}`, a linear policy: microseconds of processor (of wall clock) of a
-vector step.
+`python -m benchmarks.jax_speed` on `{id}`, a linear policy: microseconds of processor (of wall
+clock) of a vector step. The kernel alone is what no caller can save; reading the clock adds to it.
 
 {table}"""
 
