@@ -1,7 +1,7 @@
 """Evidence of what runs inside JAX: learners, gaits by derivatives, derivatives by windows, speed.
 
     python -m benchmarks.jax_evidence                    measures everything: one to two hours
-    python -m benchmarks.jax_evidence --parts learners   that part anew
+    python -m benchmarks.jax_evidence --parts shac       that part anew
     python -m benchmarks.jax_evidence --parts            the page anew, from what was measured
 
 Writes docs/evidence/jax.md and what is beside it in docs/evidence/jax. Needs
@@ -40,7 +40,8 @@ def derivatives() -> dict[str, Any]:
 
 
 PARTS: dict[str, Callable[[], Any]] = {
-    "learners": jax_learners.measure,
+    "shac": jax_learners.measure_shac,
+    "ppo": jax_learners.measure_ppo,
     "gaits": jax_gaits.measure,
     "derivatives": derivatives,
     "speed": jax_speed.measure,

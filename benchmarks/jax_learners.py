@@ -104,36 +104,56 @@ def learn_flat(steps: int, seed: int, judge: Judge) -> Curve:
     return curve
 
 
-def measure(steps: int = STEPS, seeds: Iterable[int] = SEEDS) -> dict[str, Any]:
-    """Return the curves of all learners, and the seconds that compiling took."""
+def measure_shac(steps: int = STEPS, seeds: Iterable[int] = SEEDS) -> dict[str, Any]:
+    """Return the curves of SHAC and of `ppo_flat`; see `_beside_flat`."""
+    return _beside_flat("SHAC", lambda: Shac(ID).train, lambda actor: (actor["mean"], np.tanh), steps, seeds)
+
+
+def measure_ppo(steps: int = STEPS, seeds: Iterable[int] = SEEDS) -> dict[str, Any]:
+    """Return the curves of PPO in one program and of `ppo_flat`; see `_beside_flat`."""
+
+    def trainer() -> Any:
+        ppo = Ppo(ID)
+        return lambda steps, seed: ppo.train(steps, seed, LOOKS)
+
+    def network(agent: Any) -> Any:
+        return agent["actor"], lambda x: np.clip(x, -1.0, 1.0)
+
+    return _beside_flat("PPO in one program", trainer, network, steps, seeds)
+
+
+def _beside_flat(
+    name: str, trainer: Callable[[], Any], network: Callable[[Any], Any], steps: int, seeds: Iterable[int]
+) -> dict[str, Any]:
+    """Return the curves of a learner, of `ppo_flat` over equal steps and over equal seconds, and the seconds
+    that compiling took.
+
+    Args:
+        name: the learner's name.
+        trainer: function that makes its training, a function of steps and seed.
+        network: function of what it learned, which returns its network and the bounds of its actions.
+        steps: steps of a training.
+        seeds: seeds of the trainings.
+    """
     judge = Judge()
     curves: dict[str, list[Curve]] = {}
-    compiled: dict[str, float] = {}
 
-    def note(name: str, seed: int, curve: Curve) -> None:
-        curves.setdefault(name, []).append(curve)
-        print(f"{name}, seed {seed}: {curve[-1]}", flush=True)
+    def note(learner: str, seed: int, curve: Curve) -> None:
+        curves.setdefault(learner, []).append(curve)
+        print(f"{learner}, seed {seed}: {curve[-1]}", flush=True)
 
     since = time.process_time()
-    shac = Shac(ID)
-    next(shac.train(1, 0))
-    compiled["SHAC"] = time.process_time() - since
+    train = trainer()
+    next(train(steps, 0))  # the shapes of a whole training
+    compiled = time.process_time() - since
     for seed in seeds:
-        score = lambda actor: judge.score_network(actor["mean"], np.tanh)  # noqa: E731
-        note("SHAC", seed, curve_of(shac.train(steps, seed), steps, score))
-    since = time.process_time()
-    ppo = Ppo(ID)
-    next(ppo.train(steps, 0, LOOKS))
-    compiled["PPO in one program"] = time.process_time() - since
-    for seed in seeds:
-        score = lambda agent: judge.score_network(agent["actor"], lambda x: np.clip(x, -1.0, 1.0))  # noqa: E731
-        note("PPO in one program", seed, curve_of(ppo.train(steps, seed, LOOKS), steps, score))
+        score = lambda learned: judge.score_network(*network(learned))  # noqa: E731
+        note(name, seed, curve_of(train(steps, seed), steps, score))
     learn_flat(2048, 0, judge)  # loads the trainer's kernels
     for seed in seeds:
         note("ppo_flat, equal steps", seed, learn_flat(steps, seed, judge))
+    seconds = np.median([curve[-1]["seconds"] for curve in curves[name]])
     rate = np.median([curve[-1]["steps"] / curve[-1]["seconds"] for curve in curves["ppo_flat, equal steps"]])
-    for name in ("SHAC", "PPO in one program"):
-        seconds = np.median([curve[-1]["seconds"] for curve in curves[name]])
-        for seed in seeds:
-            note(f"ppo_flat, seconds of {name}", seed, learn_flat(int(rate * seconds), seed, judge))
+    for seed in seeds:
+        note("ppo_flat, equal seconds", seed, learn_flat(int(rate * seconds), seed, judge))
     return {"id": ID, "steps": steps, "compiled": compiled, "curves": curves}

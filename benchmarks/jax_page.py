@@ -25,15 +25,18 @@ means of 64 episodes of the compiled environment that no training met, and a row
 runs with the lowest and the highest. [Inside JAX](../jax.md) says what the programs are."""
 
 LEARNERS = """\
-## SHAC and PPO in one program, beside `ppo_flat`
+## {name}, beside `ppo_flat`
 
-`examples/jax_shac.py` and `examples/jax_ppo.py` on `{id}`, {steps:,} steps, {runs} seeds each; `ppo_flat`
-with its settings, whose learning rate falls over the steps given, once for equal steps, and once for the
-median seconds of each of the two. {compiled}
+`{file}` on `{id}`, {steps:,} steps, {runs} seeds; `ppo_flat` with its settings, whose learning rate
+falls over the steps given, once for equal steps and once for the median seconds of the other. Compiling took
+{compiled:.0f} s.
 
 {table}
 
-![Return against steps and against processor seconds](jax/learners.png)"""
+![Return against steps and against processor seconds](jax/{part}.png)"""
+
+FILES = {"shac": ("SHAC", "examples/jax_shac.py"), "ppo": ("PPO in one program", "examples/jax_ppo.py")}
+"""Names and files of the learners, by part."""
 
 GAITS = """\
 ## A gait by its derivative, beside CMA-ES
@@ -60,8 +63,8 @@ constant action, and its distance from the central difference of 0.001, relative
 SPEED = """\
 ## Steps inside `jax.jit`
 
-`python -m benchmarks.jax_speed` on `{id}`, a linear policy: microseconds of processor (of wall clock) of a
-vector step.
+`python -m benchmarks.jax_speed` on `{id}`, a linear policy: microseconds of processor (of wall
+clock) of a vector step. The kernel alone is what no caller can save; reading the clock adds to it.
 
 {table}"""
 
@@ -83,28 +86,16 @@ def table_of_curves(curves: dict[str, Any]) -> str:
     return markdown_table(("learner", "steps", "seconds", "last return", "best score of a run"), rows)
 
 
-def seconds_of(compiled: dict[str, float]) -> str:
-    """Return the sentence of what compiling took."""
-    return "Compiling took " + " and ".join(f"{x:.0f} s ({name})" for name, x in compiled.items()) + "."
-
-
 def page(found: Found) -> str:
     """Return the page of what was measured."""
     parts = [HEAD]
     results = {part: each["result"] for part, each in found.items()}
-    if "learners" in found:
-        given = results["learners"]
-        curves = given["curves"]
-        runs = len(next(iter(curves.values())))
-        parts.append(
-            LEARNERS.format(
-                id=given["id"],
-                steps=given["steps"],
-                runs=runs,
-                compiled=seconds_of(given["compiled"]),
-                table=table_of_curves(curves),
-            )
-        )
+    for part, (name, file) in FILES.items():
+        if part in found:
+            given = results[part]
+            about = {key: given[key] for key in ("id", "steps", "compiled")}
+            table, runs = table_of_curves(given["curves"]), len(given["curves"][name])
+            parts.append(LEARNERS.format(name=name, file=file, part=part, table=table, runs=runs, **about))
     if "gaits" in found:
         given = results["gaits"]
         first = spread(given["first"])
@@ -138,7 +129,8 @@ def draw(found: Found, folder: Path) -> None:
         return plt.subplots(1, count, figsize=(4.2 * count, 3.4), layout="constrained", squeeze=False)
 
     with plt.rc_context(STYLE):
-        for part, keys in (("learners", ("steps", "seconds")), ("gaits", ("steps",))):
+        both = ("steps", "seconds")
+        for part, keys in (("shac", both), ("ppo", both), ("gaits", ("steps",))):
             if part not in found:
                 continue
             figure, ((*places,),) = axes(len(keys))

@@ -22,7 +22,7 @@ from examples.jax_learning import adam, answer, new_moments, new_network, print_
 ENVS, WINDOW = 16, 25
 GAMMA, LAMBDA, WIDTH = 0.99, 0.95, 64
 ACTOR_RATE, CRITIC_RATE = 2e-3, 2e-3
-SPREAD = -1.0
+SPREAD = 0.0
 """First logarithm of the standard deviation of what is added to actions."""
 
 SCALE = 20.0
