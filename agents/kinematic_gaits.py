@@ -282,7 +282,7 @@ class Rig:
         return means
 
 
-def costs_of(figures: dict[str, Floats], bars: Bars, criterion: str = "force") -> Floats:
+def costs_of(figures: dict[str, Floats], bars: Bars, criterion: str = "force", fall: float = FALL) -> Floats:
     """Return the cost of gaits, shape (m,): distances from bars over `SCALES`, falls, and one of
     `CRITERIA`."""
     cost = np.zeros(len(figures["fell"]))
@@ -293,7 +293,7 @@ def costs_of(figures: dict[str, Floats], bars: Bars, criterion: str = "force") -
         # Far from the bar a cost grows more slowly, so that no figure hides all others
         cost += MISS * np.where(np.isfinite(far), far / (1 + far / 20), 20.0)
     name, price = CRITERIA[criterion]
-    total: Floats = cost + FALL * figures["fell"] + price * np.nan_to_num(figures[name], nan=10.0)
+    total: Floats = cost + fall * figures["fell"] + price * np.nan_to_num(figures[name], nan=10.0)
     return total
 
 
@@ -343,6 +343,12 @@ class Args:
     """generations from the best of these"""
     seed: int = 0
     """of searches and their episodes"""
+    starts: int = STARTS
+    """episodes of each candidate"""
+    fall: float = FALL
+    """cost of a gait that always falls"""
+    spread: float = AGAIN
+    """of a search that goes on, in the box of the gaits"""
 
 
 class Finder:
@@ -353,11 +359,20 @@ class Finder:
         froude: Froude number of the commanded speed.
         seed: seed of the searches and their episodes.
         criterion: one of `CRITERIA`.
+        starts: episodes of each candidate.
+        fall: cost of a gait that always falls.
         **settings: arguments of the environment.
     """
 
     def __init__(
-        self, kind: str, froude: float, seed: int, criterion: str = "force", **settings: Any
+        self,
+        kind: str,
+        froude: float,
+        seed: int,
+        criterion: str = "force",
+        starts: int = STARTS,
+        fall: float = FALL,
+        **settings: Any,
     ) -> None:
         require("agents.kinematic_gaits", "cma")
         self.kind = kind
@@ -366,14 +381,16 @@ class Finder:
         self.seed = seed
         self.criterion = criterion
         self.count = 0
-        self.rig = Rig(POPULATION * STARTS, **settings)
+        self.starts = starts
+        self.fall = fall
+        self.rig = Rig(POPULATION * starts, **settings)
 
     def costs(self, gaits: Floats) -> list[float]:
         """Return the costs of gaits, at most `POPULATION`; every call has other starts."""
         self.count += 1
-        seed = 100_000 * (self.seed + 1) + STARTS * self.count
-        figures = self.rig.play(gaits, self.speed, seed, STARTS)
-        found: list[float] = costs_of(figures, self.bars, self.criterion).tolist()
+        seed = 100_000 * (self.seed + 1) + self.starts * self.count
+        figures = self.rig.play(gaits, self.speed, seed, self.starts)
+        found: list[float] = costs_of(figures, self.bars, self.criterion, self.fall).tolist()
         return found
 
     def begin(self, stride: float) -> Floats:
@@ -394,9 +411,9 @@ class Finder:
 
     def check(self, gait: Floats) -> dict[str, Any]:
         """Return a gait and its figures over starts of their own."""
-        starts = POPULATION * STARTS
+        starts = POPULATION * self.starts
         figures = self.rig.play(gait[None], self.speed, 10**7, starts)
-        cost = float(costs_of(figures, self.bars, self.criterion)[0])
+        cost = float(costs_of(figures, self.bars, self.criterion, self.fall)[0])
         shown = {name: round(float(values[0]), 4) for name, values in figures.items()}
         return {"gait": gait.tolist(), "cost": round(cost, 4), **shown}
 
@@ -440,7 +457,7 @@ class Records:
 def find(kind: str, froude: float, args: Args, records: Records) -> dict[str, Any]:
     """Return the best gait of a kind at a Froude number: searches from each stride, and one from the best of
     these."""
-    finder = Finder(kind, froude, args.seed, args.criterion)
+    finder = Finder(kind, froude, args.seed, args.criterion, args.starts, args.fall)
     title = f"{kind} at {froude:g} by {args.criterion}, seed {args.seed}"
 
     def improve(first: Floats, spread: float, count: int) -> Any:
@@ -449,13 +466,13 @@ def find(kind: str, froude: float, args: Args, records: Records) -> dict[str, An
     if args.begin is not None:
         known = parse_json(args.begin.read_text(encoding="utf-8"))
         best = np.array(known[check_choice("gait", f"kinematic-{kind}", known)]["gait"])
-        return records.keep(f"{title}, from {args.begin.name}", improve(best, AGAIN, args.more))
+        return records.keep(f"{title}, from {args.begin.name}", improve(best, args.spread, args.more))
     begun = [
         records.keep(f"{title}, stride {stride:g}", improve(finder.begin(stride), SPREAD, args.first))
         for stride in STRIDES
     ]
     best = np.array(min(begun, key=lambda one: float(one["cost"]))["gait"])
-    return records.keep(f"{title}, best", improve(best, AGAIN, args.more))
+    return records.keep(f"{title}, best", improve(best, args.spread, args.more))
 
 
 def main(argv: list[str] | None = None) -> None:

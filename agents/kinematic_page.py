@@ -22,7 +22,7 @@ from agents.horse_gaits import speed_of
 from agents.judge import ENV_ID, verdicts
 from agents.judge_pictures import draw
 from agents.judges import searched_bars
-from agents.kinematic_gaits import STARTS, peaked
+from agents.kinematic_gaits import peaked
 from hoof_env._output import markdown_table
 from hoof_env.envs.policies import make_policy
 from hoof_env.errors import count, parse_json
@@ -86,9 +86,11 @@ foal's).
 
 Gaits with the wanted kinematics are many, and a criterion without a figure of a horse decides between them:
 the least mean square of the forces on the hooves, the least positive work of single limbs on the centre of
-mass or of the drives, the highest return, the lowest peaks or the slowest loading. Searches of {rows_starts}
-starts a candidate, each from strides of 1.3 to 2.3 hip heights and then from the best of these. Figures are
-those of the search, over 6 s; *searched rows* are those inside of their bars.
+mass or of the drives, the highest return, the lowest peaks or the slowest loading. Searches begin with
+strides of 1.3 to 2.3 hip heights and go on from the best of these, or from [a named gait]({name}/begin.json).
+Figures are those of the search, over 6 s; *searched rows* are those inside of their bars.
+
+{criteria}
 
 {searches}
 """
@@ -246,12 +248,15 @@ def write(args: Args) -> None:
         ),
         judges=markdown_table(("judge", "horse", "bar", *families), rows),
         films=FILMS.format(**NOT_A_HORSE),
-        rows_starts=STARTS,
+        criteria=CRITERIA,
         searches=markdown_table((*head, "return", "time [s]"), search_rows(searches)),
     )
     runs.write_text(args.out / f"{NAME}.md", page)
     print(f"written: {args.out / NAME}.md")
 
+
+CRITERIA = "-"
+"""What the searches by other criteria end in."""
 
 NOT_A_HORSE = {"walk": "-", "trot": "-"}
 """What the films show that is not a horse's, by gait."""
