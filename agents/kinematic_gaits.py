@@ -28,7 +28,7 @@ from numpy.typing import NDArray
 from agents import runs
 from agents.command import parse, run
 from agents.evolution import generations, make_strategy, require
-from agents.horse_gaits import landings, speed_of
+from agents.horse_gaits import speed_of
 from agents.judges import Bars, searched_bars
 from hoof_env.dynamics.layout import Features, stride_sums
 from hoof_env.dynamics.observables import stance_figures
@@ -203,7 +203,9 @@ class Rig:
         sums = {name: np.zeros((len(LEGS), n)) for name in self.names}
         upright = np.ones(n, bool)
         returns = np.zeros(n)
-        lags = np.zeros(n, complex)
+        # Sums over landings of fore and of hind hooves
+        landed = np.zeros((len(PAIRS), n), complex)
+        place = np.zeros((1 + len(LEGS), n))
         forces = np.zeros((len(PAIRS), BINS, n))
         counts = np.full((len(PAIRS), BINS, n), 1e-9)
         column = np.arange(n)
@@ -216,6 +218,7 @@ class Rig:
             upright &= ~failed
             returns += np.where(upright, rewards, 0.0)
             measured = infos["measured"]
+            before = place[1:]
             place = np.array([measured[name] for name in ("x", *(f"{leg}_crank_angle" for leg in LEGS))])
             if k == settled - 1:
                 began = place
@@ -228,7 +231,13 @@ class Rig:
                     squares += forward**2 + up**2
                     work = forward * measured["vx"] + up * measured["vy"]
                     limb_work += np.maximum(work, 0.0)
-                lags += landings(rows, np.array([measured[f"{leg}_stance_began"] for leg in LEGS]))
+                for i, leg in enumerate(LEGS):
+                    # The time of a landing within the step, from the crank's angle
+                    turned = (measured[f"{leg}_stance_began"] - before[i]) % (2 * np.pi)
+                    part = np.clip(turned / np.maximum((place[1 + i] - before[i]) % (2 * np.pi), 1e-9), 0, 1)
+                    # Two turns a stride: left and right are half a stride apart
+                    phase = 2 * rows[:, 0] * (k + part) * envs.dt
+                    landed[i // 2] += measured[f"{leg}_stances"] * np.exp(1j * phase)
                 at = (place[1:] / (2 * np.pi) * BINS).astype(int) % BINS
                 for i, leg in enumerate(LEGS):
                     # The mean force over the step, but for a factor
@@ -243,7 +252,7 @@ class Rig:
         for k, pair in enumerate(PAIRS):
             figures[f"dip_{pair}"] = dips(forces[k] / counts[k])
         figures["speed_ratio"] = figures["reached"] / speed
-        return self._means(figures, lags, returns, upright, m, starts)
+        return self._means(figures, landed[0] * landed[1].conj(), returns, upright, m, starts)
 
     def _figures(
         self, sums: dict[str, Floats], seconds: float, travelled: Floats, turns: Floats
