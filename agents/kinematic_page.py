@@ -264,8 +264,8 @@ python -m agents.kinematic_gaits --gaits trot --froude 0.93 --criterion work --s
 The search for the walk measured the lag by the angles of the cranks at landings, as of commit bc2ec6e5, and
 later ones measure it by the times of landings. The named gait of the trot is the end of earlier searches by
 work, which began with the stored trot-like gait at the same strides and leads; its lag is 0.07 strides, and
-1.6 % of the horses fall. The one search for a trot by force ended in a gait that falls more often, so the trot
-that ships is by work and the walk by force."""
+1.6 % of the horses fall. The one search for a trot by force ended in a gait that falls more often, so the
+trot that ships is by work and the walk by force."""
 """How what ships was found, and what the searches by other criteria end in."""
 
 NOT_A_HORSE = {
