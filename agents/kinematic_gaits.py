@@ -32,7 +32,7 @@ from agents.horse_gaits import speed_of
 from agents.judges import Bars, searched_bars
 from hoof_env.dynamics.layout import Features, stride_sums
 from hoof_env.dynamics.observables import stance_figures
-from hoof_env.errors import check_choice, parse_json
+from hoof_env.errors import HoofEnvError, check_choice, parse_json
 from hoof_env.evaluation.episodes import make_rows
 from hoof_env.simd.threads import limit_threads
 from hoof_env.tasks.horse import HIP_HEIGHT
@@ -47,6 +47,10 @@ SECONDS = 6.0
 SETTLED = 2.0
 """Candidates of a generation, episodes of each, their length and the time after which figures count [s]."""
 BINS = 32  # of a turn of the crank, in which the force of a pair is averaged
+
+PHASES = np.arange(0.0, 0.5, 0.025)  # of starts that are tried [strides]
+DROPPED = 512  # starts from each
+AT_ONCE = 1.4  # [s]
 
 STRIDES = (1.3, 1.6, 1.95, 2.3)  # of the gaits that searches begin with [hip heights]
 LEADS = np.arange(0.0, 0.5, 0.05)  # of these [strides]
@@ -484,6 +488,41 @@ def find(kind: str, froude: float, args: Args, records: Records) -> dict[str, An
     return records.keep(f"{title}, best", improve(best, args.spread, args.more))
 
 
+def phase_of(gait: Floats, speed: float) -> float | None:
+    """Return the phase of the stride at which episodes in a gait should start: the middle of the longest run
+    of `PHASES` from which no horse falls at once; None if none falls from any.
+
+    A start is level and at rest but for its speed, which a gait with flight may not take at any phase.
+
+    Raises:
+        HoofEnvError: horses fall from each phase.
+    """
+    envs: Any = make_rows(ENV_ID, DROPPED, num_threads=limit_threads(2))
+    idle = np.zeros((DROPPED, 16), np.float32)
+    falls = []
+    for phase in PHASES:
+        options = {"gait": gait, "target_speed": speed, "phase": float(phase)}
+        envs.reset(seed=[2 * 10**6 + k for k in range(DROPPED)], options=options)
+        fell = np.zeros(DROPPED, bool)
+        for _ in range(round(AT_ONCE / envs.dt)):
+            fell |= envs.step(idle)[2]
+        falls.append(int(fell.sum()))
+    if not any(falls):
+        return None
+    # Twice around, for the run may pass the end; left and right are alike half a stride apart
+    runs_of = [0]
+    for count in falls * 2:
+        runs_of.append(runs_of[-1] + 1 if count == 0 else 0)
+    longest = min(max(runs_of), len(PHASES))
+    if longest == 0:
+        raise HoofEnvError(
+            f"the gait at {speed:.2f} m/s: expected a phase from which no horse falls, got none"
+        )
+    last = runs_of.index(max(runs_of)) - 1
+    middle: float = round((last - (longest - 1) / 2) / len(PHASES) / 2 % 0.5, 4)
+    return middle
+
+
 def main(argv: list[str] | None = None) -> None:
     """Find gaits."""
     args = parse(Args, argv, "python -m agents.kinematic_gaits", __doc__)
@@ -492,7 +531,10 @@ def main(argv: list[str] | None = None) -> None:
     for kind, froude in zip(args.gaits, args.froude, strict=True):
         found = find(kind, froude, args, records)
         # A gait is filed under the speed that it reaches
-        shipped[f"kinematic-{kind}"] = {"speed": round(found["reached"], 3), "gait": found["gait"]}
+        speed = round(found["reached"], 3)
+        phase = phase_of(np.array(found["gait"]), speed)
+        start = {} if phase is None else {"phase": phase}
+        shipped[f"kinematic-{kind}"] = {"speed": speed, **start, "gait": found["gait"]}
     runs.write_text(args.shipped, json.dumps(shipped, indent=1) + "\n")
     print(f"written: {args.out}, {args.shipped}")
 

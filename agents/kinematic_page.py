@@ -27,7 +27,7 @@ from hoof_env._output import markdown_table
 from hoof_env.envs.policies import make_policy
 from hoof_env.errors import count, parse_json
 from hoof_env.evaluation.episodes import make_rows
-from hoof_env.tasks.horse_gaits import horse_gaits, kinematic_speeds
+from hoof_env.tasks.horse_gaits import horse_gaits, kinematic_phases, kinematic_speeds
 
 EVIDENCE = Path(__file__).parents[1] / "docs" / "evidence"
 NAME = "horse_gaits"
@@ -54,7 +54,7 @@ was given is printed as searched, inside or outside of the bar, and is no result
 
 ## Falls, slip and depth
 
-The depth is what the springs of a hoof give, which pictures show as a hoof in the ground.
+{starts}The depth is what the springs of a hoof give, which pictures show as a hoof in the ground.
 
 {falls}
 
@@ -120,7 +120,7 @@ def played(episodes: int) -> dict[str, list[Figures]]:
         "predicted": [play(envs, zero, speed_of(froude)) for froude in PREDICTED],
         "trot-like": [play(envs, zero, TROT_SPEED, horse_gaits()["trot-like"].to_array())],
         "kinematic": [
-            play(envs, zero, speed, horse_gaits()[name].to_array()) | {"searched": True, "name": name}
+            play(envs, make_policy(name, envs), speed) | {"searched": True, "name": name}
             for name, speed in kinematic_speeds().items()
         ],
     }
@@ -193,6 +193,15 @@ def search_rows(searches: Mapping[str, Figures]) -> list[list[str]]:
     return rows
 
 
+def starts_of() -> str:
+    """Return at which phases kinematic gaits start, in sentences."""
+    return "".join(
+        f"`{name}` starts at the phase {phase:g} of the stride, from which no trunk that begins level drops "
+        "too far; with `gait=` alone starts are at any phase, and some horses fall in the first second. "
+        for name, phase in kinematic_phases().items()
+    )
+
+
 def summary(rows: Sequence[Sequence[str]], figures: Sequence[Figures], episodes: int) -> str:
     """Return what the kinematic family meets and misses, in sentences."""
     verdict = [row[-1].partition(": ")[2] for row in rows]
@@ -247,6 +256,7 @@ def write(args: Args) -> None:
             fall_rows(families, episodes),
         ),
         judges=markdown_table(("judge", "horse", "bar", *families), rows),
+        starts=starts_of(),
         films=FILMS.format(**NOT_A_HORSE),
         criteria=CRITERIA,
         searches=markdown_table((*head, "return", "time [s]"), search_rows(searches)),
@@ -263,9 +273,9 @@ python -m agents.kinematic_gaits --gaits trot --froude 0.93 --criterion work --s
 
 The search for the walk measured the lag by the angles of the cranks at landings, as of commit bc2ec6e5, and
 later ones measure it by the times of landings. The named gait of the trot is the end of earlier searches by
-work, which began with the stored trot-like gait at the same strides and leads; its lag is 0.07 strides, and
-1.6 % of the horses fall. The one search for a trot by force ended in a gait that falls more often, so the
-trot that ships is by work and the walk by force."""
+work, which began with the stored trot-like gait at the same strides and leads; its lag is 0.07 strides. The
+one search for a trot by force ended in a gait that falls more often, so the trot that ships is by work and
+the walk by force."""
 """How what ships was found, and what the searches by other criteria end in."""
 
 NOT_A_HORSE = {
