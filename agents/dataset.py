@@ -213,8 +213,8 @@ def default_id(env_id: str, policies: Sequence[str]) -> str:
 
 
 def policy_files(name: str, env_id: str) -> list[Path]:
-    """Return the files of a trained policy or a gait, none for a scripted policy; "shipped" is that of
-    `env_id`."""
+    """Return the files of a trained policy or a gait, none for a scripted policy; "shipped" is the
+    policy that ships for `env_id`."""
     if name == "shipped" or name in shipped_ids():
         path = SHIPPED / own_id(env_id if name == "shipped" else name).rpartition("/")[2]
     else:

@@ -262,7 +262,7 @@ def train_trial(config: dict[str, Any]) -> None:
         env_kwargs=(json.dumps(env_kwargs),),
         params=(json.dumps(params),),
     )
-    # run.json shall name the user's command, not that of Ray's worker
+    # run.json shall name the user's command, not the command of Ray's worker
     sys.orig_argv = shlex.split(config["command"])
     try:
         train(args, reporter)

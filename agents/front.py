@@ -5,8 +5,8 @@
 
 For each of `PREFERENCES` and each seed `ppo_flat` learns the weighted sum of the objectives, with the
 settings of HorseLeg-v0 but fewer steps. The shipped agent, of the same learner, equal weights and more steps,
-is added. Policies play the episodes of the published scores; the file has the returns of those that no other
-dominates. Linear weights find no concave part of a front. Trainings are resumed where they were stopped.
+is added. Policies play the episodes of the published scores; the file has the returns of the policies that
+are not dominated. Linear weights find no concave part of a front. Trainings resume where they stopped.
 """
 
 from __future__ import annotations
@@ -124,7 +124,7 @@ def learn(preference: Sequence[float], seed: int, folder: Path) -> Path:
 
 def returns_of(policy: Any, seeds: Sequence[int] = FINAL_SEEDS) -> NDArray[np.float64]:
     """Return the return of each objective in an episode for each seed, shape (len(seeds), 3); `policy` is
-    what `load_policy` takes."""
+    an argument of `load_policy`."""
     envs = HorseLegMOVectorEnv(len(seeds))
     actor = Actor(policy)
     actor.begin(len(seeds))
@@ -143,12 +143,12 @@ def summarise(found: Sequence[Trained], more: Sequence[Trained] = ()) -> dict[st
     """Return the content of the file.
 
     Args:
-        found: trainings of all preferences with each seed, of which each seed has a front and its volume.
-        more: further trainings, which only the front of all contains.
+        found: trainings of all preferences with each seed; each seed has a front and its volume.
+        more: further trainings, which count in the common front alone.
     """
     everything = [*found, *more]
-    kept = [everything[k] for k in np.flatnonzero(non_dominated([each.returns for each in everything]))]
-    kept.sort(key=lambda each: each.returns, reverse=True)
+    front = [everything[k] for k in np.flatnonzero(non_dominated([each.returns for each in everything]))]
+    front.sort(key=lambda each: each.returns, reverse=True)
     seeds = sorted({each.seed for each in found})
     volumes = [hypervolume([each.returns for each in found if each.seed == seed]) for seed in seeds]
     middle, low, high = map(float, iqm(volumes))
@@ -168,10 +168,10 @@ def summarise(found: Sequence[Trained], more: Sequence[Trained] = ()) -> dict[st
                 "returns": [*each.returns],
                 "commit": each.commit,
             }
-            for each in kept
+            for each in front
         ],
         "hypervolume": {
-            "all": hypervolume([each.returns for each in kept]),
+            "all": hypervolume([each.returns for each in front]),
             "seeds": volumes,
             "iqm": middle,
             "interval95": None if len(volumes) < 2 else [low, high],
@@ -182,24 +182,24 @@ def summarise(found: Sequence[Trained], more: Sequence[Trained] = ()) -> dict[st
 
 
 def draw(found: Sequence[Trained], path: Path) -> None:
-    """Draw all trainings, those of the front filled, progress against the other two objectives."""
+    """Draw all trainings, the front filled, progress against the other two objectives."""
     import matplotlib
     from matplotlib.figure import Figure
 
     points = np.array([each.returns for each in found])
-    kept = non_dominated(points)
+    in_front = non_dominated(points)
     colours = (BLUE, ORANGE, GREEN, PURPLE, SKY, AMBER, "black", GREY)
     with matplotlib.rc_context(STYLE):
         figure = Figure(figsize=(8, 3.8), layout="constrained")
         for axes, other in zip(figure.subplots(1, 2), (1, 2), strict=True):
             for preference, colour in zip(PREFERENCES, colours, strict=True):
-                for is_kept in (True, False):
+                for is_filled in (True, False):
                     chosen = [
-                        each.preference == shares(preference) and bool(keep) == is_kept
-                        for each, keep in zip(found, kept, strict=True)
+                        each.preference == shares(preference) and bool(inside) == is_filled
+                        for each, inside in zip(found, in_front, strict=True)
                     ]
-                    filling = colour if is_kept else "none"
-                    label = " : ".join(f"{part:g}" for part in preference) if is_kept else None
+                    filling = colour if is_filled else "none"
+                    label = " : ".join(f"{part:g}" for part in preference) if is_filled else None
                     x, y = points[np.array(chosen)][:, [0, other]].T
                     axes.plot(x, y, "o", color=colour, mfc=filling, ms=5, label=label)
             axes.set(xlabel=f"return of {OBJECTIVES[0]}", ylabel=f"return of {OBJECTIVES[other]}")
@@ -218,7 +218,7 @@ Written by `python -m agents.front`, with [its data](../../hoof_env/data/fronts/
 `hoof_env.evaluation.fronts.read_front` returns. `ppo_flat` learnt {preferences} preferences with {seeds}
 seeds each, {steps:,} steps each; the shipped agent of equal weights, {shipped:,} steps, is added.
 Returns are undiscounted means over the {episodes} episodes of the published scores. Of {trainings} policies
-{kept} are dominated by no other.
+{front} are dominated by no other.
 
 The hypervolume of their returns over the reference point {reference} is **{volume:,.0f}**.
 The policies of one seed reach {interval} thousand: interquartile mean over seeds, without the
@@ -235,7 +235,7 @@ one seed learnt to stand.
 
 
 def write(found: Sequence[Trained], more: Sequence[Trained], data: Path, evidence: Path) -> dict[str, Any]:
-    """Write file, page and picture, and return the content of the file; `found` and `more` are those of
+    """Write file, page and picture, and return the content of the file; `found` and `more` are as in
     `summarise`."""
     about = summarise(found, more)
     rows = [
@@ -255,7 +255,7 @@ def write(found: Sequence[Trained], more: Sequence[Trained], data: Path, evidenc
         steps=STEPS,
         shipped=max((each.steps for each in more), default=0),
         episodes=len(FINAL_SEEDS),
-        kept=len(about["front"]),
+        front=len(about["front"]),
         reference=tuple(REFERENCE_POINT),
         volume=volume["all"],
         interval=Interval(volume["iqm"], *(volume["interval95"] or ())).text(0, 1e-3),
@@ -279,7 +279,7 @@ def shipped() -> Trained:
 
 
 def trained(preference: tuple[float, ...], record: dict[str, Any], returns: tuple[float, ...]) -> Trained:
-    """Return a policy with what the record of its training says."""
+    """Return a policy with the steps, seed and commit of the record of its training."""
     steps = int(record["finished"]["steps"])
     commit = record.get("versions", {}).get("commit", "unknown")
     return Trained(preference, record["seed"], steps, returns, commit)

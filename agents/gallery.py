@@ -116,8 +116,8 @@ def random_return(env_id: str) -> float:
 
 
 def returns_of(env_id: str, random: float) -> dict[str, Any]:
-    """Return the returns that the page of an id compares with, and how fast it is learnt; `random` is that of
-    random actions."""
+    """Return the returns that the page of an id compares with, and how fast it is learnt; `random` is the
+    return of random actions."""
     played = STANDS_FOR.get(env_id, env_id)
     found = {"random": round(random, 4), **{k: round(v, 4) for k, v in stock_return(played).items()}}
     scored = shipped_returns(env_id.rpartition("/")[2])

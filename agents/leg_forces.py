@@ -67,8 +67,8 @@ UNITS = {
     "failed": "share of the episodes",
 }
 """Figures of an episode: `pulling_time` is the share of the time in which the suspension pulls the trunk down
-and `pulling_force` its mean while it does; depths are the greatest of the episode, that of the hoof the
-greater of toe and heel."""
+and `pulling_force` its mean while it does; depths are the greatest of the episode, the hoof's the greater
+of toe and heel."""
 
 
 @dataclass(frozen=True)

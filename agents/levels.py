@@ -2,9 +2,9 @@
 
 The normalised score of a return is 0 for random actions and 100 for the shipped agent, each the mean over the
 episodes of the published scores. "simple" and "medium" are the shipped agent, of which a share of the actions
-is random; the share is the one at which the score is 25 or 50. Such imperfect demonstrations are those of
-Fujimoto et al. (2019), "Off-policy deep reinforcement learning without exploration". "mixed" has equal parts
-of the other four.
+is random; the share is the one at which the score is 25 or 50. Fujimoto et al. (2019), "Off-policy deep
+reinforcement learning without exploration", have such imperfect demonstrations. "mixed" has equal parts of
+the other four.
 """
 
 from __future__ import annotations

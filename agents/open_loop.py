@@ -170,7 +170,8 @@ class Family(NamedTuple):
         coefficients[0, 0] -= self.middle
         point = (coefficients / self.half).ravel()
         if self.clock:
-            hertz = parameters.get("frequency_hz", 1.0)
+            # Of a gait without a clock, the frequency of its crank
+            hertz = np.clip(parameters.get("frequency_hz", given[0, 0, 0] / (2 * math.pi)), SLOWEST, FASTEST)
             point = np.append(point, 2 * math.log(hertz / SLOWEST) / math.log(FASTEST / SLOWEST) - 1)
         return np.clip(point, -1.0, 1.0)
 

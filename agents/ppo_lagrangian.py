@@ -35,13 +35,13 @@ from agents.ppo_flat import Scale
 from hoof_env.errors import ParameterError, check_number
 
 WIDTHS = (64, 64)
-"""Widths of the hidden layers of the costs' critic, those of Stable-Baselines3's own critic."""
+"""Widths of the hidden layers of the costs' critic, as in Stable-Baselines3's own critic."""
 
 Floats = NDArray[np.float32]
 
 
 class Constraint(nn.Module):
-    """Multiplier and critic of the costs, whose numbers are saved with the model.
+    """Multiplier and critic of the costs, both saved with the model.
 
     Args:
         numbers: length of an observation.
@@ -64,7 +64,7 @@ class Constraint(nn.Module):
 
 
 class LagrangianPPO(PPO):
-    """PPO with the arguments of Stable-Baselines3, as which its policies are loaded, and a limit.
+    """PPO of Stable-Baselines3 with a limit on the cost; its policies are loaded as PPO's.
 
     Args:
         cost_limit: largest mean cost of an episode, in the unit of `info["cost"]`.
@@ -135,7 +135,7 @@ class LagrangianPPO(PPO):
     def _setup_model(self) -> None:
         super()._setup_model()
         numbers = int(np.prod(self.observation_space.shape or 1))
-        with torch.random.fork_rng():  # the policy draws as that of PPO
+        with torch.random.fork_rng():  # the policy draws the numbers of PPO's
             torch.manual_seed(self.seed or 0)
             self.constraint = Constraint(numbers, self.first_multiplier)
         self.critic_optimizer = torch.optim.Adam(self.constraint.critic.parameters(), eps=1e-5)
@@ -199,7 +199,7 @@ class LagrangianPPO(PPO):
         return goes_on
 
     def change_multiplier(self, mean_cost: float) -> None:
-        """Raise the multiplier if the mean cost of an episode is above the limit, else lower it."""
+        """Raise the multiplier if the mean cost of an episode is above the limit; lower it otherwise."""
         multiplier = self.constraint.multiplier
         self.multiplier_optimizer.zero_grad()
         (-multiplier * (mean_cost - self.cost_limit)).backward()
@@ -209,12 +209,12 @@ class LagrangianPPO(PPO):
         self.logger.record("train/episode_cost", mean_cost)
 
     def charge(self, rollouts: RolloutBuffer) -> None:
-        """Replace the advantages of a rollout by those of the reward and of the cost."""
+        """Replace the advantages of a rollout by advantages of reward and cost together."""
         buffer, values = self.cost_buffer, self.constraint.values
         buffer.reset()
         costs = np.array(self.rollout_costs, np.float32)
         buffer.rewards[:] = costs / self.scale.after(costs, np.array(self.rollout_ends))
-        for step, k, last in self.cut_off:  # costs that a time limit hides, as PPO does it with rewards
+        for step, k, last in self.cut_off:  # costs beyond a time limit, as PPO estimates rewards
             buffer.rewards[step, k] += self.gamma * values(last.reshape(-1))
         flat = rollouts.observations.reshape(*rollouts.rewards.shape, -1)
         buffer.episode_starts[:] = rollouts.episode_starts

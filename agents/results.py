@@ -437,8 +437,8 @@ def check_replay(row: Row) -> str:
     mean, interval = figures(played(row.policy, row.env_id, range(*row.seeds)))
     for key, value in row.mean.items():
         bounds = interval.get(key)
-        # The last bits of an action differ between processors, and chaos makes more of them; the interval is
-        # that of the replay, for a row must not choose how well it has to agree
+        # The last bits of an action differ between processors, and chaos makes more of them; the interval
+        # comes from the replay, for a row must not choose how well it has to agree
         room = (bounds[1] - bounds[0]) / 2 if bounds else 0.005 * abs(value) + 1e-9
         recorded: list[float] = [value, *(row.interval95.get(key) or [value] * 2)]
         replayed: list[float] = [mean[key], *(bounds or [mean[key]] * 2)] if key in mean else [math.nan] * 3

@@ -35,8 +35,8 @@ def dominates(figures: Mapping[str, float], run: Mapping[str, float]) -> bool:
 
 
 def dominates_with_confidence(agent: Scored, run: Scored) -> bool:
-    """True if the 95 % intervals are apart, too; that of the weight share must lie neither below the run's
-    nor above 1."""
+    """True if the 95 % intervals are apart, too; the interval of the weight share must lie neither below the
+    run's nor above 1."""
     ours = agent.intervals
     theirs = run.intervals
     lower = all(theirs[key].above(ours[key]) for key in LOWER)

@@ -10,7 +10,7 @@ each, under runs/environments. NumPy must be the same version in both. A process
 if the work tree is faster. Exits with 1 if a median is below 0.95, and with 2 where the commits cannot be
 compared.
 
-With `--first` the cases are those of `compare_first.py` instead: processor seconds of imports, first steps,
+With `--first` the cases come from `compare_first.py` instead: processor seconds of imports, first steps,
 an edited reward term and `hoof-env reproduce`, with empty caches and with full ones.
 """
 
@@ -93,7 +93,7 @@ def run_cases(
     done = subprocess.run(command, cwd=tree, env=os.environ | settings, stdout=subprocess.PIPE, check=True)
     result = json.loads(done.stdout)
     if not Path(result["package"]).is_relative_to(tree):
-        raise RuntimeError(f"expected hoof_env of {tree}, got that of {result['package']}")
+        raise RuntimeError(f"expected hoof_env in {tree}, got {result['package']}")
     return dict(result["seconds"])
 
 
@@ -135,7 +135,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     spreads = {case: spread(np.array(r)) for case, r in compare(*sides, args.rounds or ROUNDS).items()}
     slower = {case for case, s in spreads.items() if s["median"] < LOWEST}
     rows = [[case, describe(s), "slower" if case in slower else ""] for case, s in spreads.items()]
-    print(markdown_table(["case", f"speed over that of {base.name}", f"below {LOWEST}"], rows))
+    print(markdown_table(["case", f"speed over {base.name}'s", f"below {LOWEST}"], rows))
     return 1 if slower else 0
 
 

@@ -83,7 +83,7 @@ def run(side: Side, words: tuple[str, ...], caches: Path) -> float:
     if words != (REPRODUCE,):
         package, *seconds = done.stdout.split("\n")[:-1]
         if not Path(package).is_relative_to(tree):
-            raise RuntimeError(f"expected hoof_env of {tree}, got that of {package}")
+            raise RuntimeError(f"expected hoof_env in {tree}, got {package}")
         if seconds:
             return float(seconds[0])
     return after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime

@@ -61,7 +61,7 @@ def edit(count: int) -> float:
     with tempfile.TemporaryDirectory() as folder:
         module = Path(folder) / "first_own_task.py"
         sys.path.insert(0, folder)
-        # Bytes of the first text would be taken for those of a second that follows within a second
+        # Bytecode of the first text would pass for the second text's if this follows within a second
         sys.dont_write_bytecode = True
         module.write_text(TASK.format(factor=EDITS[0]))
         task = importlib.import_module(module.stem)

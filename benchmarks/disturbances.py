@@ -1,10 +1,10 @@
-"""Cost of disturbances: the time of a step with each of them, and with all, over that of a step without.
+"""Cost of disturbances: the time of a step with each of them, and with all, over the time without any.
 
     python -m benchmarks.disturbances                    about two minutes
     python -m benchmarks.disturbances --env-id hoof_env/Horse-v0
     python -m benchmarks.disturbances --num-envs 1 --steps 300 --rounds 30
 
-Environments of all cases take turns, each for a few steps, in processor time; a ratio is that of the least
+Environments of all cases take turns, each for a few steps, in processor time; ratios are of the least
 times. Kernels are the same in all cases: what is off costs a comparison.
 """
 

@@ -2,10 +2,10 @@
 
 `landing` applies the force of this package's ground, Eq. 14, to toe and heel from outside. MuJoCo has the
 mechanics: links, loops, trunk. Crank and swing move as the gait prescribes, for their joints have an inertia
-that no force of the leg changes. `landing` is otherwise that of `benchmarks.elasticity_runs`.
+that no force of the leg changes. `landing` is otherwise as in `benchmarks.elasticity_runs`.
 
 `own_contact` plays HorseLeg-v0 with MuJoCo's contact, a spring and damper in proportion to the mass that
-moves at the contact. It has no counterpart under a fixed trunk: the mass there is that of the drives, without
+moves at the contact. It has no counterpart under a fixed trunk: the mass there is the drives', without
 bound.
 """
 
@@ -42,7 +42,7 @@ DROP_SPEED = 1.0
 """Mass [kg] and speed [m/s] of the ball that measures the restitution of MuJoCo's contact."""
 
 DAMPINGS = (0.0, 13.7, 60.0)
-"""Damping of MuJoCo's contact [1/s]; the second is that of `benchmarks.mujoco_transfer`, and with the third
+"""Damping of MuJoCo's contact [1/s]; the second as in `benchmarks.mujoco_transfer`, and with the third
 a ball returns as much of its speed as under the paper's inelastic ground."""
 
 

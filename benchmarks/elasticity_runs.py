@@ -109,8 +109,8 @@ def delivered(law: str, restitution: float) -> float | None:
 
 
 def free_mass(chi: float, exponent: float) -> float:
-    """Return the highest force in the impact of a free mass over that of an elastic impact [-], of any mass,
-    speed and stiffness.
+    """Return the highest force in the impact of a free mass over the highest force of an elastic impact [-],
+    for any mass, speed and stiffness.
 
     From m v dv/dd = -K d^n (1 + chi v / v0), with u = v / v0: d^(n + 1) is proportional to
     (1 - u) / chi - ln((1 + chi) / (1 + chi u)) / chi^2 on the way in, to (1 - u^2) / 2 without damping. The

@@ -125,7 +125,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--rounds", type=int, default=25)
     parser.add_argument("--steps", type=int, default=2000, help="of a single environment in a round")
-    parser.add_argument("--out", type=Path, default=RESULTS, help="folder for those of all vector widths")
+    parser.add_argument("--out", type=Path, default=RESULTS, help="folder of results of all vector widths")
     args = parser.parse_args()
     result = measure(args.rounds, args.steps)
     print(page(result))

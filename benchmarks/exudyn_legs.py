@@ -267,7 +267,7 @@ class ExudynLegs:
             return start.phi(i, start.crank[i] - sigma * (q[8] - q[5] - crank_at))
 
         def error(mbs: Any, t: float, item: int, q: Any, q_t: Any, velocity: bool) -> list[float]:
-            """Return the gap of the gear: swing of the frame against the trunk less that of the crank
+            """Return the gap of the gear: swing of the frame against the trunk less the swing at the crank
             angle."""
             return [q[5] - q[2] - sigma * swung(q)[0]]
 

@@ -43,10 +43,10 @@ def write(folder: Path, name: str, result: Mapping[str, Any], page: str, rows: I
 
 
 def keep(folder: Path, machine: Mapping[str, str], bits: int, rows: Iterable[Row]) -> None:
-    """Add those of `rows` that have a bar and a ratio to the files in `folder`.
+    """Add the rows that have a bar and a ratio to the files in `folder`.
 
     Args:
-        folder: of all results; that of each width is inside.
+        folder: folder of all results, with a folder for each width.
         machine: `benchmarks.machine.machine()`.
         bits: of the widest vectors.
         rows: of one run.

@@ -3,7 +3,8 @@
     python -m benchmarks.jax_speed
 
 A linear policy acts; the processor time of a vector step, the least of several rounds that alternate, in one
-process. Wall-clock time is printed, too: on a busy machine it says little. Needs the extra `jax`.
+process. Wall-clock time is printed, too: on a busy machine it says little. The last column is what no caller
+can save: the kernel of the step, without the policy. Needs the extra `jax`.
 """
 
 from __future__ import annotations
@@ -22,9 +23,11 @@ import numpy as np
 from jax.experimental import io_callback
 
 import hoof_env  # noqa: F401 - registers the environments
+from hoof_env._output import markdown_table
 
 ID = "hoof_env/HorseLeg-v0"
 COUNTS = 16, 128, 1024
+NAMES = LOOP, XLA, _, _ = "Python loop", "`envs.xla()`", "`io_callback`", "kernel alone"
 STEPS = 200
 ROUNDS = 9
 
@@ -36,7 +39,7 @@ def new_envs(count: int) -> Any:
     return envs
 
 
-def python_loop(count: int, weights: Any) -> Callable[[], None]:
+def python_loop(count: int, weights: Any) -> Callable[[], Any]:
     """Return a loop of steps in Python."""
     envs = new_envs(count)
     observations = envs.reset(seed=0)[0]
@@ -49,7 +52,7 @@ def python_loop(count: int, weights: Any) -> Callable[[], None]:
     return run
 
 
-def inside_jit(count: int, weights: Any) -> Callable[[], None]:
+def inside_jit(count: int, weights: Any) -> Callable[[], Any]:
     """Return a scan over `envs.xla()`."""
     envs = new_envs(count)
     handle, recv, _, step = envs.xla()
@@ -70,7 +73,7 @@ def inside_jit(count: int, weights: Any) -> Callable[[], None]:
     return run
 
 
-def by_callback(count: int, weights: Any) -> Callable[[], None]:
+def by_callback(count: int, weights: Any) -> Callable[[], Any]:
     """Return a scan over a call of `step` by `io_callback`."""
     envs = new_envs(count)
     first = jnp.asarray(envs.reset(seed=0)[0])
@@ -93,25 +96,53 @@ def by_callback(count: int, weights: Any) -> Callable[[], None]:
     return run
 
 
-def main() -> None:
-    """Print the table."""
-    print(f"jax {jax.__version__}, {ID}, microseconds of processor (of wall clock) a vector step")
-    print("| rows | Python loop | `envs.xla()` | `io_callback` | loop / xla |\n|---|---|---|---|---|")
+def kernel_alone(count: int, weights: Any) -> Callable[[], Any]:
+    """Return a loop that times nothing but the kernel of the step."""
+    envs = new_envs(count)
+    batch = envs.batch
+
+    def run() -> Any:
+        envs.reset(seed=0)
+        spent = np.zeros(2)
+        for _ in range(STEPS):
+            batch.rows.actions[:count] = np.tanh(batch.rows.observations[:count] @ weights)
+            begin = np.array([time.process_time(), time.perf_counter()])
+            batch.run_kernels()
+            spent += np.array([time.process_time(), time.perf_counter()]) - begin
+        return spent
+
+    return run
+
+
+def measure() -> dict[str, Any]:
+    """Return microseconds of processor and of wall clock of a vector step, for each number of rows."""
+    rows = []
     for count in COUNTS:
         envs = new_envs(count)
         shape = envs.single_observation_space.shape[0], envs.single_action_space.shape[0]
         weights = (np.random.default_rng(0).normal(size=shape) * 0.3).astype(np.float32)
-        runs = [make(count, weights) for make in (python_loop, inside_jit, by_callback)]
+        runs = [make(count, weights) for make in (python_loop, inside_jit, by_callback, kernel_alone)]
         times = np.zeros((ROUNDS + 1, len(runs), 2))
         for each in times:
             for k, run in enumerate(runs):
-                start = time.process_time(), time.perf_counter()
-                run()
-                each[k] = time.process_time() - start[0], time.perf_counter() - start[1]
+                start = np.array([time.process_time(), time.perf_counter()])
+                own: Any = run()
+                each[k] = np.array([time.process_time(), time.perf_counter()]) - start if own is None else own
         least = times[1:].min(axis=0) / STEPS * 1e6
-        cells = [f"{cpu:.0f} ({wall:.0f})" for cpu, wall in least]
-        print(f"| {count:,} | {' | '.join(cells)} | {least[0, 0] / least[1, 0]:.1f} |", flush=True)
+        rows.append({"rows": count, **dict(zip(NAMES, least.tolist(), strict=True))})
+    return {"id": ID, "rows": rows}
+
+
+def table(rows: list[dict[str, Any]]) -> str:
+    """Return the table of `measure`."""
+    cells = []
+    for row in rows:
+        loop, xla = row[LOOP], row[XLA]
+        times = (f"{row[name][0]:.0f} ({row[name][1]:.0f})" for name in NAMES)
+        cells.append([f"{row['rows']:,}", *times, *(f"{loop[k] / xla[k]:.2f}" for k in (0, 1))])
+    return markdown_table(("rows", *NAMES, "loop / xla", "by wall clock"), cells)
 
 
 if __name__ == "__main__":
-    main()
+    print(f"jax {jax.__version__}, {ID}, microseconds of processor (of wall clock) a vector step")
+    print(table(measure()["rows"]))

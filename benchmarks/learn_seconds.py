@@ -5,7 +5,7 @@
 
 The clock runs from the first reset to the end of the update whose policy passes; scores, on 64 starts that
 no training meets, stop it. Imports, and loading the kernels, are timed apart. Stock learners have their
-library's defaults and one environment; those of SBX are tried where `pip install sbx-rl` was run.
+library's defaults and one environment; SBX's are tried where `pip install sbx-rl` was run.
 """
 
 from __future__ import annotations

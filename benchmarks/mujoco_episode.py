@@ -32,10 +32,10 @@ Floats = NDArray[np.float64]
 HARDEST = 0.9
 DEEP = 0.5
 """Impedance of the contact at a depth [-], and that depth [m]: it grows in proportion, so that the force does
-not jump at a touch-down, as that of Eq. 14 does not."""
+not jump at a touch-down, as under Eq. 14."""
 
 GRIP = 100.0
-"""Impedance of friction over that of the normal force [-]."""
+"""Impedance of friction over the impedance of the normal force [-]."""
 
 SERVO = Motor(speed_gain=5e3, torque_limit=1e5, rotor_inertia=0.01)
 """Servo of the crank: a prescribed crank follows its command within torque over gain, here 0.06 rad/s."""
@@ -130,7 +130,7 @@ class MujocoEpisode:
     def _set_speeds(
         self, geometry: Any, names: dict[str, int], theta: float, state: dict[str, float], report: Any
     ) -> None:
-        """Set the speeds of all joints to those of the start."""
+        """Set the speeds of all joints at the start."""
         rate = state["crank_angle_rate"]
         spin = report["swing_angle_rate"]
         frame = FrameMotion(phi=report["swing_angle"], phi_rate=spin)

@@ -163,7 +163,7 @@ class MujocoLegs:
         self.evaluate()
 
     def step(self, steps: int = 1) -> None:
-        """Advance by whole steps; the read-outs are then those of the new instant."""
+        """Advance by whole steps; the read-outs are then of the new instant."""
         if self.outside is None:
             mujoco.mj_step(self.model, self.data, steps)
             self.evaluate()

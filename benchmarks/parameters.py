@@ -4,7 +4,7 @@
     python -m benchmarks.parameters --draw          tables and picture alone, from the data
 
 Writes docs/evidence/parameters.json, the tables of docs/parameters.md and its picture. Under the fixed trunk
-a cycle is moved once and put on other ground (`benchmarks.prescribed`). Under the suspended trunk, that of
+a cycle is moved once and put on other ground (`benchmarks.prescribed`). Under the suspended trunk of
 HorseLeg-v0, the steady gait is simulated on each ground, with friction; its energy is the engine's account.
 """
 

@@ -1,7 +1,7 @@
 """Animals that `speed` times: the same leg and the same horse in every engine.
 
 All walk: contact, motors, steps of 1 ms. MuJoCo's legs keep their swing, so here all legs do; the engine has
-no branch on a swing, so its cost is that of any gait. MuJoCo's contact is not in N/m: its time constant here
+no branch on a swing, so all gaits cost the same. MuJoCo's contact is not in N/m: its time constant here
 is chosen so that the cranks turn about as fast and the hooves are down about as long as on this project's
 ground: 30 % of the time at 98 % of the command for a leg, 34 to 36 % at 78 to 80 % for a horse. With the
 usual one, 0.02 s, a leg on a fixed trunk is jammed against the floor and stalls.

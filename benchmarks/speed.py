@@ -71,7 +71,7 @@ ANIMAL: tuple[tuple[str, dict[str, Any], float | None], ...] = (
         None,
     ),
 )
-"""Name and options of compliant legs, and the largest ratio of their time of a step to that of rigid legs."""
+"""Name and options of compliant legs, and the largest ratio of their time of a step to rigid legs'."""
 
 INTRO = """\
 # How fast it is
@@ -336,7 +336,7 @@ def page(result: dict[str, Any]) -> str:
 def main(arguments: list[str] | None = None) -> None:
     """Run the command; see `--help`."""
     parser = argparse.ArgumentParser(prog="python -m benchmarks.speed", description=__doc__.splitlines()[0])
-    parser.add_argument("--out", type=Path, default=RESULTS, help="folder for those of all vector widths")
+    parser.add_argument("--out", type=Path, default=RESULTS, help="folder of results of all vector widths")
     parser.add_argument("--rounds", type=int, help=f"how many; {ROUNDS} if not given")
     parser.add_argument("--clock", choices=CLOCKS, default="wall", help="processor: on a busy machine")
     parser.add_argument("--quick", action="store_true", help="a smoke test: small numbers that mean nothing")

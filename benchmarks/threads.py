@@ -154,7 +154,7 @@ def call_cost(calls: int) -> float:
 
 
 def gain(legs: int, threads: int, serial: float, group: float, call: float, neighbours: float) -> float:
-    """Return the speed of `threads` threads over that of one by the page's model; `serial` is for `LEGS`."""
+    """Return the speed of `threads` threads over one thread's by the page's model; `serial` is for `LEGS`."""
     groups = -(-legs // LANES)
 
     def seconds(p: int) -> float:
@@ -227,7 +227,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--rounds", type=int, default=40)
     parser.add_argument("--threads", type=int, default=2, help="and processes")
-    parser.add_argument("--out", type=Path, default=RESULTS, help="folder for those of all vector widths")
+    parser.add_argument("--out", type=Path, default=RESULTS, help="folder of results of all vector widths")
     args = parser.parse_args()
     if not 2 <= args.threads <= available():
         parser.error(f"--threads: expected 2 to {available()}, the processors here, got {args.threads}")

@@ -172,7 +172,7 @@ def main() -> None:
     """Measure, print and write."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--rounds", type=int, default=15)
-    parser.add_argument("--out", type=Path, default=RESULTS, help="folder for those of all vector widths")
+    parser.add_argument("--out", type=Path, default=RESULTS, help="folder of results of all vector widths")
     args = parser.parse_args()
     result = measure(args.rounds)
     print(page(result))

@@ -1,7 +1,7 @@
 """Derivative of a return by a constant action, against the length of the window that it goes through.
 
     pip install "hoof-env[jax]"
-    python examples/jax_gradient.py --env-id hoof_env/HorseLeg-v0
+    python -m examples.jax_gradient --env-id hoof_env/HorseLeg-v0
 
 Where a window is short, the derivative is the difference quotient. Through more and more landings it grows,
 and the two part, because the return bends where a landing comes earlier or later. Prints for each window, as
@@ -19,9 +19,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-jax.config.update("jax_enable_x64", True)
-
-import hoof_env.jax  # noqa: E402 - after the setting of JAX
+import hoof_env.jax
 
 WINDOWS = (5, 12, 25, 37, 50, 100)
 """Control steps of each window."""
@@ -30,8 +28,9 @@ SMALL = 1e-3
 """Step of the differences."""
 
 
-def compare(id: str, starts: int) -> None:
-    """Print the table."""
+def compare(id: str, starts: int) -> list[dict[str, float]]:
+    """Return for each window its length [s], the size of the derivative and its distance from the difference,
+    medians of the starts. Asks for doubles in JAX."""
     env, params = hoof_env.jax.make(id, starts=starts)
     key = jax.random.key(0)
     action = 0.2 * jax.random.normal(key, (env.num_actions,))
@@ -54,11 +53,13 @@ def compare(id: str, starts: int) -> None:
     slopes = np.asarray(both(0.0, params.starts)[1])
     above, below = (np.asarray(both(sign * SMALL, params.starts)[0]) for sign in (1.0, -1.0))
     quotients = (above - below) / (2 * SMALL)
-    print("| window [s] | size of the derivative | distance from the difference |\n|---|---|---|")
+    rows = []
     for length in WINDOWS:
         slope, quotient = slopes[:, length - 1], quotients[:, length - 1]
         apart = np.abs(slope - quotient) / np.maximum(np.abs(quotient), 1e-9)
-        print(f"| {length * env.dt:g} | {np.median(np.abs(slope)):.3g} | {np.median(apart):.2g} |")
+        sizes = {"size": float(np.median(np.abs(slope))), "apart": float(np.median(apart))}
+        rows.append({"seconds": length * env.dt, **sizes})
+    return rows
 
 
 if __name__ == "__main__":
@@ -66,4 +67,7 @@ if __name__ == "__main__":
     parser.add_argument("--env-id", default="hoof_env/HorseLeg-v0", help="id of an environment")
     parser.add_argument("--starts", type=int, default=16, help="number of starts")
     given = parser.parse_args()
-    compare(given.env_id, given.starts)
+    jax.config.update("jax_enable_x64", True)
+    print("| window [s] | size of the derivative | distance from the difference |\n|---|---|---|")
+    for row in compare(given.env_id, given.starts):
+        print(f"| {row['seconds']:g} | {row['size']:.3g} | {row['apart']:.2g} |")

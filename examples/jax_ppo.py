@@ -1,16 +1,17 @@
 """PPO in one compiled program: environment, learner and their loop inside `jax.jit`, by `envs.xla()`.
 
     pip install "hoof-env[jax]"
-    python examples/jax_ppo.py --steps 200000
+    python -m examples.jax_ppo --steps 200000
 
-Networks and Adam are a few lines of JAX, so that nothing else is needed. Prints the mean return of the
-episodes that ended in each tenth of the steps.
+Settings as in `agents/hyperparams/ppo_flat.yml`. Prints the mean return of the episodes that ended
+in each tenth of the steps.
 """
 
 from __future__ import annotations
 
 import argparse
 import time
+from collections.abc import Iterator
 from typing import Any
 
 import gymnasium as gym
@@ -19,24 +20,10 @@ import jax.numpy as jnp
 import numpy as np
 
 import hoof_env  # noqa: F401 - registers the environments
+from examples.jax_learning import adam, answer, new_moments, new_network
 
 ENVS, LENGTH, EPOCHS, BATCHES = 16, 128, 8, 8
-GAMMA, LAMBDA, CLIP, RATE, WIDTH = 0.99, 0.95, 0.2, 3e-4, 64
-
-
-def new_network(key: Any, sizes: tuple[int, ...], last: float) -> Any:
-    """Return weights and biases of layers, orthogonal, the last one scaled."""
-    scales = [2**0.5] * (len(sizes) - 2) + [last]
-    parts = zip(jax.random.split(key, len(scales)), scales, sizes[:-1], sizes[1:], strict=True)
-    return [(jax.nn.initializers.orthogonal(scale)(k, (m, n)), jnp.zeros(n)) for k, scale, m, n in parts]
-
-
-def answer(network: Any, x: Any) -> Any:
-    """Return the output of a network."""
-    for weights, biases in network[:-1]:
-        x = jnp.tanh(x @ weights + biases)
-    weights, biases = network[-1]
-    return x @ weights + biases
+GAMMA, LAMBDA, CLIP, RATE, WIDTH = 0.99, 0.95, 0.2, 1e-3, 64
 
 
 def log_density(agent: Any, observations: Any, actions: Any) -> Any:
@@ -67,87 +54,98 @@ def loss(agent: Any, batch: Any) -> Any:
     return of_actor + 0.5 * ((answer(agent["critic"], observations)[:, 0] - targets) ** 2).mean()
 
 
-def adam(agent: Any, moments: Any, slopes: Any) -> Any:
-    """Return agent and moments after one step of Adam, with the slopes' norm limited to 0.5."""
-    count, means, squares = moments
-    norm = jnp.sqrt(sum((x**2).sum() for x in jax.tree.leaves(slopes)))
-    slopes = jax.tree.map(lambda x: x * jnp.minimum(1.0, 0.5 / (norm + 1e-6)), slopes)
-    means = jax.tree.map(lambda m, x: 0.9 * m + 0.1 * x, means, slopes)
-    squares = jax.tree.map(lambda m, x: 0.999 * m + 0.001 * x**2, squares, slopes)
-    count = count + 1
-    rate = RATE * jnp.sqrt(1 - 0.999**count) / (1 - 0.9**count)
-    agent = jax.tree.map(lambda a, m, s: a - rate * m / (jnp.sqrt(s) + 1e-8), agent, means, squares)
-    return agent, (count, means, squares)
+def scaled(scale: Any, rewards: Any, ends: Any) -> Any:
+    """Return the scale with the steps of a rollout, and their rewards by it: the deviation of the discounted
+    returns so far, from the first step of an episode to each."""
+    count, mean, square, running = scale
+
+    def add(running: Any, row: Any) -> Any:
+        reward, end = row
+        running = running + reward
+        return jnp.where(end, 0.0, GAMMA * running), running
+
+    running, returns = jax.lax.scan(add, running, (rewards, ends))
+    total, gap = count + returns.size, returns.mean() - mean
+    between = gap**2 * count * returns.size / total
+    square = (square * count + returns.var() * returns.size + between) / total
+    scale = total, mean + gap * returns.size / total, square, running
+    return scale, jnp.clip(rewards / jnp.sqrt(square + 1e-8), -10.0, 10.0)
 
 
-def train(id: str, steps: int, seed: int) -> None:
-    """Train an agent, and print returns."""
-    envs: Any = gym.make_vec(id, num_envs=ENVS, autoreset_mode="SAME_STEP").unwrapped
-    envs.reset(seed=seed)
-    handle, recv, _, step = envs.xla()
-    handle, states = recv(handle)
-    size, count = states.observations.shape[1], envs.single_action_space.shape[0]
-    key, of_actor, of_critic = jax.random.split(jax.random.key(seed), 3)
-    agent = {
-        "actor": new_network(of_actor, (size, WIDTH, WIDTH, count), 0.01),
-        "critic": new_network(of_critic, (size, WIDTH, WIDTH, 1), 1.0),
-        "spread": jnp.full(count, -0.5, jnp.float32),
-    }
-    zeros = jax.tree.map(jnp.zeros_like, agent)
+class Ppo:
+    """Learner for an id; its program is compiled once.
 
-    def act(carry: Any, key: Any) -> Any:
+    Attributes:
+        envs: environments, which `train` resets.
+    """
+
+    def __init__(self, id: str) -> None:
+        self.envs: Any = gym.make_vec(id, num_envs=ENVS, autoreset_mode="SAME_STEP").unwrapped
+        self._step = self.envs.xla().step
+        self._run = jax.jit(lambda carry, left: jax.lax.scan(self._turn, carry, left))
+
+    def begin(self, seed: int) -> Any:
+        """Return what a learner starts with."""
+        self.envs.reset(seed=seed)
+        handle, recv, *_ = self.envs.xla()
+        handle, states = recv(handle)
+        size, count = states.observations.shape[1], self.envs.single_action_space.shape[0]
+        key, of_actor, of_critic = jax.random.split(jax.random.key(seed), 3)
+        agent = {
+            "actor": new_network(of_actor, (size, WIDTH, WIDTH, count), 0.01),
+            "critic": new_network(of_critic, (size, WIDTH, WIDTH, 1), 1.0),
+            "spread": jnp.zeros(count),
+        }
+        zeros, none = jnp.zeros(ENVS), jnp.float32(0.0)
+        scale = none, none, none, zeros
+        return agent, new_moments(agent), scale, handle, states.observations, zeros, key
+
+    def train(self, steps: int, seed: int, parts: int = 10) -> Iterator[tuple[int, Any, float]]:
+        """Train an agent; after each of `parts` yield the number of steps, the agent, and the mean return of
+        the episodes that ended in it. Learning rates fall to 0."""
+        carry = self.begin(seed)
+        part = max(steps // (LENGTH * ENVS * parts), 1)
+        left = (1.0 - jnp.arange(part * parts) / (part * parts)).reshape(parts, part)
+        for k in range(parts):
+            carry, (total, ended) = jax.block_until_ready(self._run(carry, left[k]))
+            yield (k + 1) * part * LENGTH * ENVS, carry[0], float(total.sum()) / max(int(ended.sum()), 1)
+
+    def _act(self, carry: Any, key: Any) -> Any:
+        """Take a step; return what was seen."""
         agent, handle, observations, returns = carry
         actions = answer(agent["actor"], observations)
         actions = actions + jnp.exp(agent["spread"]) * jax.random.normal(key, actions.shape)
-        handle, states = step(handle, jnp.clip(actions, -1.0, 1.0))
+        handle, states = self._step(handle, jnp.clip(actions, -1.0, 1.0))
         ends = states.terminated | states.truncated
         returns = returns + states.rewards
-        seen = (
-            observations,
-            actions,
-            states.rewards,
-            states.infos["final_obs"],
-            ends,
-            states.terminated,
-            returns,
-        )
+        final = states.infos["final_obs"]
+        seen = observations, actions, states.rewards, final, ends, states.terminated, returns
         return (agent, handle, states.observations, jnp.where(ends, 0.0, returns)), seen
 
-    def learn(carry: Any, batch: Any) -> Any:
-        agent, moments = carry
-        return adam(agent, moments, jax.grad(loss)(agent, batch)), None
-
-    def turn(carry: Any, _: Any) -> Any:
-        agent, moments, handle, observations, returns, key = carry
+    def _turn(self, carry: Any, left: Any) -> Any:
+        """Play a rollout and learn from it."""
+        agent, moments, scale, handle, observations, returns, key = carry
         key, of_actions, of_order = jax.random.split(key, 3)
         keys = jax.random.split(of_actions, LENGTH)
-        (_, handle, now, returns), seen = jax.lax.scan(act, (agent, handle, observations, returns), keys)
+        first = agent, handle, observations, returns
+        (_, handle, now, returns), seen = jax.lax.scan(self._act, first, keys)
         observations, actions, rewards, final, ends, terminated, so_far = seen
+        scale, rewards = scaled(scale, rewards, ends)
         values = answer(agent["critic"], observations)[..., 0]
         gains = advantages(rewards, values, answer(agent["critic"], final)[..., 0], ends, terminated)
         rows = (observations, actions, log_density(agent, observations, actions), gains, gains + values)
         flat = jax.tree.map(lambda x: x.reshape(LENGTH * ENVS, *x.shape[2:]), rows)
         order = [jax.random.permutation(k, LENGTH * ENVS) for k in jax.random.split(of_order, EPOCHS)]
         order = jnp.stack(order).reshape(EPOCHS * BATCHES, -1)
-        (agent, moments), _ = jax.lax.scan(
-            lambda carry, rows: learn(carry, jax.tree.map(lambda x: x[rows], flat)), (agent, moments), order
-        )
-        figures = jnp.where(ends, so_far, 0.0).sum(), ends.sum()
-        return (agent, moments, handle, now, returns, key), figures
 
-    turns = steps // (LENGTH * ENVS)
-    part = max(turns // 10, 1)
-    run = jax.jit(lambda carry: jax.lax.scan(turn, carry, length=part))
-    carry = (agent, (jnp.float32(0.0), zeros, zeros), handle, states.observations, jnp.zeros(ENVS), key)
-    start = time.perf_counter()
-    for k in range(turns // part):
-        carry, (total, count) = jax.block_until_ready(run(carry))
-        mean = float(total.sum()) / max(int(count.sum()), 1)
-        taken, seconds = (k + 1) * part * LENGTH * ENVS, time.perf_counter() - start
-        print(
-            f"{taken:>9,} steps, {seconds:6.1f} s, {int(count.sum()):>4} episodes, return {mean:7.1f}",
-            flush=True,
-        )
+        def learn(carry: Any, rows: Any) -> Any:
+            agent, moments = carry
+            slopes = jax.grad(loss)(agent, jax.tree.map(lambda x: x[rows], flat))
+            return adam(agent, moments, slopes, RATE * left), None
+
+        (agent, moments), _ = jax.lax.scan(learn, (agent, moments), order)
+        figures = jnp.where(ends, so_far, 0.0).sum(), ends.sum()
+        return (agent, moments, scale, handle, now, returns, key), figures
 
 
 if __name__ == "__main__":
@@ -156,4 +154,7 @@ if __name__ == "__main__":
     parser.add_argument("--steps", type=int, default=200_000, help="number of steps of all environments")
     parser.add_argument("--seed", type=int, default=0, help="seed")
     given = parser.parse_args()
-    train(given.env_id, given.steps, given.seed)
+    start = time.perf_counter()
+    for taken, _, mean in Ppo(given.env_id).train(given.steps, given.seed):
+        seconds = time.perf_counter() - start
+        print(f"{taken:>9,} steps, {seconds:6.1f} s, return {mean:7.1f}", flush=True)

@@ -94,6 +94,7 @@ _TASKS = {
     "HorseLegSpeed": "speed",
     "HorseLegSafe": "safe",
     "HorseLegTerrain": "terrain",
+    "HorseLegHop": "hop",
     "HorseLegFixed": "fixed",
     "Horse": "horse",
     "HorseRough": "rough",

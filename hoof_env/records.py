@@ -326,7 +326,7 @@ def export_episode(
         path: the file.
         policy: name of a policy, see `find_policy`.
         env_id, arguments: id and arguments of the environment, key=value or JSON objects.
-        seed, seconds, reactions: arguments of `record_episode`; `seed` is also that of the policy "random".
+        seed, seconds, reactions: arguments of `record_episode`; `seed` also seeds the policy "random".
         threshold: force along the ground's normal below which a limb counts as unloaded [N].
         units: unit of forces, "N" or "BW".
         bodies: bodies of an OpenSim model that carry the forces, LIMB=BODY.

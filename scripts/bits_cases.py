@@ -108,7 +108,7 @@ SETTINGS: tuple[tuple[str, dict[str, Any]], ...] = (
 
 
 def spelled(text: str, names: Mapping[str, str]) -> str:
-    """Python in the words of the commit that runs: `names` maps those of the work tree to it."""
+    """Python in the words of the commit that runs: `names` maps names of the work tree to it."""
     import re
 
     for new, old in names.items():

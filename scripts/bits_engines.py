@@ -1,6 +1,6 @@
 """Cases of engines that compare_bits.py digests: the package's, one and nine at once, and the paper's solver.
 
-Each part yields pairs of a case's name and its `Digests`, as those of bits_cases.py do.
+Each part yields pairs of a case's name and its `Digests`, as in bits_cases.py.
 """
 
 from __future__ import annotations

@@ -97,7 +97,7 @@ class Asked:
 
     @classmethod
     def of(cls, tree: Path, extras: Iterable[str]) -> Asked:
-        """Read what a checkout depends on, with those of the extras that it has.
+        """Read the dependencies of a checkout, with the extras among `extras` that it has.
 
         Raises:
             NoEnvironment: the checkout lacks a file.

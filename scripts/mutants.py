@@ -5,9 +5,9 @@
     python scripts/mutants.py --list                the places alone
 
 A place is drawn at random among all arithmetic, comparisons, numbers and conditions of hoof_env. Each mutant
-runs in a checkout of its own the tests of its room, `tests/<room>`, up to the first failure; a room without
-tests of its own those of the commands and `tests/test_<module>.py`. One that these pass runs `tests/envs`,
-too. What nothing notices is listed at the end: some of them compute the same.
+runs in a checkout of its own the tests of its room, `tests/<room>`, up to the first failure; for a room
+without tests of its own, the tests of the commands and `tests/test_<module>.py`. If they pass, `tests/envs`
+follows. Mutants that no test notices are listed at the end: some of them compute the same.
 """
 
 from __future__ import annotations

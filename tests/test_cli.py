@@ -63,7 +63,7 @@ def test_an_interrupt_is_one_line_and_leaves_nothing_behind(tmp_path):
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="no SIGPIPE")
-def test_a_reader_that_leaves_is_no_error():
+def test_a_reader_that_leaves_causes_no_error():
     read, write = os.pipe()
     os.close(read)
     command = [*HOOF_ENV, "manual"]

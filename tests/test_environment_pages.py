@@ -113,7 +113,7 @@ def test_a_policy_without_scores_is_named(tmp_path, monkeypatch):
 
 
 @pytest.mark.parametrize("name", NAMES)
-def test_spaces_and_groups_of_a_page_are_those_of_the_environment(name):
+def test_spaces_and_groups_of_a_page_agree_with_the_environment(name):
     """On the page, or on the one that it refers to."""
     env = gym.make(f"hoof_env/{name}-v0")
     place = "Horse" if name in ("HorseRough", "HorseSafe") else name
@@ -130,7 +130,7 @@ def test_spaces_and_groups_of_a_page_are_those_of_the_environment(name):
 
 
 @pytest.mark.parametrize("name", NAMES)
-def test_options_infos_and_quantities_are_those_of_the_environment(name):
+def test_options_infos_and_quantities_agree_with_the_environment(name):
     env = gym.make(f"hoof_env/{name}-v0", randomize=None, episode_seconds=0.02)
     _, started = env.reset(seed=0, options={"parameters": {"friction": 0.3}})
     info = env.step(np.zeros(env.action_space.shape, np.float32))[4]
@@ -158,7 +158,7 @@ def test_parameters_are_those_that_a_reset_takes(name):
     assert set(listed) == set(PER_EPISODE) - refused
 
 
-def test_words_are_there_for_all_names_and_no_other():
+def test_all_names_and_no_more_have_words():
     assert set(tables.WORDS["hills"]) == set(HILLS)
     known = inspect.signature(HorseLegVectorEnv).parameters
     arguments = {row[0].strip("`") for row in tables.arguments("HorseLeg").rows}

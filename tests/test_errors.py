@@ -59,7 +59,7 @@ def test_a_number_is_returned_or_named(value, bounds, exclusive):
         10**400, np.nan, np.timedelta64(1, "s"),
     ],
 )  # fmt: skip
-def test_what_is_no_number_is_refused(value):
+def test_a_value_other_than_a_number_is_refused(value):
     with pytest.raises(ParameterError, match=r"x: expected a finite number in \[-inf, inf\], got "):
         check_number("x", value)
 
@@ -77,7 +77,7 @@ def test_other_kinds_of_number_are_taken(value):
         [np.nan], np.inf, 10**400, [10**400, 1],
     ],
 )  # fmt: skip
-def test_what_are_no_numbers_is_refused(value):
+def test_values_other_than_numbers_are_refused(value):
     with pytest.raises(ParameterError, match="x: expected finite numbers, got "):
         finite("x", value)
 
@@ -111,13 +111,13 @@ DEEP = "[" * 30000 + "]" * 30000
 
 
 @pytest.mark.parametrize("item", [f"terrain={DEEP}", '{"a":' * 30000 + "1" + "}" * 30000])
-def test_what_is_nested_too_deep_is_refused_in_few_words(item):
+def test_deep_nesting_is_refused_in_few_words(item):
     with pytest.raises(ParameterError, match="nested too deep") as refused:
         parse_pairs("--env-kwargs", [item])
     assert len(str(refused.value)) < 500
 
 
-def test_a_positive_number_is_not_so_small_that_quotients_are_none():
+def test_a_positive_number_is_not_so_small_that_quotients_overflow():
     with pytest.raises(ParameterError, match="mass: expected 1e-12 or more, got 5e-324"):
         check_number("mass", 5e-324, low=0, exclusive_low=True)
     assert check_number("mass", 1e-12, low=0, exclusive_low=True) == 1e-12

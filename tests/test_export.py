@@ -87,7 +87,7 @@ def test_parquet_has_units_version_and_geometry(episode, tmp_path):
     assert (said["environment"], said["policy"], said["seed"]) == (LEG, "run", 3)
 
 
-def test_mot_is_what_opensim_reads(episode, tmp_path):
+def test_opensim_reads_mot(episode, tmp_path):
     record, about = episode
     header, columns = read_mot(write(record, about, tmp_path / "run.mot"))
     own = {"version": "1", "nRows": "2001", "nColumns": "10", "inDegrees": "yes"}

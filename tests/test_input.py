@@ -78,7 +78,7 @@ def test_the_control_characters_of_a_name_do_not_reach_the_terminal(tmp_path, ca
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="needs file names of any bytes")
-def test_a_name_that_is_no_text_is_shown_with_its_bytes(tmp_path, capsys, monkeypatch):
+def test_a_name_in_no_encoding_is_shown_with_its_bytes(tmp_path, capsys, monkeypatch):
     monkeypatch.chdir(tmp_path)
     name = os.fsdecode(b"\xff leg.csv")
     assert cli.main(["export", "--out", name, "--policy", "run", "--seconds", "2"]) == 0
@@ -94,7 +94,7 @@ def test_an_argument_without_a_value_is_not_the_working_folder(option, capsys, t
     assert not list(tmp_path.iterdir())
 
 
-def test_a_body_whose_name_is_none_of_xml_is_refused(tmp_path, capsys):
+def test_a_body_with_a_name_that_xml_cannot_hold_is_refused(tmp_path, capsys):
     out = tmp_path / "run.mot"
     assert (
         cli.main(["export", "--out", str(out), "--seconds", "0.1", "--bodies", '{"leg": "a\\u0001b"}']) == 2

@@ -20,7 +20,7 @@ TESTS = {
 
 
 def options():
-    """Those of pytest in `make test`, with two processes."""
+    """Options of pytest in `make test`, with two processes."""
     (line,) = re.findall(r"-m pytest (-q -n auto .*)", (ROOT / "Makefile").read_text())
     return str(line).replace("-n auto", "-n 2").split()
 

@@ -330,7 +330,7 @@ def marks() -> Iterator[tuple[str, str, str]]:
 
 
 @pytest.mark.parametrize(("page", "number", "source"), list(marks()))
-def test_a_result_is_what_its_source_has(page, number, source):
+def test_a_result_agrees_with_its_source(page, number, source):
     kind, *arguments = source.split()
     decimals = len(number.partition(".")[2])
     assert f"{SOURCES[kind](*arguments):.{decimals}f}" == number.replace(",", ""), source
@@ -378,7 +378,7 @@ def differs(shown: str, values: Iterable[float]) -> bool:
     return any(abs(number - value) > 0.5001 * step for number, step, value in pairs)
 
 
-def test_seconds_to_learn_are_those_of_the_benchmark():
+def test_seconds_to_learn_agree_with_the_benchmark():
     page = "benchmarks/results/512-bits/learn_seconds.md"
     row = table(page, "seconds to the best constant gait")["ppo_flat"]
     best = numbers(row["seconds to the best constant gait"])
@@ -389,7 +389,7 @@ def test_seconds_to_learn_are_those_of_the_benchmark():
     assert f"within 5 % of its final return after {near[0]:g}" in text
 
 
-def test_reference_gaits_on_the_page_are_those_of_the_evidence():
+def test_reference_gaits_on_the_page_agree_with_the_evidence():
     shown = table("docs/horse.md", "Froude number", "0.25")
     found = table("docs/evidence/horse.md", "Fr 0.1, 1.17 m/s")
     speeds = {title.split(",")[0].removeprefix("Fr "): title for title in found["fell"] if title != "figure"}
@@ -429,7 +429,7 @@ def test_a_living_horse_is_compared_with_what_the_evidence_has():
         assert not differs(shown[f"duty factor, {leg}"]["trot-like"], duties[k : k + 1])
 
 
-def test_the_suspension_on_the_page_is_that_of_the_figures():
+def test_the_suspension_on_the_page_agrees_with_the_figures():
     shown = table("docs/task.md", "pulls down")
     figures = {
         "mean": ("force_mean", 1),
@@ -459,7 +459,7 @@ POLICIES = {"zero action": "zero action", "shipped agent": "agent", "trot-like":
 """Names of policies of the horse in its figures, by those on the page."""
 
 
-def test_the_gain_of_the_horse_by_term_is_that_of_the_figures():
+def test_the_gain_of_the_horse_by_term_agrees_with_the_figures():
     shown = table("docs/horse.md", "term", "gain")
     found = measured("horse/figures.json")["gain"]
     named = set()
@@ -472,7 +472,7 @@ def test_the_gain_of_the_horse_by_term_is_that_of_the_figures():
     assert named == set(found)
 
 
-def test_the_horse_by_speed_is_that_of_the_figures():
+def test_the_horse_by_speed_agrees_with_the_figures():
     text = (ROOT / "docs/horse.md").read_text(encoding="utf-8")
     titles = {
         "return": ("return", 1),
@@ -498,7 +498,7 @@ def test_the_horse_by_speed_is_that_of_the_figures():
     assert not list(rows)
 
 
-def test_which_legs_brake_is_what_the_figures_have():
+def test_braking_legs_on_the_page_agree_with_the_figures():
     """Signs, too: the page says where roles are reversed, and where the agent loads faster."""
     title = "net horizontal force of the pair, fore and hind [N/kg]"
     shown = table("docs/horse.md", title)

@@ -98,7 +98,7 @@ def test_a_file_that_appears_while_a_command_works_stays(command, name, tmp_path
     assert len(list(tmp_path.iterdir())) == 2
 
 
-def test_without_proc_free_memory_is_that_of_the_machine(monkeypatch):
+def test_without_proc_free_memory_is_the_machines(monkeypatch):
     """As on macOS, where nothing tells what others have taken."""
 
     def absent(path, *args, **options):

@@ -80,7 +80,7 @@ def test_text_and_path_alike(stored, tmp_path, monkeypatch):
 
 
 @pytest.mark.parametrize("what", [3, None, ["a.csv"]])
-def test_what_is_no_path_is_refused(stored, what):
+def test_arguments_other_than_paths_are_refused(stored, what):
     pytest.importorskip("imageio_ffmpeg")
     for name, (_, call) in calls(*stored).items():
         # Without a path there is no file, or the run folder's default.
@@ -100,7 +100,7 @@ def test_a_page_that_stands_alone(tmp_path):
     assert page.write(str(tmp_path / "p.html")) == page.write(tmp_path / "p.html") == tmp_path / "p.html"
 
 
-def test_a_file_name_is_no_record(stored):
+def test_a_file_name_in_place_of_a_record_is_refused(stored):
     name = str(stored[2])
     for call in (lambda: compare(name, name), lambda: average([name]), lambda: average(name)):
         with pytest.raises(ParameterError, match=r"record.*read_record returns"):

@@ -51,7 +51,7 @@ def test_all_that_a_release_needs_is_filled_in():
         pytest.skip("to fill in before a release: " + "; ".join(places))
 
 
-def test_what_is_not_filled_in_is_found(tmp_path):
+def test_missing_facts_of_a_release_are_found(tmp_path):
     assert [place.split(":")[0] for place in unfilled(release(tmp_path))] == [
         "pyproject.toml", "CITATION.cff", "pyproject.toml",
     ]  # fmt: skip

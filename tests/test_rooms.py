@@ -44,7 +44,7 @@ FLOORS = (
     ("agents", "examples"),
     ("benchmarks",),
 )
-"""Rooms from the foundation up; those of a floor do not import each other. `import hoof_env` registers the
+"""Rooms from the foundation up; rooms of one floor do not import each other. `import hoof_env` registers the
 environments, so it stands beside them, although by name it has everything."""
 
 FLOOR = {room: number for number, rooms in enumerate(FLOORS) for room in rooms}

@@ -304,8 +304,8 @@ def check_wheels(setup, *options, stdin):
 
 @pytest.fixture(scope="module")
 def known():
-    """Facts for all tests of this file: "settings", what pip needs half a second to say, and "lists" once uv
-    has fetched those of the index."""
+    """Facts for all tests of this file: "settings", which take pip half a second, and "lists" once uv has
+    fetched the index's."""
     return {}
 
 

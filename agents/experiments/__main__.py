@@ -6,6 +6,7 @@
     python -m agents.experiments --plan stock --only ppo-HorseLeg-v0 --seeds 3 --out runs/mine
     python -m agents.experiments --plan trainers --workers 1  speed of PPO and PPO_FLAT, by turns
     python -m agents.experiments --plan costs                 learners with and without a constraint
+    python -m agents.experiments --plan hop                   learners of a leg that carries itself
     python -m agents.experiments --plan stock --no-train      the page alone
 
 The plans are files of agents/plans. A training that is done is not repeated: after Ctrl-C, or kill -9, the
@@ -24,7 +25,7 @@ from pathlib import Path
 from typing import Any
 
 from agents.command import parse, run
-from agents.experiments import baselines_page, costs_page, curves, runner, stock_page
+from agents.experiments import baselines_page, costs_page, curves, hop_page, runner, stock_page
 from agents.experiments.outcomes import is_done, read_outcome
 from agents.experiments.plans import FOLDERS, Entry, Plan, Run, load_plan, runs_of
 from hoof_env._output import check_folder
@@ -46,8 +47,8 @@ class Args:
     workers: int = 2
     """trainings at a time, one thread each"""
     out: Path | None = None
-    """folder of trainings and page; otherwise runs/baselines, or the plan's own; the pages of stock learners
-    and of costs are in docs/evidence"""
+    """folder of trainings and page; otherwise runs/baselines, or the plan's own; the pages of stock learners,
+    of costs and of the leg that carries itself are in docs/evidence"""
     train: bool = True
     """train; otherwise write the page of the trainings that are done"""
     page: bool = True
@@ -61,7 +62,7 @@ class Args:
     @property
     def published(self) -> Path:
         """Folder of the page."""
-        places = {"stock": curves.PUBLISHED, "costs": costs_page.PUBLISHED}
+        places = {"stock": curves.PUBLISHED, "costs": costs_page.PUBLISHED, "hop": hop_page.PUBLISHED}
         return self.out or places.get(self.plan, self.folder)
 
 
@@ -124,6 +125,8 @@ def write_page(args: Args) -> Path:
         return stock_page.write(args.published, curves.publish(entries, args.folder, args.published), entries)
     if args.plan == "costs":
         return costs_page.write(args.published, costs_page.publish(entries, args.folder, args.published))
+    if args.plan == "hop":
+        return hop_page.write(args.published, hop_page.publish(entries, args.folder, args.published))
     return baselines_page.write(f"the {args.plan} plan", entries, args.folder)
 
 

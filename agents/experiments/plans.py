@@ -18,9 +18,10 @@ from hoof_env.errors import DataFileError
 PLANS = Path(__file__).parents[1] / "plans"
 """Folder of the plans."""
 
-Plan = Literal["full", "nightly", "trainers", "stock", "costs"]
+Plan = Literal["full", "nightly", "trainers", "stock", "costs", "hop"]
 """Names of the plans: the table of baselines, a small part of it that takes minutes, trainers of PPO compared
-with each other, learners with the defaults of their library, and learners under a constraint."""
+with each other, learners with the defaults of their library, learners under a constraint, and learners of a
+leg that carries itself."""
 
 FOLDERS: Mapping[Plan, Path] = {
     "full": Path("runs/baselines"),
@@ -28,6 +29,7 @@ FOLDERS: Mapping[Plan, Path] = {
     "trainers": Path("runs/trainers"),
     "stock": Path("runs/stock"),
     "costs": Path("runs/costs"),
+    "hop": Path("runs/hop"),
 }
 """Folders of the trainings, by plan."""
 

@@ -2,9 +2,9 @@
 
     python -m agents.experiments.training --algo ppo --env-id hoof_env/HorseLeg-v0 --seed 0
 
-The folder is that of `agents.train` with curve.csv, a row per score, and final.json, the last policy's score
-on fresh episodes. The same command goes on where it was interrupted. Seconds are of training alone; wall time
-depends on the machine's other work, too.
+The folder holds the files of `agents.train`, curve.csv, a row per score, and final.json, the last policy's
+score on fresh episodes. The same command goes on where it was interrupted. Seconds are of training alone;
+wall time depends on the machine's other work, too.
 """
 
 from __future__ import annotations

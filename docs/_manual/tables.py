@@ -1,4 +1,4 @@
-"""Tables of the pages of docs/environments: those of `hoof_env.envs.manual`, and what only pages show."""
+"""Tables of the pages of docs/environments: the tables of `hoof_env.envs.manual` and some for pages alone."""
 
 from __future__ import annotations
 
@@ -105,6 +105,7 @@ def features(name: str) -> Features:
 def quantities(name: str) -> Table:
     """Return what is measured and recorded."""
     words = WORDS["quantities"] | (WORDS["horse_quantities"] if is_horse(name) else {})
+    words |= WORDS["spring_quantities"] if features(name).has_springs else {}
     rows: list[tuple[str, ...]] = [(names, *cells) for names, cells in words.items()]
     sums = {field: StrideSums.notes[field] for field in stride_sums(features(name))}
     rows += [(field, "measured", quantity.unit, quantity.text) for field, quantity in sums.items()]

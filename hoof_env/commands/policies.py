@@ -38,10 +38,10 @@ def evaluate(
         policies: policies as in `hoof-env render`: names, shipped, open-loop, paths of models (trusted ones
             only: a model is code) and gaits; or module:function, a function of observations, shape (n, k),
             that returns actions.
-        env_id: id of the environment; otherwise that of the first model or gait file, or
+        env_id: id of the environment; otherwise the id of the first model or gait file, or
             hoof_env/HorseLeg-v0.
-        env_kwargs: arguments of the environment: key=value ..., or one JSON object; otherwise those of the
-            first model or gait file.
+        env_kwargs: arguments of the environment: key=value ..., or one JSON object; otherwise the
+            arguments of the first model or gait file.
         episodes: number of episodes of each policy; 20 if left out.
         seed: seed of the first episode; 1000 if left out. The others follow it.
         published: play the 100 episodes of the published tables, print their lines in Markdown, and refuse

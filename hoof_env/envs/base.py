@@ -75,7 +75,7 @@ def array_of(name: str, value: Any) -> NDArray[Any]:
 
 
 def longer_limit(given: int, steps: int, dt: float) -> str:
-    """Return what is wrong with a limit beyond the environment's own, and the remedy.
+    """Return the message about a limit beyond the environment's own, with the remedy.
 
     Args:
         given: `max_episode_steps`.
@@ -238,7 +238,7 @@ class LegBase:
         return {name: self._each(values) for name, values in figures.items()}
 
     def raw_observation(self) -> dict[str, Any]:
-        """Return what is observed of the present, before scaling and without disturbances, by name, in
+        """Return the present entries of the observation, before scaling and without disturbances, by name, in
         `observation_units`; in a vector environment of shape (num_envs,).
 
         Raises:
@@ -343,7 +343,7 @@ class LegBase:
         return True
 
     def surroundings(self, env: int = 0) -> Surroundings:
-        """Return what is around an environment: ground, trunk, hips, weight, and the kind of its picture."""
+        """Return the surroundings of an environment: ground, trunk, hips, weight, and kind of picture."""
         from hoof_env.episodes.recording import surroundings_of
 
         return surroundings_of(self.batch, env)
@@ -471,7 +471,7 @@ class LegBase:
         return line_of(type(self).__name__, id=self.task.id, environments=self.batch.num_envs)
 
     def _repr_html_(self) -> str:
-        """Return what is observed and what actions do, as a table."""
+        """Return the entries of the observation and the effects of actions, as a table."""
         entries = zip(self.observation_names, self.observation_units, strict=True)
         both = [("observation", *entry) for entry in entries]
         both += [("action", name, "-1 to 1") for name in self.action_names]
@@ -606,9 +606,9 @@ class LegBase:
             for settings in asked:
                 check_unscheduled(SPEED, settings)
         of_rows = {row: each for each, group in zip(given, groups.values(), strict=True) for row in group}
-        kept = [of_rows.get(row, each) for row, each in enumerate(self._given)]
+        merged = [of_rows.get(row, each) for row, each in enumerate(self._given)]
         self.batch.change(asked, [*groups.values()])
-        self._given = kept
+        self._given = merged
 
     def _take_given(self) -> None:
         """Go on, after a state, from the settings of its rows."""

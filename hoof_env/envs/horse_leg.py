@@ -68,7 +68,7 @@ class HorseLegEnv(LegBase, gym.Env[NDArray[np.float32], NDArray[np.float32]]):
         self._attach()
 
     def _attach(self) -> None:
-        """Collect what a step reads, writes or calls: looking it up costs as much as a substep."""
+        """Collect all that a step reads, writes or calls: looking it up costs as much as a substep."""
         batch, rows = self.batch, self.batch.rows
         weighted = [(k, term) for k, term in enumerate(self.task.terms) if batch.plan.weights[term.name]]
         # Terms that can differ from 0 before the end of an episode; infos start with 0 for the rest.

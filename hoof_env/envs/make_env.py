@@ -1,4 +1,4 @@
-"""Environments by their ids, with errors that name what was asked for."""
+"""Environments by their ids, with errors that name the id and arguments."""
 
 from __future__ import annotations
 
@@ -25,8 +25,7 @@ def make_env(env_id: str, **kwargs: Any) -> gym.Env[Any, Any]:
 
 
 def _alike(env_id: str) -> str:
-    """Return a question that names the id of this package most like one that is not registered, "" if none
-    is."""
+    """Return a question that names the id of this package most like an unregistered one, "" without any."""
     ours = {_bare(name): name for name in gym.registry if name.startswith("hoof_env/")}
     found = get_close_matches(_bare(env_id), ours, 1, 0.7)
     return f"; did you mean {ours[found[0]]}?" if found and env_id not in gym.registry else ""

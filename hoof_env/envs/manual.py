@@ -118,7 +118,7 @@ def arguments(task: Task) -> Table:
 
 
 def actions(task: Task) -> Table:
-    """Return the actions of a task: what they change, in which range and unit."""
+    """Return the actions of a task: their effects, ranges and units."""
     if task.action_map is not None:
         named = enumerate(dict(task.action_map.actions).items())
         return Table(("Num", "Action", "At +1"), [(str(k), *pair) for k, pair in named])
@@ -183,7 +183,7 @@ def constants(task: Task) -> Table:
 
 
 def choices() -> dict[str, str]:
-    """Return what stands for the words with $ in the meanings of settings: choices and limits."""
+    """Return the texts for the words with $ in the meanings of settings: choices and limits."""
     names = {
         "presets": preset_names(),
         "horse_presets": presets_of_paper(),

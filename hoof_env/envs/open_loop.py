@@ -219,14 +219,14 @@ def gait_file(env_id: str, family: str | None = None) -> Path:
     """Return the file of the best gait of an id in the package, of all families or of one.
 
     Raises:
-        DataFileError: there is none.
+        DataFileError: the package has no such gait.
     """
     name = STANDS_FOR.get(env_id, env_id).rpartition("/")[2]
     places = [GAITS / f"{name}-{each}.json" for each in FAMILIES if family in (None, each)]
     files = [file for file in places if file.is_file()]
     if not files:
         known = ", ".join(sorted(file.name for file in GAITS.glob("*.json"))) or "none"
-        raise DataFileError(f"open-loop gait of {name}: expected one of those in {GAITS.name}/: {known}")
+        raise DataFileError(f"open-loop gait of {name}: expected a file of {GAITS.name}/: {known}")
     return max(files, key=lambda file: open_loop_record(file)["score"]["mean"]["return"])
 
 

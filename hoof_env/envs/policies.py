@@ -30,10 +30,10 @@ class Scripted:
         act: function of an observation, shape (k,), and a time that returns the action, shape (4,). For many
             environments it must also take shapes (n, k) and (n,) and return (n, 4), or (4,) for all.
         dt: control step [s].
-        start: reset options of the policy's episodes, unless others are given; a gait starts in this gait.
+        start: reset options of the policy's episodes, unless a call gives its own; a gait starts in itself.
 
     Attributes:
-        name: name by which `make_policy` made it, "" of others.
+        name: name by which `make_policy` made it, "" if it did not.
     """
 
     name = ""

@@ -25,9 +25,9 @@ ENDINGS = ("episode_summary", "end", "is_success", "final_obs", "final_info")
 class RowInfo(dict[str, Any]):
     """Info of one environment after a step.
 
-    It is a dictionary of what an episode's end adds. What every step measures is read from the arrays of all
-    environments when it is asked for: as dictionaries it would cost more than the simulation. The first call
-    that removes or keeps an entry of them makes it an ordinary dictionary.
+    Its own entries are added at an episode's end. The measurements of every step are read from the arrays of
+    all environments on request: as dictionaries they would cost more than the simulation. The first call that
+    removes or stores such an entry makes it an ordinary dictionary.
 
     Args:
         arrays: infos of the vector environment.
@@ -58,7 +58,7 @@ class RowInfo(dict[str, Any]):
 
     def get(self, key: str, default: Any = None) -> Any:
         """Return an entry, or `default` if there is none."""
-        # Quickly for what is in no info, which learners ask of every row of every step.
+        # Quickly for keys that no info has, for which learners ask in every row of every step.
         found = super().get(key, self)
         if found is not self:
             return found
@@ -306,7 +306,7 @@ class Sb3VecEnv(VecEnv):
 
 
 def _are_equal(one: Any, other: Any) -> bool:
-    """Return True if options are known to be equal; those with arrays are only if they are one object."""
+    """Return True if options are known to be equal; options with arrays only if they are one object."""
     if one is other:
         return True
     try:

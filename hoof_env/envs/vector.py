@@ -407,7 +407,7 @@ class HorseLegVectorEnv(LegBase, VectorEnv[NDArray[np.float32], NDArray[np.float
         return not self._watched and self.batch.is_plain
 
     def _check_open(self, call: str) -> None:
-        # What is called next may change what XLA's steps have to do.
+        # The call may give XLA's steps something to do.
         if self._xla is not None:
             self._xla.look()
         super()._check_open(call)

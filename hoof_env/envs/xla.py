@@ -107,8 +107,8 @@ def loaded_jax() -> Any:
 
 
 class XlaSteps:
-    """Steps of some environments by XLA. Copies and pickles of the environments have none: addresses belong
-    to one object.
+    """Steps of some environments by XLA. Copies and pickles of the environments leave them out: addresses
+    belong to one object.
 
     Args:
         envs: the environments.
@@ -180,7 +180,7 @@ class XlaSteps:
     # What Python does in a step
 
     def run(self, reason: int) -> None:
-        """Do what Python has to do.
+        """Do Python's part of a step.
 
         Args:
             reason: `BEFORE`, `INSTEAD`, or the code of a step.

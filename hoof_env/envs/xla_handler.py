@@ -2,8 +2,8 @@
 
 XLA gives the address of a call frame, whose words are named below; the structs are in
 `xla/ffi/api/c_api.h`, version 0.x of the interface. The handler copies the actions into the arrays of the
-environments, calls the kernel of a step, and copies the outcome out; it asks Python only for what Python has
-to do. The first operand is a handle: the address of `Word`s, and how often these were used.
+environments, calls the kernel of a step, and copies the outcome out; it calls Python for Python's part
+alone. The first operand is a handle: the address of `Word`s, and how often these were used.
 """
 
 from __future__ import annotations
@@ -36,8 +36,8 @@ class _Counted(IntEnum):
 
 
 class Word(_Counted):
-    """Places of what Python tells the handler, in an array of whole numbers; of which further ones follow, an
-    address and a number of bytes for each output after the rewards."""
+    """Places of Python's messages to the handler, in an array of whole numbers. An address and a number of
+    bytes follow for each output after the rewards."""
 
     USES = auto()  # number of uses so far; BUSY during one, GONE without environments
     CHECK = auto()  # 1: Python has something to do before the next step
@@ -50,7 +50,7 @@ class Word(_Counted):
     ACTION_BYTES = auto()
     OBSERVATIONS = auto()  # address of the observations, and their size
     OBSERVATION_BYTES = auto()
-    LAST = auto()  # address of a copy of those before restarts, 0 without
+    LAST = auto()  # address of a copy of the observations before restarts, 0 without
     STEP_REWARDS = auto()  # address of the kernel's rewards
     REWARDS = auto()  # of the rewards of the last step, as doubles, and their number
     REWARD_COUNT = auto()
@@ -90,8 +90,8 @@ FRAME_EXTENSION, FRAME_API, FRAME_STAGE, FRAME_COUNT, FRAME_INPUTS, FRAME_RESULT
 """Words of a call frame."""
 
 OLDEST_VERSION = 1 << 32
-"""Version 0.1 of the interface, that of jax 0.5.0, which asks without naming its own; its structs have the
-words above."""
+"""Version 0.1 of the interface, used by jax 0.5.0, which asks without naming it; its structs have the words
+above."""
 
 API_VERSION, API_ERROR = 4, 6
 """Words of XLA's functions: the version of the interface, and the function that makes an error."""

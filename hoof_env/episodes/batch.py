@@ -4,8 +4,8 @@
 any number of neighbours: its starts are drawn from its own generator, and the kernels are `step`'s,
 compiled for one environment or for several side by side.
 
-What follows from settings is a `plan.Plan`, what changes from step to step are the arrays of `rows.Rows`, and
-`row_plans.RowPlans` says which row is under which plan.
+A `plan.Plan` holds all that follows from settings, `rows.Rows` the arrays that change from step to step, and
+`row_plans.RowPlans` the plan of each row.
 """
 
 from __future__ import annotations
@@ -81,7 +81,7 @@ class EpisodeBatch:
         drawn_names: names of the parameters that any row draws, in the order of `rows.start_values`.
         measurements: places of the values in the engine's memory that infos contain.
         is_push_unseen: True if a trunk was pushed since the last step, which no observation shows yet.
-        unpushed: what was measured at the end of the last step, by row, in rows that were due to be pushed.
+        unpushed: measurements at the end of the last step, by row, of rows that were due to be pushed.
 
     Args:
         task: task of all episodes.
@@ -324,8 +324,8 @@ class EpisodeBatch:
             raise ParameterError(f"{self.task.id}: start: {error}") from None
 
     def _start(self, which: Index, generators: Generators, options: Mapping[str, Any]) -> dict[str, Floats]:
-        """Start episodes under the present plan; see `reset`. The order of the draws from a generator is part
-        of what a seed means."""
+        """Start episodes under the present plan; see `reset`. A seed's meaning includes the order of the
+        draws from its generator."""
         plan, rows, engine = self.plan, self.rows, self.engine
         options = {**self._usual_start, **options}
         self.unpushed = {env: values for env, values in self.unpushed.items() if env not in which}
@@ -353,7 +353,7 @@ class EpisodeBatch:
         groups = range(begin, min(engine.columns, end))
         self.observe(groups)
         if plan.delays.fill_past(rows, which):
-            # Again, with what the first one saw as all that was ever seen.
+            # Again, with the first observation as the whole past.
             self.observe(groups)
         return drawn
 
@@ -374,7 +374,7 @@ class EpisodeBatch:
         return drawn
 
     def _clear(self, which: Index) -> None:
-        """Set what rows count and keep to its value at the start of an episode."""
+        """Set the counters and memories of rows to their values at the start of an episode."""
         episode = self.rows.named
         for row in (episode.steps, episode.time, episode.distance, episode.commanded, episode.ended):
             row[which] = 0.0
@@ -400,7 +400,7 @@ class EpisodeBatch:
         return self.end_step(self.run_kernels(), generators, idle)
 
     def end_step(self, happened: int, generators: Generators, idle: NDArray[np.bool_] | None = None) -> bool:
-        """Do what follows `run_kernels` in a `step`."""
+        """Do the rest of a `step` after `run_kernels`."""
         if self.plan.costs.names:
             self.plan.costs.add(self.rows, self.engine)
         # A step between two episodes does not count.
@@ -442,7 +442,7 @@ class EpisodeBatch:
         if happened == NOT_A_NUMBER:
             raise ParameterError("action: expected finite numbers, got NaN or infinity")
         self._check_mapped()
-        # The engine put failed environments back to their last good state; the kernel observed what failed.
+        # The engine put failed environments back to their last good state; the kernel observed the failure.
         if happened & SOME_ENDED:
             put_back = np.flatnonzero(broken(self.engine.results))
             if put_back.size and self.row_plans.differ:
@@ -525,11 +525,11 @@ class EpisodeBatch:
         self.under_each(np.arange(self.num_envs), look, for_kernels=True)
 
     def measured(self) -> dict[str, Floats]:
-        """Return what is observed, true and before scaling: entries by name, shape (num_envs,) each."""
+        """Return the observation, true and before scaling: entries by name, shape (num_envs,) each."""
         names = [entry.name for entry in self.plan.observed.entries]
         out = np.zeros((len(names), self.num_envs))
         if self.row_plans.differ:
-            # The kernel measures all rows; only those under the present plan are right.
+            # The kernel measures all rows; only rows under the present plan are right.
             def measure(group: Index) -> None:
                 measured = np.zeros_like(out)
                 self._measure(measured)
@@ -662,8 +662,8 @@ class EpisodeBatch:
             raise user_error(self.task.id, error) from None
 
     def direct_step(self) -> Any:
-        """Return `calls.step` as machine code, without what a call of it costs in Python. It must be called
-        with `calls.held` only, as it checks no types."""
+        """Return `calls.step` as machine code, without the cost of a call in Python. It must be called with
+        `calls.held` only, as it checks no types."""
         if not self.engine.in_kernels:
             return self.calls.step
         kernel = self.calls.kernels.step

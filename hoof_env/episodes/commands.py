@@ -49,7 +49,7 @@ class Commands:
 
         Args:
             s: settings.
-            speeds: lowest and highest commanded speed of the body [m/s]; None for none.
+            speeds: lowest and highest commanded speed of the body [m/s]; None without commands.
             schedule: ramps of scheduled settings.
             largest_change: see the class.
             dt: control step [s].

@@ -25,22 +25,21 @@ class Contexts:
     bounds: Mapping[str, tuple[float, float]]
 
     @classmethod
-    def of(cls, s: ResolvedSettings, others: Mapping[str, Any]) -> Contexts:
+    def of(cls, s: ResolvedSettings, drawn: Mapping[str, Any]) -> Contexts:
         """Return the contexts from settings.
 
         Args:
             s: settings.
-            others: parameters that `randomize` and a schedule set.
+            drawn: parameters that `randomize` and a schedule set.
 
         Raises:
-            ParameterError: an unknown set, a parameter that is set elsewhere, too, or one that is out of
-                range.
+            ParameterError: an unknown set, or a parameter that is set elsewhere, too, or out of range.
         """
         chosen = check_context_set(s)
         if chosen is None:
             return cls((), {})
         bounds = bounds_of(chosen[0], s)
-        if twice := sorted(set(bounds) & set(others)):
+        if twice := sorted(set(bounds) & set(drawn)):
             raise ParameterError(
                 f"context_set: {s.context_set!r} sets {', '.join(twice)}; expected none of these in randomize"
                 " or schedule"

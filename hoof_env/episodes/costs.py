@@ -38,7 +38,7 @@ COSTS = {
         " the weight that is the limit [-], what the leg bears repays it, and more than a second is forgiven",
     ),
 }
-"""Costs by name: unit and meaning. The resultant force is that of the hoof with the highest one."""
+"""Costs by name: unit and meaning. The resultant force is the highest of all hooves."""
 
 LEANING = ("suspended", "rail")
 """Kinds of trunk of which something else than the legs can bear a part of the weight."""

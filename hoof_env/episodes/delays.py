@@ -1,5 +1,5 @@
-"""Delays of observations and actions, and histories of both: what rows keep of earlier steps, and into which
-parts a delay divides a control step. `frames_kernel` moves frames and actions."""
+"""Delays of observations and actions, and histories of both: the memory of rows, and the parts into which a
+delay divides a control step. `frames_kernel` moves frames and actions."""
 
 from __future__ import annotations
 
@@ -200,8 +200,8 @@ class Delays:
             delays[which] = whole if is_drawn else delay.most
 
     def fill_past(self, rows: Rows, which: NDArray[np.int64]) -> bool:
-        """Fill what some rows keep of earlier steps with their first frame, and with zeros for actions;
-        return True if they keep anything."""
+        """Fill the memory of some rows with their first frame, and with zeros for actions; return True if
+        they have a memory."""
         rows.past_actions[which] = 0.0
         rows.frames[which] = rows.frames[which, :1]
         return bool(rows.frames.size or rows.past_actions.size)

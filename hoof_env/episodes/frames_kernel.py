@@ -1,5 +1,4 @@
-"""Parts of the kernels of a step that keep what was observed and asked for: delays of observations and
-actions, and histories of both.
+"""Parts of the kernels of a step that store observations and actions: delays and histories of both.
 
 A row keeps frames, which are observations of one instant, and actions, the newest first. Each control step
 moves them one place on. Both are numbers of one row after the other, so these loops take no lanes.

@@ -90,7 +90,7 @@ class NamedArray(np.ndarray[Any, np.dtype[np.float64]]):
     """Numbers that have names along the last axis: `row["crank_speed"]` is `row[..., 0]`.
 
     A float array with a last axis that can also be indexed by name, and a mapping of its names; made by
-    `name_columns`. Comparison with another `NamedArray` or a mapping is that of mappings.
+    `name_columns`. It compares with another `NamedArray` or a mapping as mappings do.
     """
 
     # No dictionary, which would take as long to make as the array.

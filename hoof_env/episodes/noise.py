@@ -44,7 +44,7 @@ def check_noise(name: str, given: Any, groups: Sequence[str]) -> dict[str, float
 
 @dataclass(frozen=True)
 class Noise:
-    """Errors of what is observed.
+    """Errors of observations.
 
     Attributes:
         noise: largest errors that change with every control step, by group of the observation.

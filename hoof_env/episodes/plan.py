@@ -55,8 +55,8 @@ class Feature(Protocol):
         generators: Sequence[np.random.Generator],
         options: Mapping[str, Any],
     ) -> None:
-        """Draw or set what is new in the episodes that start in the rows `which`, with a generator for each
-        and the options of the reset."""
+        """Draw or set the feature's values in episodes that start in the rows `which`, with a generator for
+        each and the options of the reset."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -103,8 +103,8 @@ class Plan:
 
     @property
     def features(self) -> tuple[Feature, ...]:
-        """Features with a start of their own, in the order in which they draw. That order is part of what a
-        seed means: parameters and the body's start come before."""
+        """Features with a start of their own, in the order in which they draw. A seed's meaning includes this
+        order: parameters and the body's start come before."""
         return self.commands, self.strength, self.noise, self.delays, self.pushes, self.costs
 
     @property

@@ -76,7 +76,7 @@ class Pushes:
 
     Attributes:
         given: pushes of each episode, in the order of their times.
-        impulse: smallest and largest impulse of pushes that are drawn [N s]; None for none.
+        impulse: smallest and largest impulse of pushes that are drawn [N s]; None if none are drawn.
         seconds: shortest and longest time from one push that is drawn to the next [s].
         trunk: kind of the trunk.
         dt: control step [s].

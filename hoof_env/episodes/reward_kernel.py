@@ -43,10 +43,10 @@ def compute_reward(scene: Scene, outcome: Outcome, n: Whole) -> Lanes:
 def compute_user_term(
     scene: Scene, term: Term, weights: tuple[Number, Number], outcome: Outcome, n: Whole
 ) -> tuple[Lanes, Lanes]:
-    """Return a term from outside this package, which may have constants and keep rows, under two weights. The
-    rows are written under the first.
+    """Return a term from outside this package, which may have constants and rows of its own, under two
+    weights. The rows are written under the first.
 
-    The rows that it keeps have their former values where the engine failed: what it read there may be NaN.
+    Its rows have their former values where the engine failed: its inputs may be NaN there.
     """
     now = scene.kept_rows(n)
     count = scene.layouts.own_rows if term.state else 0

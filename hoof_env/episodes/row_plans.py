@@ -3,7 +3,7 @@
 A batch works under one plan at a time. If its rows are under several that kernels distinguish, a kernel runs
 once under each of them on all rows, and each row keeps the result under its own: it has the bits of a single
 environment with these settings. The time of a step is multiplied by the number of such plans; settings that
-act at starts alone, such as `strength`, `randomize` and ranges of commanded speeds, cost none.
+act at starts alone, such as `strength`, `randomize` and ranges of commanded speeds, cost no time.
 """
 
 from __future__ import annotations
@@ -147,8 +147,8 @@ class RowPlans:
         return [self.plans[k] for k in np.unique(self.present).tolist()]
 
     def groups(self, rows: Index, *, for_kernels: bool = False) -> Iterator[tuple[Plan, Index]]:
-        """Yield the plans that some rows are under, each with those rows; with `for_kernels` the plans that
-        kernels distinguish."""
+        """Yield the plans of some rows, each with its rows; with `for_kernels` the plans that kernels
+        distinguish."""
         each: list[object] = [*(self.marks if for_kernels else self.plans)]
         present = self.present[rows]
         for key in {id(one): one for one in each}.values():

@@ -213,7 +213,7 @@ class Scene:
         return columns(self._episode, self.lanes, None, n, self.layouts.own_first)
 
     def inputs(self, n: Whole) -> ObservationInputs:
-        """Return what entries, and maps of actions, are computed from."""
+        """Return the inputs of entries and of maps of actions."""
         is_terrain = dict(self.kind.engine.known)["is_terrain"]
         return ObservationInputs(
             self.trunk(n),

@@ -118,7 +118,7 @@ def _check_settings(engine: Mapping[str, Any]) -> None:
         masses = np.asarray(engine["trunk_settings"], np.float64)[TrunkSettings.rows("total_mass")]
         largest = float(np.abs(np.asarray(engine["limb_settings"], np.float64)).max())
     except (TypeError, ValueError, KeyError, IndexError):
-        return  # the engine says what is wrong
+        return  # the engine raises the error
     if (masses <= 0.0).any():
         raise ParameterError(f"state['trunk_settings']: expected positive masses, got {masses.min():g}")
     if largest > MAX_SETTING:
@@ -319,7 +319,7 @@ def _are_costs(values: Floats) -> bool:
 
 
 def _read_seen(batch: EpisodeBatch, name: str, given: Any) -> NDArray[np.float32]:
-    """Return what was observed or asked for in a state.
+    """Return the stored observations or actions of a state.
 
     Raises:
         ParameterError: numbers out of range, or another shape.

@@ -22,7 +22,8 @@ Floats = NDArray[np.float64]
 def read_front() -> dict[str, Any]:
     """Return the approximate front of `HorseLegMO-v0` as `python -m agents.front` wrote it: "front" has the
     returns of policies that no other dominates, with the weights and seed of their training, and
-    "hypervolume" that of the front of each seed and of all together. A better front than this is possible."""
+    "hypervolume" the hypervolume of the front of each seed and of all seeds together. A better front than
+    this is possible."""
     text = files("hoof_env").joinpath("data", "fronts", "HorseLegMO-v0.json").read_text(encoding="utf-8")
     front: dict[str, Any] = json.loads(text)
     return front
@@ -63,7 +64,7 @@ def hypervolume(points: ArrayLike, reference: ArrayLike = REFERENCE_POINT) -> fl
             f"points, reference: expected shapes (n, 3) and (3,), got {values.shape} and {low.shape}"
         )
     values = values[(values > low).all(axis=1)]
-    # Slabs between heights of the last objective: the area of a slab is that of all points at least as high.
+    # Slabs between heights of the last objective: the points at least as high as a slab span its area.
     values = values[np.argsort(-values[:, 2], kind="stable")]
     bounds = [*values[:, 2], low[2]]
     slabs = ((bounds[k] - bounds[k + 1]) * _area(values[: k + 1, :2] - low[:2]) for k in range(len(values)))

@@ -216,7 +216,7 @@ def _find_same(name: str, env: gym.Env[Any, Any], env_id: str) -> Any:
         try:
             return find_policy(name, env, env_id)
         except UserWarning as unlike:
-            raise DataFileError(f"{unlike}: its score would be that of another task") from None
+            raise DataFileError(f"{unlike}: its score would belong to another task") from None
 
 
 class _Progress:

@@ -76,8 +76,8 @@ def make(id: str, *, dtype: Any = None, starts: int = STARTS, seed: int = 0, **s
     Args:
         id: id of an environment of this package, of one leg or of a horse.
         dtype: float64, which needs `jax_enable_x64`, or float32; None for what JAX has now.
-        starts: number of starts. The k-th is that of `reset(seed=seed + k)` of the environment; a reset takes
-            one of them at random.
+        starts: number of starts. The k-th is the start after `reset(seed=seed + k)` of the environment; a
+            reset takes one of them at random.
         seed: see `starts`.
         settings: settings of the id, as for `gymnasium.make`.
 
@@ -180,7 +180,7 @@ class JaxEnv:
         return len(self.action_names)
 
     def params_of(self, seeds: Any, options: Any = None) -> Params:
-        """Return parameters whose starts are those of `reset(seed=..., options=options)` for some seeds."""
+        """Return parameters with the starts of `reset(seed=..., options=options)` for some seeds."""
         seeds = list(seeds)
         batch = EpisodeBatch(self._batch.task, self._settings, len(seeds))
         generators = [seeding.np_random(int(seed))[0] for seed in seeds]

@@ -72,6 +72,9 @@ class Jax(Eager):
 
     Args:
         kind: type of numbers, float64 or float32.
+
+    Attributes:
+        huge: quotient by 0, without a slope; far beyond what is physical, and products with it are finite.
     """
 
     has_angles = True
@@ -79,6 +82,7 @@ class Jax(Eager):
     def __init__(self, kind: Any) -> None:
         super().__init__(exact=False)
         self.kind = np.dtype(kind)
+        self.huge = float(np.sqrt(np.finfo(self.kind).max))
         self.whole_kind = np.int64 if self.kind == np.float64 else np.int32
 
     # numbers
@@ -114,8 +118,9 @@ class Jax(Eager):
             return x * y
         if is_known(y):
             return x / y
-        # a quotient by 0 has the value of IEEE 754, and no slope
-        return jnp.where(y == 0.0, jax.lax.stop_gradient(x / y), x / jnp.where(y == 0.0, 1.0, y))
+        # infinity as a factor in a branch that is not chosen would make slopes of 0 NaN on their way back
+        endless = jnp.sign(jax.lax.stop_gradient(x)) * self.huge
+        return jnp.where(y == 0.0, endless, x / jnp.where(y == 0.0, 1.0, y))
 
     def negative(self, x: Any, n: int) -> Any:
         return -x

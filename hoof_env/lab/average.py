@@ -41,7 +41,7 @@ MAX_SHOWN = 5
 """Largest number of stances or limbs that a message names."""
 
 DROPPED = ("first", "odd")
-"""Stances that may be left out: the first of each record, and those of odd length."""
+"""Stances that may be left out: the first of each record, and stances of odd length."""
 
 
 @dataclass(frozen=True)

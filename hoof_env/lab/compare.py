@@ -1,7 +1,7 @@
 """Comparison of two force records, limb by limb: `hoof-env compare`.
 
-Both are resampled by linear interpolation to the higher of both rates, so that no peak of either is lost.
-`lab.stances` defines a stance. Times in results and messages are those of the files.
+Both are resampled by linear interpolation to the higher of both rates, so that neither loses a peak.
+`lab.stances` defines a stance. Times in results and messages are as in the files.
 
 There are three ways to align B with A:
 

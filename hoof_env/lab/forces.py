@@ -97,7 +97,7 @@ def _to_surface(at: Complex, along: Complex, terrain: Terrain) -> NDArray[np.flo
     nearest = np.clip(np.floor((at.real - terrain.start) / terrain.spacing) + 1, 0, last).astype(int)
     far = min(last, math.ceil(REACH / terrain.spacing) + 1)
     best = np.full(len(at), np.inf)
-    # Outward from the piece below the point, so that of equal ways the nearest piece's is kept.
+    # Outward from the piece below the point, so that among equal distances the nearest piece wins.
     for step in sorted(range(-far, far + 1), key=abs):
         cell = nearest + step
         inside = (cell >= 0) & (cell <= last)

@@ -98,9 +98,9 @@ def _remedy(found: Comparison, limb: str, of_b: str) -> str:
     forward, upward = record.signs.get(limb, (1, 1))
     # An option turns all limbs, so that it is no remedy if their signs differ.
     if len({record.signs.get(name, (1, 1)) for name in record.limbs}) > 1:
-        return f"a minus before the column of {limb}_force_x in --map-{which} turns those of {which.upper()}"
+        return f"a minus before the column of {limb}_force_x in --map-{which} turns {which.upper()}"
     option = next(name for name, signs in REVERSED.items() if signs == (-forward, upward))
-    return f"--reverse-{which} {option} turns those of {which.upper()}"
+    return f"--reverse-{which} {option} turns {which.upper()}"
 
 
 def _levels(found: Comparison) -> str:
@@ -146,7 +146,7 @@ def _table(found: Comparison) -> str:
                 row += [str(errors.pairs), f"{force.rmse:.{places}f}", _r(force)]
             else:
                 row += ["", "", ""]
-            # The largest fore-aft force is that of propulsion, which has its own row.
+            # The largest fore-aft force is propulsion's, which has its own row.
             row.append("" if name == "fore-aft" else _pair(force.peak_error, force.peak, places))
             row.append(_pair(force.impulse_error, force.impulse, places + 1))
             if name == "vertical":

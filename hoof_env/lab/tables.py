@@ -122,7 +122,7 @@ def _read_text(path: Path) -> Table:
 
 
 def _are_own(names: Sequence[str]) -> bool:
-    """Return True if columns of these names are those of a table of this package."""
+    """Return True if these are names of columns of a table of this package."""
     return all(any(name.endswith(end) for name in names) for end in OWN_COLUMNS)
 
 

@@ -213,8 +213,8 @@ class ConstrainedLeg:
         A hoof point that starts inside the ground has entered it at its present rate. Returns one trace row.
 
         Raises:
-            ParameterError: no gait, theta or x is not finite, or `height` or `speed` is not that of the fixed
-                trunk.
+            ParameterError: no gait, theta or x is not finite, or `height` or `speed` differs from the fixed
+                trunk's.
         """
         theta, x = check_number("theta", theta), check_number("x", x)
         own = self.trunk.height
@@ -250,7 +250,7 @@ class ConstrainedLeg:
             raise ParameterError(f"trace: expected rows of new_trace, got an array of {trace.dtype}")
         numbers = command.tolist()
         before = self.state.copy()
-        self._present = None  # that of another command, or of another state
+        self._present = None  # it belongs to another command or state
         result = Result.OK
         try:
             with np.errstate(all="ignore"):  # a diverging integration is a result, not a warning

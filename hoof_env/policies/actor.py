@@ -82,5 +82,5 @@ def _check_signature(policy: Any) -> None:
     except TypeError as error:
         raise ParameterError(
             f"policy {type(policy).__name__}: expected predict(observation, state=None, episode_start=None,"
-            f" deterministic=True), as that of Stable-Baselines3; got predict{signature} ({error})"
+            f" deterministic=True), as in Stable-Baselines3; got predict{signature} ({error})"
         ) from None

@@ -164,7 +164,8 @@ def find_function(name: str, env: gym.Env[Any, Any]) -> Any:
 
 def policy_of(policy: Any, env: gym.Env[Any, Any] | None) -> Any:
     """Return a policy that is an object with `predict`: a model of Stable-Baselines3 with the normalisation
-    of its environment, and any other one as it is. A warning says if a model lacks that of its training.
+    of its environment, and any other policy as it is. A warning says if a model lacks the normalisation of
+    its training.
 
     Raises:
         DataFileError: a model of other spaces.
@@ -323,7 +324,7 @@ def load_policy(policy: Any, env: gym.Env[Any, Any] | None = None, seed: int = 0
     if not isinstance(policy, (str, Path)):
         raise ParameterError(f"policy: expected a name, a path, a gait or a function, got {brief(policy)}")
     name = str(policy)
-    # An environment that gymnasium.make has not made has no id: it is taken for that of the file.
+    # An environment that gymnasium.make has not made has no id: the file's id stands for it.
     env_id = spec.id if spec else read_policy_record(name).get("env_id", type(env.unwrapped).__name__)
     return find_policy(name, env, env_id, seed)
 

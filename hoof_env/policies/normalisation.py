@@ -13,7 +13,7 @@ from hoof_env.errors import DataFileError, bounded
 
 STATISTICS = "vecnormalize.pkl"
 NAMES = (STATISTICS, "vec_normalize.pkl")
-"""Names of a file of statistics: those of rl_zoo3 and agents.train, and of huggingface_sb3."""
+"""Names of a file of statistics: the first from rl_zoo3 and agents.train, the second from huggingface_sb3."""
 
 MISSING = (
     "trained under VecNormalize, whose statistics are missing: unless only rewards were normalised, its"

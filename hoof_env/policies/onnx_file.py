@@ -1,4 +1,4 @@
-"""Trained policies in ONNX: reading and playing them, and marking those of other exporters.
+"""Trained policies in ONNX: reading and playing them, and marking the files of other exporters.
 
 A policy's graph has one input, observations of shape (batch, k), and gives actions of shape (batch, n). Its
 metadata are the policy's record (see `record`): without them a file does not say for which environment it is,

@@ -62,12 +62,12 @@ ALGORITHMS = {
 
 
 MARKS = {"tqc": "top_quantiles_to_drop_per_net", "sac": "target_entropy", "td3": "policy_delay"}
-"""Entry by which the data in a .zip are known to be of an algorithm; TQC has that of SAC, too."""
+"""Entry by which the data in a .zip show their algorithm; TQC has the entry of SAC, too."""
 
 
 def algorithm_of(path: Path | str) -> str:
-    """Return the algorithm of `ALGORITHMS` that plays a .zip of Stable-Baselines3, "ppo" for those without a
-    mark, among them A2C, whose policy is that of PPO. Nothing is unpickled.
+    """Return the algorithm of `ALGORITHMS` that plays a .zip of Stable-Baselines3, "ppo" for a file without a
+    mark, as of A2C, which has the same policy. Nothing is unpickled.
 
     Raises:
         OSError, KeyError, ValueError, zipfile.BadZipFile: not such a file.

@@ -33,8 +33,7 @@ _WARNED: set[Path] = set()
 
 
 def folder() -> Path:
-    """Return the folder of the files: that of the environment variable, else one in the user's cache
-    folder."""
+    """Return the folder of the files: the environment variable's, else one in the user's cache folder."""
     if given := os.environ.get(FOLDER):
         return Path(given)
     try:

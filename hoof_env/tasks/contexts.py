@@ -1,12 +1,12 @@
-"""Contexts: fixed sets of physical parameters to train on and to be tested on, as of contextual learning.
+"""Contexts: fixed sets of physical parameters for training and testing, as in contextual learning.
 
-A split varies some parameters. Its three sets have `COUNT` contexts each: "train"; "interpolation", other
-contexts of the same ranges; and "extrapolation", of which every parameter is outside these ranges, above or
-below. A parameter is the environment's own value times a factor, whose logarithm is spread evenly, by
-Roberts' sequence: no generator is drawn from, and the sets are the same on any machine.
+A split varies some parameters. Its three sets have `COUNT` contexts each: "train"; "interpolation", further
+contexts in the same ranges; and "extrapolation", with every parameter outside these ranges, above or below. A
+parameter is the environment's own value times a factor. The logarithms of the factors are spread evenly by
+Roberts' sequence, without random numbers: the sets are the same on any machine.
 
-Terms as in Kirk et al. (2023), "A survey of zero-shot generalisation in deep reinforcement learning", and
-sets as in CARL (Benjamins et al. 2023), whose environments keep contexts by number, too.
+Terms follow Kirk et al. (2023), "A survey of zero-shot generalisation in deep reinforcement learning", and
+numbered contexts follow CARL (Benjamins et al. 2023).
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ FACTORS = MappingProxyType(
         "trunk_share": (1.1, 1.2),
     }
 )
-"""Largest factor of a parameter in training, and in extrapolation; the smallest ones are one over these."""
+"""Largest factor of a parameter in training and in extrapolation; the smallest are their reciprocals."""
 
 SPLITS = MappingProxyType(
     {
@@ -36,7 +36,7 @@ SPLITS = MappingProxyType(
         "all": tuple(FACTORS),
     }
 )
-"""Parameters of each split; `trunk_share` is one of a suspended trunk alone."""
+"""Parameters of each split; only a suspended trunk has `trunk_share`."""
 
 SETS = ("train", "interpolation", "extrapolation")
 
@@ -44,15 +44,15 @@ COUNT = 32
 """Contexts of a set."""
 
 ROOT = 1.1673039782614187
-"""Root of x^5 = x + 1 above 1, of which powers step through Roberts' sequence in four dimensions."""
+"""Root of x^5 = x + 1 above 1; its inverse powers are the steps of Roberts' sequence in four dimensions."""
 
 
 def check_context_set(s: ResolvedSettings) -> tuple[str, str] | None:
     """Return split and set of the setting `context_set`; None without one.
 
     Raises:
-        ParameterError: not a text of the form SPLIT/SET, an unknown split or set, or the paper's solver; or
-            contexts that are to be visible without a set.
+        ParameterError: not a string of the form SPLIT/SET, an unknown split or set, the paper's solver, or
+            `context_visible` without a set.
     """
     given = s.context_set
     if given is None:
@@ -108,7 +108,7 @@ def contexts_of(split: str, name: str, s: ResolvedSettings) -> tuple[dict[str, f
 
 def _power(part: float, is_outside: bool, inner: float, outer: float) -> float:
     """Return the logarithm of a factor: `part` of the way, from 0 to 1, through the range between -inner and
-    inner; or, outside, through the one from -outer to -inner followed by that from inner to outer."""
+    inner; or, outside, through the range from -outer to -inner and then from inner to outer."""
     if not is_outside:
         return (2.0 * part - 1.0) * inner
     side = 1.0 if part >= 0.5 else -1.0

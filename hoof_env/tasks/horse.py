@@ -162,8 +162,8 @@ class Horse:
     """Four legs on a free trunk; see `body.Body`.
 
     Attributes:
-        size: length relative to that of a horse of 475 kg [-].
-        speed_scale: speed relative to that of a horse of 475 kg, the root of the size [-].
+        size: length relative to a horse of 475 kg [-].
+        speed_scale: speed relative to a horse of 475 kg, the root of the size [-].
         gaits: stored gaits by name, converted to the size of the animal.
         policy_starts: see `body.Body`; of kinematic gaits.
         gait: gait to which actions add offsets at all commanded speeds; None for `reference_gaits`.
@@ -231,7 +231,7 @@ class Horse:
         size = self.size
         given = check_number("trunk_mass", s.trunk_mass, low=0, exclusive_low=True)
         mass = given * self.scale_of("trunk_mass")
-        # The legs keep their masses: `trunk_mass` is that of the trunk alone, which a reset may draw.
+        # The legs keep their masses: `trunk_mass` is the mass of the trunk alone, which a reset may draw.
         inertia = mass * (GYRATION * size) ** 2
         trunk = Trunk("free", mass, drag=0.0, height=self.height, pitch_inertia=inertia)
         drive = self._drive(s)

@@ -73,8 +73,8 @@ NAMES = ("rate", "lead", *(f"{pair}_{name}" for pair in PAIRS for name in PAIR))
 """Names of the numbers of a gait, in their order."""
 
 SIZES = 0.25, 2.0
-"""Smallest and largest length relative to that of a horse of 475 kg [-]; the command filters of a smaller one
-would be too fast for the usual time step."""
+"""Smallest and largest length relative to a horse of 475 kg [-]; the command filters of a smaller horse would
+be too fast for the usual time step."""
 SLOWEST = 0.1
 FASTEST = 6 * np.pi
 """Lowest and highest rate of a gait, and highest speed of a crank within a stride, of a horse of 475 kg
@@ -237,8 +237,8 @@ def reference_type() -> list[Any]:
 
 
 def reference_constants(speed_scale: float, follows: bool) -> dict[str, Any]:
-    """Return values for the fields of `reference_type`, for a speed relative to that of a horse of 475 kg
-    [-]; `follows` is True if the gait follows the commanded speed."""
+    """Return values for the fields of `reference_type`, for a speed relative to a horse of 475 kg [-];
+    `follows` is True if the gait follows the commanded speed."""
     speeds, gaits, _ = _reference()
     return {"follows": follows, "speed_scale": speed_scale, "speeds": speeds, "gaits": gaits}
 

@@ -43,7 +43,7 @@ def _height(scene: ObservationInputs) -> Lanes:
 
 
 def _from_hips(x: Lanes, scene: ObservationInputs) -> Lanes:
-    """Scale a height, relative to that of the hips."""
+    """Scale a height, relative to the height of the hips."""
     # Relative to the hip height, so that horses of all sizes are seen alike.
     return (x - scene.task.height) / (0.2 * scene.task.height)
 

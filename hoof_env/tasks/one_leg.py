@@ -173,7 +173,7 @@ class OneLeg:
     """One leg under a trunk; see `body.Body`.
 
     Attributes:
-        speed_scale: speed relative to that of the published leg; see `gait.speed_scale_of` [-].
+        speed_scale: speed relative to the published leg's; see `gait.speed_scale_of` [-].
         low, high, middle, half: limits of the gait parameters, their middle and half range, shape (4,)
             [rad/s, rad, rad, rad].
         rates: rates of the parameters at an action of 1, shape (4,) [rad/s^2, rad/s, rad/s, rad/s].

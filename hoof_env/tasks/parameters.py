@@ -47,8 +47,8 @@ def resolved(settings: Settings) -> ResolvedSettings:
         if "ground" not in read_preset(settings.preset):
             raise preset_error_type(settings.preset)(
                 f"{preset_label(settings.preset)}: expected an entry 'ground' with the stiffness and the"
-                " exponent that its gaits are for ({} for those of hoof_env.Ground), or both as arguments;"
-                f" got stiffness={settings.stiffness!r}, exponent={settings.exponent!r}"
+                " exponent that its gaits are for ({} for the defaults of hoof_env.Ground), or both as"
+                f" arguments; got stiffness={settings.stiffness!r}, exponent={settings.exponent!r}"
             )
         ground = load_ground(settings.preset, stiffness=settings.stiffness, exponent=settings.exponent)
         values |= {"stiffness": ground.stiffness, "exponent": ground.exponent}

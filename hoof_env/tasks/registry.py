@@ -19,9 +19,11 @@ import gymnasium as gym
 import numpy as np
 
 from hoof_env.errors import ParameterError, UnknownArgumentError, brief, check_choice, one_of
+from hoof_env.gait import GaitParameters
 from hoof_env.simd.user_functions import check_function, function_name
 from hoof_env.tasks.body import Body
 from hoof_env.tasks.disturbances import rough_ground
+from hoof_env.tasks.hop_terms import HOP_ENTRIES, HOP_TERMS
 from hoof_env.tasks.horse import HOOF_STIFFNESS, MASS, Horse
 from hoof_env.tasks.horse_gaits import checked_size
 from hoof_env.tasks.horse_terms import HORSE_ENTRIES, HORSE_TERMS
@@ -203,6 +205,9 @@ _HORSE: Mapping[str, Any] = MappingProxyType(
 )
 """Settings of a horse."""
 
+HOP = GaitParameters(crank_speed=9.66, swing_offset=1.02, swing_sin=0.158, swing_cos=-0.49)
+"""Gait in which a hop begins: mean of 133 apexes of a gait that was searched."""
+
 TASKS: Mapping[str, Task] = MappingProxyType(
     {
         "leg": Task(
@@ -266,6 +271,33 @@ TASKS: Mapping[str, Task] = MappingProxyType(
                 "reward_weights": {"loading": 10.0},
             },
         ),
+        "hop": Task(
+            "HorseLegHop",
+            "A horse's leg that carries itself: it hops.",
+            "The trunk is on a boom, free to move forward and up and down, while its pitch is held. There"
+            " is no suspension: the ground bears the whole weight through this one leg. A motor drives the"
+            " crank, which the ground slows down. The pastern is a spring between the leg's hoof points"
+            " and the soles, which sink into the ground by 1 cm. An episode begins near the apex of a hop,"
+            " at any speed up to 4 m/s. The boom also takes the torque of the hip, with which a horse"
+            " would have to turn its trunk.",
+            {
+                "trunk": "boom",
+                "drive": "motor",
+                "stiffness": 2e6,
+                "exponent": 1.5,
+                "friction": 0.6,
+                "hoof_stiffness": 4200.0,
+                "hoof_damping": 104.0,
+                "hoof_length": 0.25,
+                # Enough authority to change the height and the speed of a hop within a stance
+                "crank_rate": 20.0,
+                "swing_rate": 3.0,
+            },
+            start={"gait": HOP, "crank_angle": (3.0, 3.7), "height": (1.95, 2.15), "speed": (0.0, 4.0)},
+            reference="open-loop",
+            terms=HOP_TERMS,
+            entries=HOP_ENTRIES,
+        ),
         "fixed": Task(
             "HorseLegFixed",
             "The paper's set-up: one gait on a fixed trunk, one crank revolution.",
@@ -275,7 +307,7 @@ TASKS: Mapping[str, Task] = MappingProxyType(
             " Eq. 8 (42 coordinates, 42 multipliers, Baumgarte) with explicit Euler at 1 ms and samples the"
             " approach speed at the first step inside the ground. Restitution 1 is the paper's elastic"
             " condition, 0 its inelastic one.\n\nBy default nothing is drawn, so all episodes are the same."
-            " This is a reproduction and not a benchmark: a return is that of one deterministic episode, has"
+            " This is a reproduction and not a benchmark: a return belongs to one deterministic episode, has"
             " no interval, and says nothing about what feedback is worth.",
             {
                 "gait": "walk",
@@ -439,7 +471,7 @@ def register(
         contact_law: function of penetration [m], its rate [m/s], inverse approach speed [s/m] and the
             ground's constants, which returns the normal force [N]; see `dynamics.hoof.contact_force`.
         action_map: map from user-defined actions to body actions.
-        start: reset options of every episode, which those of a call replace; None for the base's.
+        start: reset options of every episode, which the options of a call replace; None for the base's.
         defaults: settings, see the manual pages.
 
     Raises:
@@ -461,7 +493,7 @@ def register(
     _check_twice(env_id, [entry.name for entry in (*old.entries, *new_entries)])
     added = {term.name: term for term in new_terms}
     kept = [added.pop(term.name, term) for term in old.terms]
-    law = f" The normal force is that of `{function_name(contact_law)}`." if contact_law else ""
+    law = f" `{function_name(contact_law)}` gives the normal force." if contact_law else ""
     has_more = bool(new_terms or new_entries or contact_law or action_map)
     foreign = " With terms, entries or laws from outside this package." if has_more else ""
     caller = str(sys._getframe(1).f_globals.get("__name__", ""))

@@ -63,7 +63,7 @@ MAX_STRIDE = 1.0
 """Time over which that mean is taken [s]: an older deficit cannot be made up for."""
 
 STEPPING = 0.5
-"""Rate of the crank from which a leg counts as stepping [rad/s], a twelfth of that of the paper's gaits:
+"""Rate of the crank from which a leg counts as stepping [rad/s], a twelfth of the rate of the paper's gaits:
 agents slow the crank down in a stance, and with a stopped crank a leg can only oscillate its swing."""
 
 

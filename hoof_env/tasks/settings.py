@@ -236,7 +236,7 @@ class Settings:
             (
                 'None for level ground, {"kind": "slope", "angle": rad}, {"kind": "hills", ...} as in '
                 "[HorseLegTerrain](HorseLegTerrain.md#terrain), a `Terrain`, or what its `to_dict` returns; "
-                "a suspended trunk and a rail keep their height, and that of a boom is limited, so ground "
+                "a suspended trunk and a rail keep their height, and a boom limits it, so ground "
                 "that drifts from y = 0 is refused"
             ),
         ),
@@ -378,7 +378,7 @@ class Settings:
         About(
             "-",
             (
-                "of a horse: length relative to that of one of $horse_mass kg, $smallest_size to "
+                "of a horse: length relative to a horse of $horse_mass kg, $smallest_size to "
                 "$largest_size; None for 1"
             ),
             needs=("trunk", ("free",)),
@@ -397,7 +397,7 @@ class Settings:
         About(
             "",
             (
-                'of a horse\'s commands: "quick", with which its cranks follow a stance, or "slow", those of '
+                'of a horse\'s commands: "quick", with which its cranks follow a stance, or "slow", as on '
                 "one leg; None for quick"
             ),
             needs=("trunk", ("free",)),

@@ -166,7 +166,7 @@ def start(
         address: address of this machine on which the server listens.
         port: port, 0 for any that is free.
         out: folder of recordings.
-        hosts: names of this machine by which browsers may come, further to those of `is_own_name`.
+        hosts: names of this machine by which browsers may come, besides the names of `is_own_name`.
 
     Returns:
         Bokeh's server, whose `io_loop` is not running yet, and the URL of the page.

@@ -41,7 +41,7 @@ def env():
 
 
 def save_untrained(folder, env, algo="ppo", seed=0, **policy_kwargs):
-    """A model that was never trained, its statistics those of a few random steps."""
+    """A model that was never trained, with the statistics of a few random steps."""
     envs = VecNormalize(DummyVecEnv([lambda: env]), clip_obs=2.0)
     envs.reset()
     for _ in range(5):

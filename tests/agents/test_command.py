@@ -41,7 +41,7 @@ WITH_ENV = {
 
 @pytest.mark.parametrize("name", [*COMMANDS, "experiments", "experiments.training"])
 def test_an_environment_has_the_same_options_everywhere(name, monkeypatch, capsys):
-    """As in `hoof-env`; and a wrong option shows those of its command."""
+    """As in `hoof-env`; and a wrong option shows the options of its command."""
     module = f"agents.{name}" + (".__main__" if name == "experiments" else "")
     with pytest.raises(SystemExit) as end:
         import_module(module).main([*FIRST.get(name, ()), "--no-such-option"])

@@ -46,6 +46,10 @@ def test_the_published_page_is_of_the_published_rows(tmp_path):
     page = costs_page.write(tmp_path, rows).read_text(encoding="utf-8")
     assert page == (costs_page.PUBLISHED / costs_page.PAGE_FILE).read_text(encoding="utf-8")
     agents = {found["agent"] for found in rows if found["env_id"] == LEG}
+    for env_id in {found["env_id"] for found in rows}:
+        trained = [found for found in rows if found["env_id"] == env_id and found["seed"]]
+        steps = {found["steps"] for found in trained if found["agent"] != costs_page.FREE}
+        assert len(steps) == 1, "rows of an earlier plan"
     assert agents >= {*costs_page.NAMES.values(), *costs_page.GAITS}
 
 

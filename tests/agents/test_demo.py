@@ -110,7 +110,7 @@ def test_every_published_number_stands_beside_both_solvers(folder, report):
         assert claim.id in report.ids
 
 
-def test_scores_on_the_page_are_those_of_the_file(folder, report):
+def test_scores_on_the_page_agree_with_the_file(folder, report):
     data = json.loads((folder / "scores.json").read_text())
     rows = {row[0].strip(): row[1:] for row in report.tables["scores"][1:]}
     assert set(rows) == set(data["policies"]) == {*demo.SCRIPTED, demo.TRAINED}

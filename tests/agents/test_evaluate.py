@@ -67,8 +67,8 @@ def test_policies_meet_the_same_episodes_whatever_stands_beside_them():
     assert alone.scores[0] == beside.scores[1]
 
 
-def test_intervals_are_those_of_scipy():
-    """The bootstrap that the published tables were made with, and that of a skewed sample."""
+def test_intervals_agree_with_scipy():
+    """The bootstrap that the published tables were made with, and the interval of a skewed sample."""
     from scipy.stats import bootstrap, trim_mean
 
     for count in (2, 5, 40):
@@ -115,7 +115,7 @@ def test_table_and_files(trained, tmp_path, capsys):
 
 
 def test_terminal_report_and_file_have_one_cost_of_transport():
-    """The cost of an episode that went backward is infinite; that of several is work over distance."""
+    """The cost of an episode that went backward is infinite; the cost of several is work over distance."""
     forward = {"return": 1.0, "distance_m": 10.0, "positive_work_j": 800.0, "mean_normal_n": 400.0,
                "weight_share": 0.5, "cost_of_transport": 0.1}  # fmt: skip
     back = forward | {"distance_m": -5.0, "cost_of_transport": math.inf}

@@ -40,7 +40,7 @@ RAIL = "hoof_env/HorseLegRail-v0"
 # The plan
 
 
-def test_the_full_plan_is_what_is_asked():
+def test_the_full_plan_trains_ten_seeds_of_each_learner():
     counted = {(one.algo, one.env_id): one.seeds for one in load_plan("full")}
     assert {key: n for key, n in counted.items() if key[1] == LEG} == {
         (algo, LEG): 10 for algo in ("ppo", "sac", "td3", "tqc")
@@ -80,7 +80,7 @@ def test_a_variant_has_a_name_and_hyperparameters_of_its_own():
     assert entry.settings["n_epochs"] == 2
 
 
-def test_the_time_to_a_return_is_that_of_the_first_crossing(tmp_path):
+def test_the_time_to_a_return_ends_at_the_first_crossing(tmp_path):
     rows = [(0.0, -5.0), (10.0, 10.0), (20.0, 30.0), (30.0, 5.0), (40.0, 90.0)]
     (tmp_path / CURVE).write_text("wall_s,return\n" + "".join(f"{t},{r}\n" for t, r in rows))
     one = Outcome(tmp_path, {})
@@ -89,7 +89,7 @@ def test_the_time_to_a_return_is_that_of_the_first_crossing(tmp_path):
     assert seconds_to(91.0, one) == np.inf
 
 
-def test_the_cost_of_transport_is_that_of_the_whole():
+def test_the_cost_of_transport_is_work_over_distance_of_all_episodes():
     one = {"distance_m": 10.0, "positive_work_j": 800.0, "mean_normal_n": 400.0, "weight_share": 0.5,
            "return": 1.0, "cost_of_transport": 0.1}  # fmt: skip
     back = {**one, "distance_m": -5.0, "cost_of_transport": np.inf}
@@ -123,7 +123,7 @@ def test_a_training_leaves_its_curve_and_its_score(done):
     assert len(final["episodes"]) == len(FINAL_SEEDS)
 
 
-def test_what_is_done_is_not_done_again(done, monkeypatch):
+def test_finished_trainings_are_not_repeated(done, monkeypatch):
     monkeypatch.setattr(training, "train", lambda *_: pytest.fail("was trained"))
     assert train_one(tiny(done))
 
@@ -285,7 +285,7 @@ RLIABLE = {
 
 
 @pytest.mark.parametrize("algo", RLIABLE)
-def test_the_statistics_are_those_of_rliable(algo):
+def test_statistics_agree_with_rliable(algo):
     """Bounds within a tenth of the interval: other seeds move them by 0.075 of it at most."""
     mean, *bounds = RLIABLE[algo]
     found = iqm(RETURNS[algo])
@@ -370,7 +370,7 @@ def test_who_follows_half_of_a_command(monkeypatch, tmp_path):
     assert following("PPO", speeds).intervals["follows"].mean == pytest.approx(0.5)
 
 
-def test_the_settled_speed_is_that_behind_the_start():
+def test_the_settled_speed_leaves_out_the_start():
     """A constant gait: its speed after four seconds, from the environment's own account."""
     env = gym.make(baselines_page.SPEED, target_speed=2.0)
     held = open_loop({"constant": env.unwrapped.gaits["run"].to_array()}, env)

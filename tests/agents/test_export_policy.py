@@ -58,7 +58,7 @@ def untrained(algorithm, normalized: bool) -> TrainedPolicy:
 
 @pytest.mark.parametrize("normalized", [True, False])
 @pytest.mark.parametrize("algorithm", [PPO, FlatPPO, SAC, TD3, TQC])
-def test_what_is_exported_acts_as_the_model(algorithm, normalized):
+def test_an_exported_policy_acts_as_the_model(algorithm, normalized):
     policy = untrained(algorithm, normalized)
     rows = np.random.default_rng(1).normal(0, 3, (50, 3)).astype(np.float32)
     with torch.no_grad():
@@ -156,7 +156,7 @@ def test_a_file_names_the_version_that_trained(env):
     assert export.about(env, ENV_ID, KWARGS, {})["settings"]["episode_seconds"] == 0.4
 
 
-def test_a_file_that_acts_otherwise_is_not_kept(tmp_path, monkeypatch):
+def test_a_file_that_acts_otherwise_is_not_written(tmp_path, monkeypatch):
     right = export.Deterministic.forward
     monkeypatch.setattr(export.Deterministic, "forward", lambda self, rows: right(self, rows) + 1e-4)
     path = tmp_path / "policy.onnx"

@@ -22,7 +22,7 @@ points = st.integers(1, 12).flatmap(lambda n: arrays(float, (n, 3), elements=who
 
 
 @given(points)
-def test_the_volume_is_that_of_counted_unit_cubes(found):
+def test_the_volume_is_the_number_of_unit_cubes(found):
     """Points on a grid: a cube counts if some point is at least as far in every direction."""
     cubes = np.stack(np.meshgrid(*[np.arange(0.0, 6.0)] * 3, indexing="ij"), -1).reshape(-1, 3) + 1
     counted = sum((cube <= found).all(axis=1).any() for cube in cubes)
@@ -30,7 +30,7 @@ def test_the_volume_is_that_of_counted_unit_cubes(found):
 
 
 @given(points)
-def test_what_is_dominated_adds_nothing_and_the_rest_something(found):
+def test_dominated_points_add_nothing_and_the_rest_something(found):
     kept = found[non_dominated(found)]
     volume = hypervolume(found, (-4.0, -4.0, -4.0))
     assert hypervolume(kept, (-4.0, -4.0, -4.0)) == volume
@@ -41,7 +41,7 @@ def test_what_is_dominated_adds_nothing_and_the_rest_something(found):
 
 
 @pytest.mark.parametrize("bad", [[1.0, 2.0], [[1.0, np.nan, 2.0]], "front", [[1, 2, 3], [1, 2]]])
-def test_points_that_are_none_are_refused(bad):
+def test_bad_points_are_refused(bad):
     for use in (non_dominated, hypervolume):
         with pytest.raises(ParameterError, match="points: expected finite numbers"):
             use(bad)
@@ -82,7 +82,7 @@ def test_the_shipped_agent_returns_what_the_front_says():
     assert front.shipped().returns == pytest.approx(stored["returns"], abs=1e-2)
 
 
-def test_returns_of_each_objective_are_those_of_single_environments():
+def test_returns_of_each_objective_equal_single_environments():
     policy = Scripted(lambda observation, time: np.zeros(4), 0.02)
     found = returns_of(policy, range(3))
     env = gym.make("hoof_env/HorseLegMO-v0")

@@ -59,7 +59,7 @@ def test_the_committed_file_has_what_the_curves_say():
 
 
 @pytest.mark.parametrize("name", ["HorseLegRail", "HorseLegSpeed", "HorseLegTerrain"])
-def test_the_committed_return_of_random_actions_is_that_of_the_present_reward(name):
+def test_the_committed_return_of_random_actions_has_the_present_reward(name):
     committed = json.loads((gallery.POLICIES / RETURNS).read_text(encoding="utf-8"))
     env_id = f"hoof_env/{name}-v0"
     # Another machine has other last bits, which change an episode, and hardly the mean of a hundred
@@ -68,8 +68,8 @@ def test_the_committed_return_of_random_actions_is_that_of_the_present_reward(na
 
 @pytest.mark.parametrize("env_id", [LEG, RAIL])
 def test_scores_of_the_curves_are_compared_with_gaits_in_the_same_episodes(env_id):
-    """At the start of a training the score is not yet that of the best gait, and at its end it is near that
-    of the agent that ships."""
+    """At the start of a training the score is not yet the best gait's, and at its end it is near the shipped
+    agent's."""
     scored = shipped_returns(env_id.rpartition("/")[2])
     rows = [row for row in read_curves(gallery.CURVES) if (row["env_id"], row["algo"]) == (env_id, "ppo")]
     first = [row["return"] for row in rows if row["steps"] == 0]

@@ -1,4 +1,4 @@
-"""Terms add up to the return, legs accelerate the horse, and the committed figures are those of today."""
+"""Terms add up to the return, legs accelerate the horse, and the committed figures are today's."""
 
 import json
 
@@ -26,7 +26,7 @@ def envs():
     return make_rows(horse_figures.ENV_ID, ROWS)
 
 
-def test_returns_and_figures_are_those_of_an_evaluation(envs, policies):
+def test_returns_and_figures_agree_with_an_evaluation(envs, policies):
     ours = horse_figures.play(envs, policies["reference"], SEEDS, {})
     theirs = score_vector("reference", horse_figures.ENV_ID, SEEDS)
     for one, other in zip(ours, theirs, strict=True):

@@ -1,4 +1,4 @@
-"""The force of the suspension obeys Newton's law, and the committed figures are those of today."""
+"""The force of the suspension obeys Newton's law, and the committed figures are today's."""
 
 import json
 

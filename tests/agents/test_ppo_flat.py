@@ -50,7 +50,7 @@ def model(net_arch=(8,), envs=2, ends="truncated", **changes) -> FlatPPO:
 
 @pytest.mark.parametrize("count", [2, 64, CHUNK, CHUNK + 1, 2 * CHUNK + 500])
 @pytest.mark.parametrize("net_arch", [(), (8,), (64, 64), (5, 7, 3)])
-def test_the_gradient_is_that_of_torch_and_stable_baselines(net_arch, count):
+def test_the_gradient_agrees_with_torch_and_stable_baselines(net_arch, count):
     """The loss as PPO.train has it, differentiated by torch."""
     generator = np.random.default_rng(0)
     one = model(net_arch, batch_size=count, n_steps=-(-count // 2), ent_coef=0.01, vf_coef=0.7)
@@ -104,7 +104,7 @@ def test_a_ratio_beyond_all_numbers_counts_as_the_clipped_one():
     np.testing.assert_array_equal(one.gradient.vector, 0.0)
 
 
-def test_steps_are_those_of_adam():
+def test_steps_agree_with_adam():
     """torch's, with its own clipping of the norm."""
     one, generator = model(), np.random.default_rng(0)
     copies = [parameter.detach().clone().requires_grad_() for parameter in one.policy.parameters()]

@@ -65,7 +65,7 @@ def test_without_a_multiplier_it_has_the_bits_of_ppo():
     assert numbers(charged) != numbers(theirs)
 
 
-def test_advantages_are_those_of_reward_and_cost_by_their_definition():
+def test_advantages_of_reward_and_cost_follow_their_definition():
     """Generalised advantages (Schulman et al. 2016) as sums over what follows, by the critic's values."""
     ours = model(first_multiplier=0.7, multiplier_rate=0.0)
     found = {}

@@ -169,7 +169,7 @@ def test_a_policy_of_other_spaces(run, tmp_path):
         SavedModel.find(folder).load(pendulum, "Pendulum-v1")
 
 
-def test_a_name_that_is_none_lists_the_known(env):
+def test_an_unknown_name_lists_the_known_names(env):
     with pytest.raises(ParameterError, match=r"walk.*idle.*airborne.*open-loop.*\.json.*'gallop'"):
         find_policy("gallop", env, ENV_ID)
 

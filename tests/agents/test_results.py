@@ -109,7 +109,7 @@ def test_a_row_imports_no_module_and_runs_no_pickle(row, tmp_path, monkeypatch):
 @pytest.mark.parametrize(
     "change", [{"episode_seconds": 30.0}, {"friction": 0.3}, {"drive": "motor"}], ids=str
 )
-def test_a_policy_of_another_world_is_no_row(tmp_path, change):
+def test_a_policy_of_another_world_is_refused(tmp_path, change):
     run = tmp_path / "run"
     shutil.copytree(results.ROOT / "results" / "policies" / "HorseLeg-v0-blind", run)
     record = json.loads((run / "run.json").read_text())

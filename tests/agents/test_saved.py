@@ -42,8 +42,8 @@ def options(optimizer):
 
 
 @pytest.mark.parametrize("algo", ["ppo", "sac", "td3", "tqc"])
-def test_a_policy_of_plain_data_learns_as_that_of_the_model(algo, env, tmp_path):
-    """By its own optimizers, those of a deep copy and of a copy that it saves; steps of others go on."""
+def test_a_policy_of_plain_data_learns_like_the_model(algo, env, tmp_path):
+    """By its own optimizers, also in a deep or saved copy, and with the loaded states of optimizers."""
     model = save_untrained(tmp_path, env, algo)
     policy = SavedModel.find(tmp_path).load(env, ENV_ID).model.policy
     policy.save(tmp_path / "copy.pt")

@@ -106,7 +106,7 @@ def test_a_longer_training_replaces_a_shorter_one_and_no_other(tmp_path):
     assert [row["return"] for row in found] == [3.0, 4.0, 1.0, 2.0]
 
 
-def test_what_is_written_is_read_back(tmp_path):
+def test_written_rows_are_read_back(tmp_path):
     rows = curve(LEG, "ppo", 0, [1.0, 2.5])
     with (tmp_path / "curves.csv").open("w", newline="") as file:
         writer = csv.DictWriter(file, COLUMNS)
@@ -117,7 +117,7 @@ def test_what_is_written_is_read_back(tmp_path):
 
 
 def test_seconds_are_compared_on_one_processor(tmp_path, monkeypatch):
-    """On the one of most trainings of HorseLeg-v0; those of other ids alone are marked."""
+    """On the processor of most trainings of HorseLeg-v0; one of other ids alone is marked."""
     monkeypatch.setattr(stock_page, "anchors", lambda env_id: {"zero action": 0.5, stock_page.BEST: 1.5})
     rows = [
         row

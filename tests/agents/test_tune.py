@@ -144,7 +144,7 @@ def test_a_trial_shorter_than_a_rollout_is_scored(tmp_path):
 
 
 @pytest.mark.parametrize("error", [ZeroDivisionError("of a pruner"), ParameterError("of a setting")])
-def test_an_error_is_no_divergence_and_told_once(tmp_path, monkeypatch, caplog, error):
+def test_an_error_does_not_count_as_divergence_and_is_told_once(tmp_path, monkeypatch, caplog, error):
     def fail(args, scorer):
         raise error
 

@@ -95,7 +95,7 @@ def test_engine_and_prescribed_motion_agree_under_a_fixed_trunk(gait, restitutio
 
 
 @pytest.mark.parametrize("chi", [0.75, 3.0, 20.0])
-def test_the_force_of_a_free_mass_is_that_of_its_motion(chi):
+def test_the_force_of_a_free_mass_follows_from_its_motion(chi):
     """Simulated for one mass, stiffness and speed; the formula needs none of them."""
     mass, stiffness, n, speed = 7.0, 3e4, 1.375, 0.8
 
@@ -124,7 +124,7 @@ def test_the_page_has_the_tables_of_its_data(data):
 
 @pytest.mark.parametrize("gait", GAITS)
 @pytest.mark.parametrize("setup", SETUPS)
-def test_the_data_is_what_the_engine_gives_today(data, gait, setup):
+def test_the_data_agree_with_the_present_engine(data, gait, setup):
     for law, restitution in ((PAPER_LAW, 0.0), ("exact", 0.5), ("kelvin-voigt", 0.25)):
         row = elasticity.find(data["landings"], gait=gait, setup=setup, law=law, restitution=restitution)
         peak = landing(gait, SETUPS[setup], ground_of(law, restitution))

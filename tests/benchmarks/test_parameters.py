@@ -49,7 +49,7 @@ def test_the_deleted_tables_come_out_again(data):
 
 
 @pytest.mark.parametrize(("gait", "factor", "restitution"), [("run", 1.0, 1.0), ("walk", 4.0, 0.0)])
-def test_the_energy_of_a_turn_adds_up_and_is_that_of_the_data(data, gait, factor, restitution):
+def test_the_energy_of_a_turn_adds_up_and_agrees_with_the_data(data, gait, factor, restitution):
     row = parameters.find(data["suspended"], gait=gait, factor=factor, restitution=restitution)
     ground = parameters.ground_of(
         restitution=restitution, stiffness=factor * parameters.ground_of().stiffness
@@ -57,7 +57,7 @@ def test_the_energy_of_a_turn_adds_up_and_is_that_of_the_data(data, gait, factor
     found = parameters.turn(gait, ground)
     assert found == pytest.approx({name: row[name] for name in found}, rel=1e-6, abs=1e-9)
     losses = sum(found[name] for name in parameters.ACCOUNT if name.endswith("loss"))
-    # The trunk's speed still creeps to that of the steady gait
+    # The trunk's speed still creeps to the steady gait's
     assert losses == pytest.approx(found["crank_work"] + found["swing_work"], rel=0.05)
 
 

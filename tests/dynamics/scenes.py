@@ -14,7 +14,7 @@ from tests.legs import FIRST_FIT
 
 LEG = load_geometry(FIRST_FIT)
 RUN, WALK = load_gait("run", FIRST_FIT), load_gait("walk", FIRST_FIT)
-NATURAL = Ground(restitution=0.5, approach_floor=0.1, friction_fast=0.05)  # that of `HorseLeg-v0`
+NATURAL = Ground(restitution=0.5, approach_floor=0.1, friction_fast=0.05)  # of `HorseLeg-v0`
 FAR = Ground(stiffness=100.0)  # out of reach, and soft enough for any step
 THETA, LOWEST = np.array([4.02, 4.18, 4.1, 4.14]), 1.389  # soles level, and how far they are below O [m]
 HIPS = ((-0.75, 0.0), (-0.65, 0.0), (0.65, 0.0), (0.75, 0.0))

@@ -46,7 +46,7 @@ def test_on_the_ground_the_higher_schemes_are_of_second_order_or_better(referenc
     assert np.log2(coarse / fine) / 3 > 1.7
 
 
-def test_the_kept_references_are_those_of_the_present_code(references):
+def test_stored_references_agree_with_the_present_code(references):
     assert set(references) == set(CASES)
     case = Case("first_fit", "natural")
     assert case.end(PHASES[5], pieces=24) == pytest.approx(references[case][5], abs=1e-8)

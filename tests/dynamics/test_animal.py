@@ -149,7 +149,7 @@ def test_height_is_above_the_ground_below():
 # -- sums ------------------------------------------------------------------------------------------------
 
 
-def test_slip_is_what_the_soles_slide_in_stance():
+def test_slip_is_the_sliding_of_the_soles_in_stance():
     """Motion back and forth adds up; impulses are of the horizontal force."""
     h = 2e-4
     engine = animal(Limits(), ground=replace(NATURAL, friction=0.1), sim_dt=h, substeps=1)

@@ -86,7 +86,7 @@ def test_random_mechanisms_satisfy_eq_2(seed, dyads):
 # force is what spring and damper leave of each other, and rounding of the table is not small then.
 @pytest.mark.parametrize("theta", [0.0, 0.35, 2.0, 3.5, 4.7])
 @pytest.mark.parametrize("leg", LEGS.values(), ids=LEGS)
-def test_joint_reactions_are_those_of_eq_8(leg, theta):
+def test_joint_reactions_agree_with_eq_8(leg, theta):
     """Dyad by dyad, and by a system of equations of all bodies, to the accuracy of the table; the hoof is in
     the ground in some."""
     full = ConstrainedLeg(leg, NATURAL, height=leg.hip_height - 0.05)
@@ -142,7 +142,7 @@ def test_every_body_obeys_newton_and_euler(leg, slope):
 
 
 @pytest.mark.parametrize("leg", LEGS.values(), ids=LEGS)
-def test_energy_is_what_drives_give_and_ground_and_dampers_take(leg):
+def test_energy_balances_drives_with_ground_and_dampers(leg):
     start, (_, y) = in_stance(leg)
     trunk = Trunk("suspended", mass=80.0, height=-y, damping=50.0)
     engine = TrunkEngine(Limb(leg, drive=Motor()), trunk, NATURAL, sim_dt=2.5e-4)

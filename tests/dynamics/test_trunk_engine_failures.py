@@ -30,7 +30,7 @@ def aloft(drive, n=1, kind="fixed", geometry=ROCKER, extra=()):
 @pytest.mark.parametrize(
     ("limbs", "trunk"), [((Limb(LEG),), HANGING), (LIMBS, FREE)], ids=["leg", "two legs"]
 )
-def test_what_is_no_number_any_more_is_a_result_of_one_alone(limbs, trunk, n, row):
+def test_a_value_that_is_no_longer_finite_fails_its_environment_alone(limbs, trunk, n, row):
     well, ill = (TrunkEngine(limbs, trunk, num_envs=n, strides=True) for _ in range(2))
     for engine in (well, ill):
         engine.reset(WALK, np.linspace(0, 3, n)[None].repeat(len(limbs), 0))

@@ -69,7 +69,7 @@ def test_it_converges_to_the_oracle_at_the_order_of_the_scheme(scheme, kind, dri
 
 
 @pytest.mark.parametrize("scheme", SCHEMES)
-def test_what_is_prescribed_is_exact(scheme):
+def test_prescribed_motion_is_exact(scheme):
     limbs, trunk = horse("fixed", "prescribed")
     engine = TrunkEngine(limbs, trunk, FAR, sim_dt=5e-3, integrator=scheme, substeps=1)
     engine.reset(GAITS, THETA)

@@ -95,7 +95,7 @@ def test_grazing_the_ground_between_two_pushes_ends_a_stance():
     assert (stance.count, grown, higher) == (2, 1800.0, 900.0 + 840.0)
 
 
-def test_a_rise_under_the_peak_is_no_loading_rate():
+def test_a_rise_under_the_peak_does_not_count_as_loading_rate():
     """A hoof that rocks under a peak that it has had is not charged for it again."""
     loads = [100.0, 500.0, 300.0, 480.0, 700.0]
     *_, steeper = play(loads, [0.0] * 5, [100.0, 500.0, 300.0, 480.0, 490.0], 40.0, 0.5)
@@ -104,7 +104,7 @@ def test_a_rise_under_the_peak_is_no_loading_rate():
 
 @pytest.mark.parametrize("kind", TRUNKS)
 @pytest.mark.parametrize("legs", [1, 2])
-def test_strides_are_those_of_the_record(kind, legs):
+def test_strides_agree_with_the_record(kind, legs):
     made = engine(kind, legs)
     record = {name: rows[1:, ..., 0] for name, rows in made.run(steps=2400).items() if rows.ndim > 1}
     made, sums = engine(kind, legs), []

@@ -26,7 +26,8 @@ EPISODES = 20
 
 
 class OldVectorEnv(gym.vector.SyncVectorEnv):
-    """That of Gymnasium 0.28: an episode that ends restarts in the same step, and `final_info` is a list."""
+    """Vector environment of Gymnasium 0.28: an episode that ends restarts in the same step, and `final_info`
+    is a list."""
 
     def __init__(self, makers):
         super().__init__(makers, autoreset_mode=gym.vector.AutoresetMode.SAME_STEP)
@@ -46,7 +47,7 @@ class OldVectorEnv(gym.vector.SyncVectorEnv):
 
 
 class OlderVectorEnv(OldVectorEnv):
-    """That of gym 0.23: a step gives four things, the last of them a list."""
+    """Vector environment of gym 0.23: a step gives four things, the last of them a list."""
 
     def reset(self):
         return super().reset()[0]

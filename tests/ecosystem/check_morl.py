@@ -33,7 +33,7 @@ def test_indicators(published):
 
 
 def test_indicators_of_random_points():
-    """`hypervolume` and `filter_pareto_dominated` of random points, beside those of this package."""
+    """`hypervolume` and `filter_pareto_dominated` of random points, beside this package's."""
     generator = np.random.default_rng(0)
     for _ in range(20):
         points = generator.uniform(-1, 10, (15, 3)).round(1)
@@ -45,7 +45,7 @@ def test_indicators_of_random_points():
 
 
 def test_capql(mo_id, published):
-    """CAPQL, 4,000 steps: a hypervolume between nothing and that of the published front."""
+    """CAPQL, 4,000 steps: a hypervolume between nothing and the published front's."""
     about, _ = published
     torch.set_num_threads(1)
     train, test = mo_gymnasium.make(mo_id), mo_gymnasium.make(mo_id)

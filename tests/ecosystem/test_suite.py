@@ -65,7 +65,7 @@ def test_a_failure_is_reported_and_does_not_stop_the_rest(check):
     assert page[-1] == "* **gymnasium**: Mind the gap."
 
 
-def test_an_endless_test_is_ended_and_what_ran_before_it_is_kept(check):
+def test_an_endless_test_is_ended_and_earlier_results_stay(check):
     # As long as this machine needs for the tests that end, and some more
     limit = round(2 + 4 * check(sleeps=0, seconds=300)["seconds"])
     result = check(sleeps=600, seconds=limit)
@@ -93,7 +93,7 @@ def rows(page):
     return [line for line in page.splitlines() if line.startswith("|")]
 
 
-def test_the_tables_of_the_page_are_those_of_the_stored_results():
+def test_the_tables_of_the_page_agree_with_the_stored_results():
     stored = json.loads(run.RESULTS.read_text())
     assert list(stored) == list(run.SUITE["check"])
     assert rows(run.PAGE.read_text()) == rows(run.page(stored))

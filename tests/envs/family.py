@@ -50,7 +50,7 @@ FALLS = {"trunk_share": 1.0, "trunk_stiffness": 0.0, "trunk_damping": 0.0}
 
 
 def effective(given, env_id: str = "hoof_env/HorseLeg-v0", **settings):
-    """Those of some settings that have an effect beside others on an id."""
+    """Settings among `given` that have an effect on an id, together with `settings`."""
     task = TASKS[gym.spec(env_id).kwargs["task"]]
     found = replace(Settings(), **{**task.defaults, **settings})
 

@@ -202,7 +202,7 @@ class Found:
     done: np.ndarray
 
     def check(self, expected: Found, rows: int) -> None:
-        """Raise unless the first rows are those of another."""
+        """Raise unless the first rows equal the expected ones."""
         same_rows(self.step, expected.step, rows)
         if self.reset and expected.reset and expected.done[:rows].any():
             same_rows(self.reset, expected.reset, rows)
@@ -226,7 +226,7 @@ def alone(name: str, mode: AutoresetMode) -> tuple[Any, list[Found]]:
 
 @lru_cache(maxsize=3)
 def together(name: str, mode: AutoresetMode) -> tuple[Any, list[Found]]:
-    """Results of the most rows on one thread, of which the first are those of single environments."""
+    """Results of the most rows on one thread, of which the first equal single environments'."""
     case = CASES[name]
     run = Run(case, mode, Way(case.most))
     found = run.first, run.rest()

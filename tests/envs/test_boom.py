@@ -13,7 +13,7 @@ BOOM = {"trunk": "boom", "stiffness": 2e6, "exponent": 1.5, **PASTERN}
 
 @pytest.mark.parametrize("drive", ["motor", "prescribed"])
 def test_nothing_but_the_ground_holds_the_trunk_and_the_hoof_stands_on_it(drive):
-    """Momentum changes by the impulse of the ground less that of the weight, and by nothing else."""
+    """Momentum changes by the impulse of the ground less the impulse of the weight, and by nothing else."""
     env = gym.make("hoof_env/HorseLeg-v0", drive=drive, **BOOM).unwrapped
     env.reset(seed=0)
     engine = env.engine
@@ -131,7 +131,7 @@ def test_starts_that_no_episode_can_have_are_refused_with_the_id(name, start, me
         gym.make(f"test/{name}-v0")
 
 
-def test_a_start_that_is_no_mapping_is_refused_at_once():
+def test_a_start_other_than_a_mapping_is_refused_at_once():
     with pytest.raises(ParameterError, match="test/List-v0: start: expected a mapping of reset options, got"):
         hoof_env.register("test/List-v0", base="leg", start=[1.0], **BOOM)
     assert "test/List-v0" not in gym.registry

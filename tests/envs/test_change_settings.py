@@ -41,7 +41,7 @@ def played(env, taken):
 
 
 @pytest.mark.parametrize(("env_id", "changes"), CHANGES, ids=str)
-def test_the_next_episode_is_that_of_an_environment_made_with_them(env_id, changes):
+def test_the_next_episode_equals_an_environment_made_with_the_settings(env_id, changes):
     """To the bit, infos included; the episode before goes on as if nothing had been asked."""
     env, old, made = (gym.make(env_id, **SHORT, **given) for given in ({}, {}, changes))
     taken = actions(1, 25, env_id=env_id)

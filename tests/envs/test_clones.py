@@ -83,7 +83,7 @@ def test_a_state_is_its_own():
     assert (kept["engine"]["trunk"] != env.engine.get_state()["trunk"]).any()
 
 
-def test_generators_of_many_are_those_of_the_rows():
+def test_generators_of_many_belong_to_the_rows():
     """As of Gymnasium's `SyncVectorEnv`: what reset(seed=7) seeds, what is assigned, what a state brings."""
     envs = gym.make_vec(LEG, num_envs=3).unwrapped
     theirs = gym.make_vec(LEG, num_envs=3, vectorization_mode="sync")

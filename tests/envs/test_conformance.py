@@ -88,7 +88,7 @@ def test_types_and_infos_of_a_step(env_id, settings):
 
 
 @pytest.mark.parametrize("env_id", IDS)
-def test_what_is_observed_does_not_change_what_is_paid(env_id):
+def test_the_observation_does_not_change_the_reward(env_id):
     whole, few = gym.make(env_id), gym.make(env_id, observation=["hoof"])
     starts = [env.reset(seed=3)[0] for env in (whole, few)]
     assert starts[0].size > starts[1].size == (20 if env_id in HORSES else 8)

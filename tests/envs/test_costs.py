@@ -6,9 +6,10 @@ import pickle
 import gymnasium as gym
 import numpy as np
 import pytest
-from family import same
+from family import actions, same
 
 import hoof_env
+from hoof_env.dynamics.layout import TRUNK_STATE
 from hoof_env.episodes.costs import COSTS
 from hoof_env.errors import ParameterError
 
@@ -233,6 +234,61 @@ def test_a_gait_that_leans_on_the_suspension_breaks_that_limit_alone():
     assert found["run"]["cost_leaning"] == 0.0 < 50.0 < found["run"]["cost_indicator"]
 
 
+def test_leaning_by_its_definition_in_two_episodes():
+    """A debt grows by the share that must be borne, is repaid by what is borne, and is never above a second
+    of the share; an episode owes nothing at its start."""
+    share = 0.9
+    env = gym.make(LEG, cost={"leaning": share}, episode_seconds=4.0).unwrapped
+    found, expected = [], []
+    for _ in range(2):
+        for info in played(env, 200, seed=3):
+            if not len(found) % 200:
+                debt = 0.0
+            debt = max(debt + share * env.dt - info["measured"]["normal_impulse"] / env.weight, 0.0)
+            expected.append(float(debt > share))
+            debt = min(debt, share)
+            found.append(info["cost_leaning"])
+    assert found == expected
+    assert 0.0 < sum(found) < len(found)
+    assert debt > 0.0, "the first episode leaves something to forget"
+
+
+def test_costs_of_an_episode_do_not_depend_on_the_episode_before():
+    """Also after one that ends in the middle of a stance."""
+    limits = {**LIMITS, "leaning": 0.9}
+    start = {"height": 1.1, "speed": 1.0}  # with the hoof on the ground
+    for steps in (15, 40, 65):
+        env, fresh = gym.make(LEG, cost=limits), gym.make(LEG, cost=limits)
+        played(env, steps, seed=3)
+        for each in (env, fresh):
+            each.reset(seed=7, options=start)
+        for taken in actions(5, 60):
+            one, other = env.step(taken)[4], fresh.step(taken)[4]
+            assert {key: one[key] for key in one if "cost" in key} == {
+                key: other[key] for key in other if "cost" in key
+            }
+
+
+def test_a_step_of_a_failed_simulation_costs_nothing():
+    """It is taken back, so that its forces are of no motion."""
+    limits = {"peak": 0.0, "excess": 0.0, "indicator": 0.0, "loading": 0.0, "leaning": 1.0}
+    env = gym.make(LEG, cost=limits).unwrapped
+    played(env, 60)
+    sums = ("cost_sums", "debts", "stance_rises")
+    before = {name: getattr(env.batch.rows, name).copy() for name in sums}
+    state = env.get_state()
+    state["engine"]["trunk"][TRUNK_STATE.index("momentum_x")] = 1e308
+    env.set_state(state)
+    _, _, terminated, _, info = env.step(np.zeros(4, np.float32))
+    assert terminated
+    assert [info["cost"], *(info[f"cost_{name}"] for name in limits)] == [0.0] * 6
+    for name in limits:
+        total = env.batch.rows.cost_sums[[*limits].index(name), 0]
+        assert info["episode_summary"][f"cost_{name}"] == total
+    for name in sums:
+        same(getattr(env.batch.rows, name), before[name])
+
+
 def hoof_speed(step, weight):
     """Return how fast the hoof slides while it is loaded, a cost."""
     return weight * abs(step.leg.report.toe.slide) * np.where(step.leg.strides.normal_force > 100.0, 1.0, 0.0)
@@ -247,7 +303,7 @@ def own_id():
     return "tests/Sliding-v0"
 
 
-def test_a_cost_of_ones_own_is_no_part_of_the_reward(own_id):
+def test_a_cost_of_ones_own_leaves_the_reward_alone(own_id):
     env, base, limited = gym.make(own_id), gym.make(LEG), gym.make(own_id, cost={"indicator": 700.0})
     for each in (env, base, limited):
         each.reset(seed=2)

@@ -218,8 +218,8 @@ def test_a_schedule_follows_the_steps_of_each_row(env_id):
     assert (infos["parameters"]["friction"] == 0.8).all()
 
 
-def test_a_refused_state_leaves_the_names_of_what_is_drawn():
-    """Rows of the state draw a parameter that those of the environment do not."""
+def test_a_refused_state_leaves_the_names_of_drawn_parameters():
+    """Rows of the state draw a parameter that rows of the environment do not."""
     envs, other = (gym.make_vec(LEG, 2, **SHORT).unwrapped for _ in range(2))
     for each in (envs, other):
         each.reset(seed=0)

@@ -74,7 +74,7 @@ def test_a_part_of_a_step_is_made_of_substeps():
         np.testing.assert_allclose(env.engine.state["momentum_x"], middle.state["momentum_x"], rtol=1e-12)
         record = env.record()
         same(record["vx"][-1, 0], env.engine.report["vx"][0])
-    # Sums of a step are those of its parts.
+    # Sums of a step are the sums of its parts.
     whole = make(LEG, action_delay=1)
     parts = make(LEG, action_delay=1, observation_delay=0.5)
     for one in (whole, parts, hand):

@@ -64,8 +64,8 @@ def test_a_row_has_the_bits_of_one_environment_on_any_number_of_threads(env_id, 
 
 
 def test_noise_and_bias_are_within_their_bounds_and_change_nothing_else():
-    """Numbers that do not saturate differ by their error from those of an environment without noise, in which
-    the episode is the same."""
+    """Numbers that do not saturate differ by their error from an environment without noise, in which the
+    episode is the same."""
     noise, bias = 0.03, 0.02
     n, count = 64, 40
     noisy = make(LEG, n, noise={"gait": noise}, bias={"gait": bias, "hoof": 0.1})
@@ -94,7 +94,7 @@ def test_noise_and_bias_are_within_their_bounds_and_change_nothing_else():
     same(noisy.raw_observation(), plain.raw_observation())
 
 
-def test_strength_is_a_factor_and_zero_is_none():
+def test_strength_is_a_factor_and_zero_disturbs_nothing():
     none = make(LEG, **{**ALL, "strength": 0.0})
     plain = make(LEG, episode_seconds=0.5)
     same(none.reset(seed=2)[0], plain.reset(seed=2)[0])
@@ -135,7 +135,7 @@ def test_a_push_adds_its_impulse_to_the_momentum_and_turns_motors_alone(env_id, 
 
 
 @pytest.mark.parametrize("drive", ["prescribed", "motor"])
-def test_an_impulse_is_what_a_short_force_leaves(drive):
+def test_an_impulse_is_the_limit_of_a_short_force(drive):
     """Independent of `push`: the same change as by a constant force, here a change of weight, over a time
     that goes to 0. The difference goes with the time."""
     impulse = 15.0
@@ -405,7 +405,7 @@ def test_an_option_without_pushes_leaves_drawn_ones_out():
     settings = {"push_impulse": [20.0, 30.0], "push_seconds": [0.04, 0.06]}
     env, plain = make(LEG, **settings), make(LEG)
     for given in ([], None):
-        # The draws of the pushes are left out, too: the generator goes on as that of an environment without.
+        # The draws of the pushes are left out, too: the generator goes on as without pushes.
         same(env.reset(seed=3, options={"pushes": given})[0], plain.reset(seed=3)[0])
         taken = actions(0, 20)
         for action in taken[:10]:

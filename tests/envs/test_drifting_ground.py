@@ -44,7 +44,7 @@ def test_the_bound_is_a_part_of_the_hip_height():
 
 
 @pytest.mark.parametrize("seed", range(5))
-def test_the_farthest_mean_is_that_of_many_sums(seed):
+def test_the_farthest_mean_agrees_with_many_sums(seed):
     """Against a sum over every centimetre."""
     rng = np.random.default_rng(seed)
     terrain = Terrain(tuple(rng.uniform(-1, 1, 40)), start=rng.uniform(-5, 5), spacing=rng.uniform(0.2, 3))

@@ -58,7 +58,7 @@ def test_states_pickles_and_infos_know_the_spring(soft):
     assert len(soft.unwrapped.record()["toe_deflection_normal"]) == 20
 
 
-def test_the_default_damping_is_that_of_the_settings_whatever_is_drawn():
+def test_the_default_damping_follows_the_settings_whatever_is_drawn():
     env = gym.make(LEG, randomize={"trunk_mass": (30.0, 70.0)}, **SOFT)
     limb = env.unwrapped.engine.limbs[0]
     assert limb.spring.damping == pytest.approx(

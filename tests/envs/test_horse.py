@@ -187,7 +187,7 @@ def test_what_has_the_former_spans_is_refused():
         refuse_misfit(Path("policy"), {**here, "actions": "offsets"}, here)
 
 
-def test_the_trunk_is_what_the_limbs_leave_of_the_horse():
+def test_the_trunk_is_the_horse_without_its_limbs():
     assert TASKS["horse"].defaults["trunk_mass"] == pytest.approx(trunk_mass(MASS), abs=0.01)
 
 
@@ -306,7 +306,7 @@ def test_gaits_by_name_class_and_numbers_are_the_same():
         HorseGait(6.0, 0.0, (2.0, *[0.0] * 6), (0.0,) * 7)
 
 
-def test_a_gait_for_each_environment_is_that_of_those_that_start():
+def test_gaits_given_for_each_environment_go_to_the_rows_that_start():
     envs, gaits = gym.make_vec(HORSE, num_envs=3), random_gaits(3, seed=5)
     envs.reset(seed=0, options={"gait": gaits})
     same(envs.unwrapped.batch.rows.start_values[-len(NAMES) :, :], gaits.T)

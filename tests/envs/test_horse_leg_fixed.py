@@ -49,7 +49,7 @@ def test_by_default_it_is_what_the_default_preset_says():
         assert (found.stiffness, found.exponent) == (load_ground().stiffness, load_ground().exponent)
 
 
-def test_the_force_is_that_of_the_presets_ground(soft):
+def test_the_force_comes_from_the_presets_ground(soft):
     """K sum(d^n) on elastic ground, from the trace alone."""
     env = gym.make(FIXED, preset=soft, gait="run", episode_seconds=0.5)
     env.reset(seed=0)
@@ -74,7 +74,7 @@ def test_the_training_environment_stands_on_the_presets_too(soft):
 
 @pytest.mark.parametrize("env_id", [LEG, FIXED])
 def test_a_preset_without_a_ground_needs_one(soft, tmp_path, env_id):
-    """Its gaits are for some ground, and nobody says which; {} are those of `Ground`."""
+    """Its gaits are for some ground, and nobody says which; {} stands for the defaults of `Ground`."""
     content = {name: part for name, part in read_preset(soft).items() if name != "ground"}
     path = tmp_path / "bare.json"
     path.write_text(json.dumps(content), encoding="utf-8")

@@ -88,14 +88,14 @@ def test_the_gait_is_observed_wherever_it_is():
     assert max(shown.values()) == 0
 
 
-def test_the_height_is_that_above_the_ground():
+def test_the_height_counts_from_the_ground():
     envs = make(terrain={"kind": "slope", "angle": 0.1})
     envs.reset(seed=0, options={"x": 50.0})
     assert np.all(np.abs(envs.unwrapped.raw_observation()["height above the ground"] - 1.4) < 0.5)
 
 
 def test_the_step_of_a_fall_happened():
-    """It is paid, summed up and recorded; only that of a simulation that broke is not."""
+    """It is paid, summed up and recorded; only the step of a simulation that broke is not."""
     env = gym.make(HORSE, target_speed=SPEEDS[0]).unwrapped
     _, begun = env.reset(seed=0, options={"pitch": 0.4})
     env.record()  # from now on substeps are kept

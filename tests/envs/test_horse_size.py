@@ -135,8 +135,8 @@ def test_a_pony_is_reported_the_speeds_of_its_size():
 
 
 @pytest.mark.parametrize("given", [1.2, (1.172, 3.706), (1.0, 2.0)], ids=str)
-def test_speeds_that_are_named_are_what_is_commanded(given):
-    """Those of a horse of size 1, too."""
+def test_named_speeds_are_commanded(given):
+    """Speeds of a horse of size 1, too."""
     found = make(HORSE, size=0.5, target_speed=given).batch.plan.commands.speeds
     assert found == (given if isinstance(given, tuple) else (given, given))
 

@@ -15,7 +15,7 @@ from hoof_env.tasks.horse_gaits import LEGS, _data, crank_angles, reference_gait
 from hoof_env.tasks.registry import TASKS
 
 
-def test_rates_of_the_trunk_are_those_of_its_places():
+def test_rates_of_the_trunk_are_derivatives_of_its_position():
     """By differences over the phase, on which the crank's angle in the mean is 2 pi a stride."""
     speeds, phase, step = np.array([1.3, 1.9, 2.7]), np.array([0.2, 0.5, 0.85]), 1e-6
     here, there = (trunk_motion(speeds, phase + way * step) for way in (-1, 1))

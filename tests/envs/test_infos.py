@@ -90,7 +90,7 @@ def test_gymnasiums_vector_environments_stack_them(kind):
     theirs.close()
 
 
-def test_what_is_measured_is_what_the_record_says():
+def test_measurements_agree_with_the_record():
     env = gym.make(LEG).unwrapped
     env.reset(seed=3)
     env.record()
@@ -125,7 +125,7 @@ def test_nothing_is_measured_of_a_step_that_did_not_happen():
         assert np.isfinite(info["measured"]).all()
 
 
-def test_what_is_computed_from_named_numbers_has_no_names():
+def test_results_of_arithmetic_with_named_numbers_have_no_names():
     gait = gym.make(LEG).reset(seed=0)[1]["gait"]
     assert gait
     assert not (gait > 100.0).any()
@@ -165,7 +165,7 @@ def test_a_state_says_what_the_episode_started_with(n):
     other.set_state(state)
     info = env.step(taken)[4]
     same(info, other.step(taken)[4])
-    del state["start_values"]  # as those of older versions
+    del state["start_values"]  # as in states of older versions
     other.set_state(state)
     old = other.step(taken)[4]
     assert np.isnan(old["crank_angle"]).all()

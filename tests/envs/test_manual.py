@@ -29,7 +29,7 @@ OF_LEGS = [name for name, task in TASKS.items() if task.body is OneLeg]
 
 
 def numbers(cell):
-    """Numbers of a cell of the column Num: one, several, or those of four legs, as in "50+4i"."""
+    """Numbers of a cell of the column Num: one, several, or one for each of four legs, as in "50+4i"."""
     found = []
     for part in cell.split(", "):
         first, _, step = part.partition("+")
@@ -38,7 +38,7 @@ def numbers(cell):
 
 
 def observed(task):
-    """Cells of an observation: those of each number, in their order, without the column Num."""
+    """Cells for each number of an observation, in their order, without the column Num."""
     cells = {}
     for row in manual.observations(task).rows:
         for name, places in zip(row[1].split(", "), numbers(row[0]), strict=True):
@@ -73,7 +73,7 @@ def test_unknown_ids_are_one_line(capsys):
 
 
 def test_the_manual_of_an_own_id_says_which_leg_it_has(capsys, tmp_path):
-    """And not that of the paper, or parts from outside that it does not have."""
+    """And not the paper's leg, or parts from outside that it does not have."""
     texts = {}
     pony = hoof_env.load_geometry("identified").scaled(0.5).replace(provenance="half as tall as another one")
     gaits = {name: hoof_env.load_gait(name, "identified") for name in ("walk", "run")}
@@ -135,9 +135,9 @@ def test_actions_change_the_gait_as_the_table_says(task):
     assert [row[4] for row in table] == ["rad/s^2", "rad/s", "rad/s", "rad/s"]
 
 
-def test_offsets_of_a_horse_are_those_of_the_table():
-    """The commands under ones, once offsets have followed, beside those of the same moment without offsets;
-    cranks at the same angles."""
+def test_offsets_of_a_horse_agree_with_the_table():
+    """The commands under ones, once offsets have followed, beside the commands of the same moment without
+    offsets; cranks at the same angles."""
     env = gym.make(HORSE)
     leg = env.unwrapped
     table = manual.actions(TASKS["horse"]).rows
@@ -214,7 +214,7 @@ def test_every_setting_has_its_default(task):
 
 
 @pytest.mark.parametrize("task", TASKS)
-def test_rewards_are_those_of_the_environment(task):
+def test_the_table_of_rewards_agrees_with_the_environment(task):
     env = gym.make(TASKS[task].id, episode_seconds=0.02)
     _, info = env.reset(seed=0)
     weights = {row[0]: float(row[1]) for row in manual.rewards(TASKS[task]).rows}

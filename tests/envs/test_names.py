@@ -34,7 +34,7 @@ OF_EPISODES = {
     "distance_m": "x, or travel on a fixed trunk",
     "speed_m_s": "distance_m over seconds",
     "mean_normal_n": "normal_impulse over seconds",
-    "stance_peak_sum_n": "sum of stance_peak at the ends of stances, which is that of peak_grf_increase",
+    "stance_peak_sum_n": "sum of stance_peak at the ends of stances, which is the sum of peak_grf_increase",
     "loading_rate_n_s": "loading_rate_increase over stances",
     "duty_factor": "loaded_time over seconds",
     "cost_of_transport": "positive_work divided by weight and distance_m",

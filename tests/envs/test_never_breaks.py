@@ -173,7 +173,7 @@ def test_the_engine_keeps_that_account_to_round_off():
     assert GRAVITY * engine.total_mass == env.weight
 
 
-def test_a_record_is_what_the_step_did():
+def test_a_record_agrees_with_its_step():
     """Sums of the record are those that the reward was paid for."""
     env = gym.make("hoof_env/HorseLegTerrain-v0").unwrapped
     env.reset(seed=1)

@@ -147,7 +147,7 @@ def test_a_term_takes_the_place_of_one_of_the_base(own):
     assert [term.name for term in task.terms] == [term.name for term in tasks.TASKS["speed"].terms]
     assert task.terms[0] is mine
     kept = dict(tasks.TASKS["speed"].defaults["reward_weights"])
-    assert task.settings({}).reward_weights == {**kept, "peak": 0.5}, "those of the base stay"
+    assert task.settings({}).reward_weights == {**kept, "peak": 0.5}, "the weights of the base stay"
 
 
 def test_a_step_that_could_not_be_simulated_pays_for_nothing_but_the_failure(own):
@@ -231,7 +231,7 @@ def test_a_changed_helper_or_constant_acts_at_the_next_make():
     assert old.step(np.zeros(4, np.float32))[4]["reward_mine"] == 20.0, "what is made stays as it is"
 
 
-def test_what_is_made_measures_with_the_constants_of_its_observation():
+def test_an_environment_measures_with_the_constants_of_its_observation():
     space = {"__name__": "__main__"}
     cell(
         space,

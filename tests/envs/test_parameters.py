@@ -27,7 +27,7 @@ def make(env_id=LEG, drive="motor", **settings):
 
 @pytest.mark.parametrize("name", PER_EPISODE)
 def test_one_set_at_reset_is_one_made_with(name):
-    """The same motion to the bit as that of an environment that always has it, and another without."""
+    """The same motion to the bit as in an environment that always has it, and another without."""
     given = {name: OTHER[name]}
     kind = {"drive": "motor" if name.startswith("motor") else "prescribed"}
     reset, made, plain = make(**kind), make(**kind, **given), make(**kind)

@@ -47,7 +47,7 @@ def test_a_step_runs_its_substeps_again_only_where_a_picture_is_asked_for(env_id
     assert len(runs) == 62
 
 
-def test_those_of_many_wait_as_well(runs):
+def test_pictures_of_many_environments_wait_as_well(runs):
     envs = gym.make_vec(LEG, 3, render_mode="rgb_array", episode_seconds=0.2)
     envs.reset(seed=0)
     for action in actions(0, 27, 3):

@@ -37,7 +37,7 @@ def test_every_id_of_one_leg_steps_with_every_preset(env_id, preset):
 
 @pytest.mark.parametrize("preset", PRESETS)
 def test_gaits_of_presets_carry_the_trunk_and_keep_their_speed(preset):
-    """The walk is that of the Froude number 0.25, the run makes the most of 2.5 m/s."""
+    """The walk has the Froude number 0.25, the run makes the most of 2.5 m/s."""
     speeds = {}
     for name in ("walk", "run"):
         envs = gym.make_vec("hoof_env/HorseLeg-v0", num_envs=8, preset=preset)

@@ -173,7 +173,7 @@ def test_nothing_goes_before_reset_or_after_close(kind):
             call()
 
 
-def test_a_first_reset_of_some_needs_the_others():
+def test_a_step_needs_a_reset_of_every_row():
     env = BOTH["vector"]()
     observations, _ = env.reset(seed=0, options={"reset_mask": np.array([True, False, True])})
     assert np.isfinite(observations).all()

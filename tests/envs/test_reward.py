@@ -62,7 +62,7 @@ def ends_of(values):
 
 def borne(impulses):
     """What bearing is paid for, from the impulse of each control step divided by the weight [s]: a bucket
-    fills with `BEARING` and holds that of `MAX_STRIDE`; an impulse that finds it empty is taken off."""
+    fills with `BEARING` and holds what `MAX_STRIDE` gives; an impulse that finds it empty is deducted."""
     found, bucket = [], BEARING * MAX_STRIDE
     for impulse in impulses:
         bucket = min(bucket + BEARING * DT, BEARING * MAX_STRIDE)

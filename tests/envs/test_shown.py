@@ -14,7 +14,7 @@ def env():
         yield env.unwrapped
 
 
-def test_an_environment_says_what_is_observed(env):
+def test_an_environment_lists_its_observation(env):
     assert repr(env) == "<HorseLegEnv id=hoof_env/HorseLeg-v0 environments=1>"
     table = env._repr_html_()
     assert table.count("<tr>") == 1 + len(env.observation_names) + len(env.action_names)

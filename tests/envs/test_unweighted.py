@@ -6,6 +6,7 @@ import pytest
 from family import FALLS, actions, same
 
 import hoof_env
+from hoof_env.dynamics.layout import TRUNK_STATE
 
 LEG, HORSE, OWN = "hoof_env/HorseLeg-v0", "hoof_env/Horse-v0", "tests/Unweighted-v0"
 
@@ -123,3 +124,16 @@ def test_copies_and_rows_under_other_settings_keep_their_own():
             info = env.step(taken[row])[4]
             same(infos["unweighted"][row], np.asarray(info["unweighted"]))
             assert infos["reward_progress"][row] == info["reward_progress"]
+
+
+def test_a_term_of_ones_own_measures_nothing_where_the_simulation_failed():
+    """As it pays nothing: what it read is of the point of failure."""
+    env = gym.make(OWN, reward_weights={"highest": 0.0}).unwrapped
+    env.reset(seed=0)
+    assert env.step(np.zeros(4, np.float32))[4]["unweighted"]["highest"] > 0.0
+    state = env.get_state()
+    state["engine"]["trunk"][TRUNK_STATE.index("momentum_x")] = 1e308
+    env.set_state(state)
+    _, _, terminated, _, info = env.step(np.zeros(4, np.float32))
+    assert terminated
+    assert info["unweighted"]["highest"] == info["reward_highest"] == 0.0

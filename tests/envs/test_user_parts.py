@@ -130,7 +130,7 @@ def test_change_of_constants_acts_from_the_next_episode_on(example):
         same(env.step(action)[:2], made.step(action)[:2])
 
 
-def test_constants_that_are_not_named_keep_those_of_the_registration(example):
+def test_constants_that_are_not_named_stay_as_registered(example):
     hoof_env.register("my_lab/Free-v0", base=ID, constants={"free": 700.0})
     for given in (None, {}, {"free": 700.0}):
         assert gym.make("my_lab/Free-v0", constants=given).unwrapped.batch.plan.constants == [700.0]

@@ -32,7 +32,7 @@ def test_seeds_one_each_and_going_on_without():
     assert (start[1] != start[2]).any()
 
 
-def test_a_mask_starts_those_and_no_others():
+def test_a_mask_starts_its_rows_alone():
     ours, theirs = both(IDS[0], 5)
     for env in (ours, theirs):
         env.reset(seed=1)

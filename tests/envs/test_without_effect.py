@@ -56,7 +56,7 @@ CONTEXTS = [
 
 
 @pytest.mark.parametrize("context", CONTEXTS, ids=str)
-def test_refused_is_what_changes_no_bit(context):
+def test_a_setting_is_refused_if_and_only_if_it_changes_no_bit(context):
     """Each setting in each set-up: `check_effect` refuses it if and only if a run with it is the same."""
     trunk, friction, normal, drive, target = context
     settings = replace(

@@ -77,7 +77,7 @@ def test_a_command_is_reached_without_overshoot(gait, command, h):
 
 @given(sequence=sequences, gait=commands, theta=st.floats(-10, 10))
 @settings(deadline=None, max_examples=60)
-def test_derivatives_are_those_of_the_motion_while_commands_change(sequence, gait, theta):
+def test_derivatives_follow_the_motion_while_commands_change(sequence, gait, theta):
     motion, filters = list(play(sequence, 1e-3, gait, theta))[-1]
     path = []  # the accelerations of the filters are constant over a substep: go on and back with them
     for k in OFFSETS:

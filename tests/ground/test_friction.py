@@ -34,7 +34,7 @@ def test_the_laws_have_the_numbers_that_records_have():
     mu=st.floats(0, 3), slow=st.floats(0, 0.01),
 )  # fmt: skip
 @settings(deadline=None, max_examples=500)
-def test_it_is_that_of_the_law_opposes_sliding_within_its_bound_and_is_odd(law, v, normal, mu, slow):
+def test_friction_follows_its_law_opposes_sliding_within_its_bound_and_is_odd(law, v, normal, mu, slow):
     force = friction_force(v, normal, law, mu, slow, slow + 0.02)
     assert force * v <= 0
     assert abs(force) <= mu * normal * (1 + 1e-15)

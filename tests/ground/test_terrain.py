@@ -95,7 +95,7 @@ def test_the_normal_stands_on_the_slope(terrain, x):
     assert here[1] * 2 * step + here[2] * (ahead[0] - behind[0]) == pytest.approx(0, abs=1e-12)
 
 
-def test_flat_ground_is_exactly_that_of_the_laws():
+def test_flat_ground_follows_the_laws_exactly():
     assert Terrain.flat() == Terrain()
     for x in (-1e6, -0.3, 0.0, 1e6):
         assert at(Terrain(), x)[:, 0].tolist() == [0, 0, 1, 1, 1]

@@ -97,6 +97,18 @@ def test_delays_histories_noise_and_motors_are_those_of_the_kernels():
     assert found[3] <= 2.0**-20
 
 
+def test_booms_contexts_and_sensors_are_those_of_the_kernels():
+    groups = gym.make("hoof_env/HorseLeg-v0").unwrapped.settings.observation
+    found, count = largest_differences(
+        "HorseLeg", 30, trunk="boom", context_set="ground/train", context_visible=True,
+        observation=(*groups, "pressure"), force_threshold=40.0,
+    )  # fmt: skip
+    print("boom", count, found)
+    assert count >= 10
+    assert (found[:3] < CLOSE).all(), found
+    assert found[3] <= 2.0**-20
+
+
 def test_a_gradient_through_a_second_is_that_of_differences():
     env, params = make("HorseLeg")
     state = jax.tree.map(lambda array: array[0], params.starts)
@@ -118,6 +130,27 @@ def test_a_gradient_through_a_second_is_that_of_differences():
     for k, unit in enumerate(np.eye(4)):
         by_differences = (travel(action + small * unit) - travel(action - small * unit)) / (2 * small)
         np.testing.assert_allclose(slope[k], by_differences, rtol=1e-5)
+
+
+def test_derivatives_by_the_state_are_the_same_backward_and_forward():
+    """In contact and above the ground: backward, a branch that is not chosen must not make them NaN."""
+    env, params = make("HorseLeg", starts=STARTS)
+    state, action = params.starts, jnp.zeros(env.num_actions)
+    along = jax.random.normal(jax.random.key(2), state.engine.shape[1:])
+
+    def reward(engine, state):
+        return env.step_env(jax.random.key(0), state._replace(engine=engine), action)[2]
+
+    @jax.jit
+    @jax.vmap
+    def both(state):
+        slope = jax.grad(reward)(state.engine, state)
+        return slope @ along, jax.jvp(lambda x: reward(x, state), (state.engine,), (along,))[1]
+
+    backward, forward = both(state)
+    assert np.isfinite(backward).all()
+    assert (np.abs(backward) > 0.0).all()
+    np.testing.assert_allclose(backward, forward, rtol=1e-9, atol=1e-9)
 
 
 def test_an_episode_that_ends_starts_again():

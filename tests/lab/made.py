@@ -18,7 +18,7 @@ def force(time):
 
 
 def table(path, time, true=None, name="time [s]", form="%.9g"):
-    """A text file with these times; the forces are those of the `true` ones."""
+    """A text file with these times; the forces are of the `true` times."""
     rows = np.column_stack([time, force(time if true is None else true)])
     names = f"{name},left_force_x [N],left_force_y [N]"
     np.savetxt(path, rows, [form, "%.6f", "%.6f"], ",", header=names, comments="")

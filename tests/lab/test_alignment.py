@@ -120,7 +120,7 @@ def test_strides_of_another_pace_are_all_paired(one, other):
     assert "left 2 of 6 in A." in report(more)
 
 
-def test_the_next_stance_is_no_partner_of_a_missing_one():
+def test_the_next_stance_does_not_stand_in_for_a_missing_one():
     """A ends before the stance that B, which starts later, has first."""
     a, b = steps(4, varies=0.0, high=2.9), steps(6, varies=0.0, low=2.4)
     with pytest.raises(ValueError, match="found none with align='none'"):

@@ -94,7 +94,7 @@ def test_a_baseline_that_is_not_zero_is_reported(low, high, stances, words):
 
 
 @pytest.mark.parametrize("size", [0.0, 8.0, -8.0])
-def test_a_small_offset_is_none(size):
+def test_a_small_offset_gives_no_warning(size):
     assert average([added(strides(), size)]).warnings == []
 
 
@@ -172,7 +172,7 @@ def test_nothing_is_left_is_an_error():
         average([short], drop=["first"])
 
 
-def test_what_is_missing_is_reported():
+def test_missing_parts_are_reported():
     found = average([trial(None, 700, 0.5), trial(None, 10, 0.5), trial(None, 700, 0.5, "right")])
     assert [found.limbs[limb].trials for limb in ("left", "right")] == [1, 1]
     assert any("left: expected a whole stance above 20 N, found none" in one for one in found.warnings)

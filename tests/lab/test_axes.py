@@ -64,7 +64,7 @@ def test_a_text_with_z_up_is_reported(tmp_path):
     np.testing.assert_allclose(found.limbs["left"], np.column_stack([FORWARD, UP]))
 
 
-def test_an_axis_with_a_minus_is_no_option(tmp_path, capsys):
+def test_an_axis_with_a_minus_is_not_read_as_an_option(tmp_path, capsys):
     path = str(plate(tmp_path / "x.c3d", forward="-x"))
     for option in (["--forward", "-x"], ["--forward=-x"]):
         out = str(tmp_path / "x.csv")
@@ -101,7 +101,7 @@ def test_without_frames_for_it_there_is_no_baseline(zero, tmp_path):
     ((1, 43), "plate_1 bore a load"),
     ((1, 400), "the file has 300 frames"),
 ])  # fmt: skip
-def test_a_baseline_of_a_loaded_plate_is_none(zero, words, tmp_path):
+def test_a_baseline_of_a_loaded_plate_is_not_used(zero, words, tmp_path):
     found = read_record(plate(tmp_path / "x.c3d", zero=zero, offsets=OFFSETS))
     assert words in found.notes[0]
     assert f"FORCE_PLATFORM:ZERO names frames {zero[0]} to {zero[1]}" in found.notes[0]
@@ -151,7 +151,7 @@ def test_a_damaged_file_is_one_line(seed, tmp_path):
     assert "\n" not in said
 
 
-def test_frames_are_those_of_the_cameras(tmp_path):
+def test_frames_are_counted_by_the_cameras(tmp_path):
     """Plates are sampled ten times as often: frames 1 to 3 are 30 samples."""
     path = plate(tmp_path / "x.c3d", zero=(1, 3), offsets=OFFSETS)
     file = ezc3d().c3d(str(path))

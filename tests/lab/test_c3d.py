@@ -95,7 +95,7 @@ def changed(path, change):
 
 
 @pytest.mark.usefixtures("need_ezc3d")
-def test_units_are_those_of_the_channels(of_leg, tmp_path):
+def test_units_come_from_the_channels(of_leg, tmp_path):
     path = records.write(*of_leg, tmp_path / "x.c3d")
     newtons = read_record(path)
 

@@ -35,7 +35,7 @@ def chain(entries, order="<", last=0):
 
 
 def write(path, entries, order="<", blocks=1, last=0):
-    """Write the two blocks of a header and those of the parameters."""
+    """Write the two blocks of a header and the blocks of the parameters."""
     header = bytes([PARAMETERS_IN, 80]) + b"\0" * 4 + struct.pack(f"{order}2H", 7, 1234)
     processor = 84 if order == "<" else 86
     section = bytes([1, 80, blocks, processor]) + chain(entries, order, last)

@@ -135,7 +135,7 @@ def test_data_are_read_whatever_the_counts_say(change, words, tmp_path):
 
 
 @pytest.mark.parametrize("name", PADDED)
-def test_padding_is_no_frame(name, tmp_path):
+def test_padding_does_not_count_as_a_frame(name, tmp_path):
     change, words = STALE[name]
     found = read_record(changed(plate(tmp_path / "x.c3d"), change))
     np.testing.assert_allclose(found.limbs["plate_1"], BOTH, atol=1e-3)

@@ -242,10 +242,10 @@ def test_a_plate_upside_down_turns_its_own_limb_alone(tmp_path):
 
 
 @pytest.mark.parametrize(("of_a", "of_b", "remedy"), [
-    ((1, 1), (-1, 1), "--reverse-b x turns those of B"),
-    ((1, 1), (1, -1), "--reverse-b y turns those of B"),
-    ((1, -1), (1, 1), "--reverse-a y turns those of A"),
-    ((-1, -1), (1, -1), "--reverse-b y turns those of B"),
+    ((1, 1), (-1, 1), "--reverse-b x turns B"),
+    ((1, 1), (1, -1), "--reverse-b y turns B"),
+    ((1, -1), (1, 1), "--reverse-a y turns A"),
+    ((-1, -1), (1, -1), "--reverse-b y turns B"),
 ])  # fmt: skip
 def test_the_remedy_for_opposite_forces_remedies(of_a, of_b, remedy, tmp_path):
     a = as_file(tmp_path / "a.csv", strides(), of_a, of_a)
@@ -262,6 +262,4 @@ def test_the_remedy_for_opposite_forces_remedies(of_a, of_b, remedy, tmp_path):
 
 def test_the_remedy_for_one_of_several_limbs_is_a_minus(tmp_path):
     b = read_record(as_file(tmp_path / "b.csv", strides(), right=(1, -1)))
-    assert "a minus before the column of right_force_x in --map-b turns those of B" in report(
-        compare(strides(), b)
-    )
+    assert "a minus before the column of right_force_x in --map-b turns B" in report(compare(strides(), b))

@@ -117,7 +117,7 @@ def test_commands_have_the_option(tmp_path, capsys):
     assert cli.main(["compare", path, path, *picture, "--gaps-a", "line", "--gaps-b", "zero"]) == 0
 
 
-def test_a_fore_aft_force_without_values_is_none(tmp_path):
+def test_a_fore_aft_force_without_values_is_left_out(tmp_path):
     found = read_record(lacking(tmp_path / "x.csv", np.ones(300, bool), columns=(1,)))
     assert np.isnan(found.limbs["left"][:, 0]).all()
     assert found.notes == ("left_force_x: no values, so left has no fore-aft force",)
@@ -140,7 +140,7 @@ def test_rows_without_any_value_are_samples(between, word, tmp_path):
     assert "missing in swing, the first in line 2" in found.notes[0]
 
 
-def test_rows_of_separators_beside_times_are_no_samples(tmp_path):
+def test_rows_of_separators_beside_times_do_not_count_as_samples(tmp_path):
     lines = [f"{t},{x},{y}" for t, x, y in ROWS]
     lines[100:100] = [",,", ",,"]
     (tmp_path / "x.csv").write_text("\n".join(["time [s],force_x [N],force_y [N]", ",,", *lines, ",,"]))

@@ -78,7 +78,7 @@ STALE = {
 
 
 @pytest.mark.parametrize("weight", ["0", "-5", "nan", "heavy", "inf"])
-def test_a_weight_that_is_none_is_reported_and_not_used(weight, tmp_path):
+def test_a_bad_weight_is_reported_and_not_used(weight, tmp_path):
     head = f"x\nweight_n={weight}\nendheader\ntime ground_force_vx ground_force_vy\n"
     found = read_record(written(tmp_path / "x.mot", head, between=" "))
     assert found.weight is None

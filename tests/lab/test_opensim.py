@@ -70,8 +70,8 @@ def test_opensim_reads_every_column(written):
 
 
 def test_opensim_applies_the_loads_to_a_model(written):
-    """A model whose only bodies are the hoofs, all welded to the ground: at each time the external forces are
-    those of the record, at its points."""
+    """A model whose only bodies are the hooves, all welded to the ground: at each time the external forces
+    equal the record's, at its points."""
     opensim = library()
     record, path = written
     model = opensim.Model()

@@ -84,8 +84,8 @@ def test_a_measurement_that_propels_first_is_the_one_to_be_turned():
     model, lab = strides(), strides()
     model.own = True
     lab.limbs = {limb: force * [-1, 1] for limb, force in lab.limbs.items()}
-    assert "opposite ways; --reverse-b x turns those of B" in report(compare(model, lab))
-    assert "opposite ways; --reverse-a x turns those of A" in report(compare(lab, model))
+    assert "opposite ways; --reverse-b x turns B" in report(compare(model, lab))
+    assert "opposite ways; --reverse-a x turns A" in report(compare(lab, model))
 
 
 def test_a_file_of_another_program_is_not_ours(tmp_path):

@@ -1,4 +1,4 @@
-"""Joint reactions beside a record are those of the motion that is in it."""
+"""Joint reactions beside a record belong to its motion."""
 
 from __future__ import annotations
 

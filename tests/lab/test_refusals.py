@@ -239,7 +239,7 @@ def test_options(command, words, tmp_path, capsys, monkeypatch):
 
 
 def changed_limbs(change, names=("left", "right")):
-    """A record whose forces are those of another function of force."""
+    """A record whose forces are changed by a function."""
     record = strides()
     record.limbs = {name: change(force) for name, force in zip(names, record.limbs.values(), strict=True)}
     return record

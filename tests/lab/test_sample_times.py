@@ -1,4 +1,4 @@
-"""Times of records: rounded ones, those of other units, and the clock of the file."""
+"""Times of records: rounded times, times in other units, and the clock of the file."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ def test_times_with_six_digits_are_even(tmp_path):
     assert found.rate == pytest.approx(600)
 
 
-def test_a_round_time_at_the_end_is_no_coarse_digit(tmp_path):
+def test_a_round_time_at_the_end_does_not_count_as_a_coarse_digit(tmp_path):
     time = np.round(np.arange(601) / 60, 3)  # the last is 10
     assert read_record(table(tmp_path / "x.csv", time)).rate == pytest.approx(60)
 
@@ -65,7 +65,7 @@ EPOCH = 1_700_000_000
 
 @pytest.mark.parametrize("start", [0, EPOCH])
 @pytest.mark.parametrize(("unit", "per_second"), [("ms", 1e3), ("us", 1e6), ("ns", 1e9)])
-def test_a_unit_is_found_and_said(unit, per_second, start, tmp_path):
+def test_a_unit_is_found_and_reported(unit, per_second, start, tmp_path):
     """Counts of ns since 1970 are rounded to 256 ns in doubles."""
     count = start * per_second + LATE * per_second
     found = read_record(table(tmp_path / "x.csv", count, LATE, "time", "%.0f"))

@@ -71,7 +71,7 @@ LEGS = {
 
 
 @pytest.mark.parametrize("leg", LEGS.values(), ids=LEGS)
-def test_derivatives_are_those_of_the_places(leg):
+def test_rates_are_derivatives_of_the_positions(leg):
     theta = np.linspace(0, 2 * np.pi, 50)
     h = 1e-5
     before, here, after = (solve(leg, theta + shift) for shift in (-h, 0.0, h))
@@ -161,7 +161,7 @@ def test_feet_of_legs_with_published_lengths_keep_their_paths(name, stroke, lift
     assert leg.hip_height == pytest.approx(-low * unit, rel=2e-3)
 
 
-def test_bends_of_klanns_links_are_near_those_of_his_patent():
+def test_bends_of_klanns_links_are_near_his_patents():
     """30 degrees of the leg and 12.8 of the arm, by diywalkers.com/klann-linkage-optimizer.html; ours are the
     lengths of a leg that was made more level."""
     leg = load_geometry("klann")

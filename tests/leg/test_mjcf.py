@@ -28,7 +28,7 @@ def placed(element, at=(0.0, 0.0, 0.0)):
 
 
 @pytest.mark.parametrize("preset", PRESETS.values(), ids=PRESETS)
-def test_the_pose_and_the_solids_are_those_of_the_leg(preset):
+def test_the_pose_and_the_solids_agree_with_the_leg(preset):
     leg = load_geometry(preset)
     text = leg.to_mjcf(theta=THETA, swing=SWING, trunk=Trunk(height=1.5))
     root = ET.fromstring(text)

@@ -77,7 +77,7 @@ def test_legs_that_move_alike_are_checked_once(monkeypatch):
 
 @dataclass(frozen=True)
 class Noted(Geometry):
-    """A user's leg, which has no hash: that of a `Geometry` is not inherited."""
+    """A user's leg, which has no hash: the hash of a `Geometry` is not inherited."""
 
     note: str = ""
 

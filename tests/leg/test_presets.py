@@ -61,7 +61,7 @@ def test_a_geometry_goes_through_a_dictionary_and_a_file(tmp_path):
 
 
 @pytest.mark.parametrize("preset", ["fourbar", "jansen", "klann"])
-def test_gaits_of_other_legs_are_those_of_their_study(preset):
+def test_gaits_of_other_legs_agree_with_their_study(preset):
     path = Path(__file__).parents[2] / "docs/evidence/legs/gaits.json"
     found = json.loads(path.read_text(encoding="utf-8"))[preset]
     assert {name: load_gait(name, preset) for name in ("walk", "run")} == {

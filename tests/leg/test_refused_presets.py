@@ -63,7 +63,7 @@ def test_files(content, error, words, tmp_path):
         load_geometry(path)
 
 
-def test_a_folder_is_no_file(tmp_path):
+def test_a_folder_in_place_of_a_file_is_refused(tmp_path):
     with pytest.raises(DataFileError, match="cannot read"):
         load_geometry(tmp_path)
 

@@ -17,7 +17,7 @@ class PlainCrank:
     All that moves is theta: I thetadd + I'/2 thetad^2 + V' = servo + ground. Inertia I, I'/2, V' and the hoof
     points are the plain horse's, at the nodes of Chebyshev polynomials on equal pieces of a revolution.
 
-    `height` is that of the crank centre above the ground [m], `pieces` and `order` are of the tables.
+    `height` is the height of the crank centre above the ground [m], `pieces` and `order` are of the tables.
     """
 
     def __init__(self, limb, gait, ground, height, pieces=64, order=16):

@@ -106,7 +106,7 @@ def depths(ground, at, velocity):
 def simulate(horse, gaits, times, theta, theta_rate=None, trunk=None, trunk_rate=(0.0, 0.0, 0.0)):
     """A horse under steady gaits, one for each leg, at times of which the first is the start.
 
-    A `theta_rate` of None is the gait's, as is that of a prescribed crank in any case; `trunk` is x, y and
+    A `theta_rate` of None is the gait's, as it always is with a prescribed crank; `trunk` is x, y and
     pitch at the start, None (0, trunk height, 0).
     """
     n = horse.size

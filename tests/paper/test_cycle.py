@@ -14,7 +14,7 @@ def trace(request):
     return run_cycle(request.param, "exact", restitution=0.0)
 
 
-def test_the_hoof_angle_is_that_of_the_sole_heel_up_positive(trace):
+def test_the_hoof_angle_is_the_soles_heel_up_positive(trace):
     heel, toe = (np.stack([trace[f"{name}_x"], trace[f"{name}_y"]]) for name in ("heel", "toe"))
     rise = (heel - toe)[1] / np.linalg.norm(heel - toe, axis=0)
     np.testing.assert_allclose(np.sin(trace["hoof_angle"]), rise, atol=1e-12)
@@ -23,7 +23,7 @@ def test_the_hoof_angle_is_that_of_the_sole_heel_up_positive(trace):
     assert flat["toe_x"] > flat["heel_x"]
 
 
-def test_what_is_outside_bears_nothing_and_has_no_approach_speed(trace):
+def test_a_hoof_outside_the_ground_bears_nothing_and_has_no_approach_speed(trace):
     for point in ("toe", "heel"):
         outside = trace[f"{point}_penetration"] <= 0
         assert outside.any()

@@ -16,7 +16,7 @@ LEVEL = {"hoof_angle": 0.2}  # 11 deg throughout
 
 
 @given(st.lists(st.integers(0, 50), min_size=1, max_size=60))
-def test_peaks_are_those_of_scipy(heights):
+def test_peaks_agree_with_scipy(heights):
     force = np.array([0, *heights, 0], dtype=float)
     if force.max() == 0:
         return

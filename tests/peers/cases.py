@@ -92,7 +92,7 @@ class Horse:
         return legs.run(self.case.duration, self.case.samples)
 
     def peer(self, engine, dt, **settings):
-        """A peer's record, and the assembly that its pins are those of; `settings` are the peer's own."""
+        """A peer's record, and the assembly whose pins it has; `settings` are the peer's own."""
         outside = GroundForces(self.ground, len(self.limbs)) if self.case.ground else None
         legs = engine(self.limbs, self.trunk, self.start, dt=dt, outside=outside, **settings)
         return legs.run(self.case.duration, self.case.samples), legs.assembly

@@ -32,7 +32,7 @@ def assert_agreement(rows, forces, motion):
             assert row.closure < 1e-12, label
 
 
-def test_a_leg_on_a_rail_is_that_of_the_peers():
+def test_a_leg_on_a_rail_moves_as_in_the_peers():
     rows = compare(FIRST_FIT, Case("rail", drive=Motor(), duration=0.5), COARSE)
     assert {row.engine for row in rows} >= set(PEERS)
     assert_agreement(rows, forces=5e-3, motion=1e-5)

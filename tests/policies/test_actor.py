@@ -243,7 +243,7 @@ def test_a_predict_of_other_arguments_is_reported(predict, env):
 
 
 def test_a_memory_of_any_kind_is_carried(env):
-    """Tuples as those of recurrent policies, and dictionaries."""
+    """Tuples, as in recurrent policies, and dictionaries."""
 
     class Summing:
         def predict(self, seen, state=None, episode_start=None, deterministic=True):
@@ -260,7 +260,7 @@ def test_a_memory_of_any_kind_is_carried(env):
 
 
 @pytest.mark.parametrize("policy", [3, object(), Counting])
-def test_what_is_no_policy_is_refused_by_all(policy, env):
+def test_objects_that_cannot_act_are_refused_everywhere(policy, env):
     for door in (play, lambda env, policy, _: records.record_episode(env, policy)):
         with pytest.raises(ParameterError, match=r"^policy"):
             door(env, policy, [0])

@@ -122,12 +122,12 @@ def test_what_does_not_fit_is_refused(policy, words, env):
 
 
 @pytest.mark.parametrize("seed", ["3", -1, 1.5, None])
-def test_a_seed_that_is_none_is_refused(seed, env):
+def test_a_bad_seed_is_refused(seed, env):
     with pytest.raises(ParameterError, match=r"seed: expected .*0 .*got"):
         hoof_env.load_policy("random", env, seed=seed)
 
 
-def test_what_is_no_environment_is_refused(env):
+def test_arguments_other_than_a_single_environment_are_refused(env):
     """An id, arguments in the other order, and a vector environment."""
     envs = hoof_env.HorseLegVectorEnv(2)
     for policy, given in (("shipped", ENV_ID), (env, "shipped"), ("shipped", envs)):
@@ -167,7 +167,7 @@ def test_a_module_of_the_user_that_fails_is_reported_with_its_line(env, tmp_path
 
 
 @pytest.mark.parametrize("observation", ["x", None, ["a"] * 22, [[1], [2, 3]]])
-def test_observations_that_are_no_numbers(observation):
+def test_observations_without_numbers_are_refused(observation):
     with pytest.raises(ParameterError, match=r"observation: expected (numbers|shape) .*HorseLeg-v0.*got"):
         hoof_env.load_policy("hoof_env/HorseLeg-v0").predict(observation)
 
@@ -199,7 +199,7 @@ def test_a_zip_of_any_algorithm_is_played_without_a_record(algo, env, tmp_path):
 
 
 @pytest.mark.filterwarnings("ignore:.*pickle")
-def test_a_zip_that_is_no_model_is_one_error(env, tmp_path):
+def test_a_zip_without_a_model_gives_one_error(env, tmp_path):
     pytest.importorskip("stable_baselines3")
     path = tmp_path / "mine.zip"
     for name, content in (("a.txt", "x"), ("data", "["), ("data", "{}"), ("data", "3")):

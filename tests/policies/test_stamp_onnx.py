@@ -68,7 +68,7 @@ def test_a_file_of_any_exporter(env, tmp_path, batch):
         hoof_env.load_policy(path, other)
 
 
-def test_a_second_stamp_replaces_the_first_and_keeps_what_is_not_ours(env, tmp_path):
+def test_a_second_stamp_replaces_the_first_and_leaves_foreign_entries(env, tmp_path):
     path = tmp_path / "mine.onnx"
     write(path)
     model = onnx.load(path)
@@ -108,7 +108,7 @@ def test_what_does_not_answer_is_left_alone(env, tmp_path, arguments, words):
     assert [*tmp_path.iterdir()] == [path]
 
 
-def test_what_is_no_graph_or_no_made_environment(env, tmp_path):
+def test_a_broken_graph_and_an_environment_without_an_id_are_refused(env, tmp_path):
     path = tmp_path / "mine.onnx"
     for content in (None, b"", b"no graph"):
         if content is not None:
@@ -133,7 +133,7 @@ def test_a_stamp_says_nothing_else_than_the_environment(env, tmp_path):
     assert path.read_bytes() == before
 
 
-def test_arguments_that_are_no_file_or_no_environment(env, tmp_path):
+def test_arguments_that_name_neither_a_file_nor_an_environment(env, tmp_path):
     path = tmp_path / "mine.onnx"
     write(path)
     other = tmp_path / "mine.bin"

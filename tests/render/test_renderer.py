@@ -104,7 +104,7 @@ def test_the_arrow_is_as_long_as_its_key_says(run, normal):
     dot = 2.25  # radius of the point of application, below the tail
     assert np.ptp(rows) + 1 - dot == pytest.approx(key * normal / 1000, abs=3)
     assert np.ptp(columns) < 12  # upright
-    assert pixels(frame, VERMILION)[0].size > rows.size / 2  # that of the whole hoof is behind it, wider
+    assert pixels(frame, VERMILION)[0].size > rows.size / 2  # the whole hoof's arrow is behind it, wider
 
 
 def test_the_arrow_leans_the_way_friction_acts(run):
@@ -194,7 +194,7 @@ def test_letters_are_readable_and_no_text_of_the_panel_lies_on_another(env_id, s
 
 @pytest.mark.parametrize("friction", [-900.0, -400.0, 0.0, 400.0, 900.0])
 def test_no_arrow_crosses_its_own_number(run, monkeypatch, friction):
-    """Its pixels are those of the arrow of the same force without a number."""
+    """It has the same pixels as the arrow of the same force without a number."""
     found = written(monkeypatch)
     step = loaded(run, 1000.0, friction)
     draw(step, weight_n=1000.0)
@@ -420,7 +420,7 @@ def test_the_leg_is_always_in_the_picture(height):
 
 
 @pytest.mark.parametrize("gait", ["run", "walk"])
-def test_stances_and_peaks_are_those_of_the_reward(gait):
+def test_stances_and_peaks_agree_with_the_reward(gait):
     env = gym.make("hoof_env/HorseLeg-v0", render_mode="rgb_array", episode_seconds=4.0).unwrapped
     observation, _ = env.reset(seed=0, options={"gait": gait})
     policy, ended = make_policy(gait, env), False
@@ -474,9 +474,9 @@ def test_rows_that_are_not_finite_are_left_out(run):
     np.testing.assert_array_equal(draw(run[0], broken), draw(run[0], good))
 
 
-def test_what_is_around_a_small_leg_is_as_small():
-    """The trunk of a robot at 0.2 was as long as that of the whole leg, over key and panel. Up to the scale
-    all is the same picture, so that the same leg, made smaller, is drawn as large."""
+def test_surroundings_of_a_small_leg_are_as_small():
+    """The trunk of a robot at 0.2 was as long as the whole leg's, over key and panel. The pictures agree up
+    to the scale, so that the same leg, made smaller, is drawn as large."""
     from hoof_env.render.outline import USUAL_HIP_M
     from hoof_env.render.scene import LegScene
 

@@ -11,7 +11,7 @@ def text_of(kernel):
 
 
 def assembly_of(kernel):
-    """Assembly of a kernel for this processor, or for that of HOOF_ENV_CPU."""
+    """Assembly of a kernel for this processor, or for the processor that HOOF_ENV_CPU names."""
     return target().emit_assembly(optimised(text_of(kernel)))
 
 

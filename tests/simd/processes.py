@@ -17,7 +17,7 @@ def start_python(code, folder=None, **variables):
 
     Args:
         code: the code.
-        folder: folder of its machine code, and of modules; None for those of this process.
+        folder: folder of its machine code, and of modules; None for the folders of this process.
         variables: variables of its environment.
     """
     usual = {"PYTHONPATH": f"{ROOT}{os.pathsep}{folder}"}

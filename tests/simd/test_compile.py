@@ -403,7 +403,7 @@ def test_the_same_function_has_the_same_text_at_each_trace():
     assert text_of(made) == text_of(real_kernel(ONE_BY_ONE[4]))
 
 
-def test_assembly_is_that_of_the_processor():
+def test_assembly_is_made_for_the_processor():
     assert "kernel" in assembly_of(twice)
 
 

@@ -93,7 +93,7 @@ def test_a_loop_has_the_turns_of_range(bounds):
     assert both(sum_of_rests, *bounds) == wanted
 
 
-def test_known_bounds_and_conditions_are_those_of_python():
+def test_known_bounds_and_conditions_act_as_in_python():
     @kernel
     def known(x: Number) -> Number:
         total = Cell(0.0)

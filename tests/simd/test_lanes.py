@@ -107,7 +107,7 @@ def found(numbers):
     return {count: results(count, arithmetic, numbers) for count in (1, 2, 4, 8, 16)}
 
 
-def test_operations_are_those_of_numpy(numbers, found):
+def test_operations_agree_with_numpy(numbers, found):
     np.testing.assert_allclose(found[8], expected(numbers), rtol=2e-15, atol=1e-15)
 
 
@@ -183,7 +183,7 @@ def test_a_dot_product_rounds_its_first_product_only(close, count):
 
 
 @pytest.mark.parametrize("count", [1, 8])
-def test_larger_and_smaller_are_those_of_numpy_for_every_pair(count):
+def test_larger_and_smaller_agree_with_numpy_for_every_pair(count):
     """What is not a number, infinities and signed zeros, of two lanes and of a lane and a constant."""
     odd = (np.nan, np.inf, -np.inf, 0.0, -0.0, 1.0, -2.5, 5e-324)
     given = np.zeros((INPUTS, 64))
@@ -201,7 +201,7 @@ def test_larger_and_smaller_are_those_of_numpy_for_every_pair(count):
     np.testing.assert_array_equal(results(count, operations, given), wanted)
 
 
-def test_what_is_not_a_number_differs_from_all_and_compares_with_none():
+def test_nan_differs_from_all_numbers_and_no_comparison_holds():
     def operations(x):
         a, b = x[0], x[1]
         truths = (a == a, a != a, a < b, a <= b, a > b, a >= b, ~(a < b))

@@ -54,7 +54,7 @@ def drawn(n, width, seed=0):
     return keys, counts, one
 
 
-def test_they_are_those_of_splitmix64():
+def test_numbers_agree_with_splitmix64():
     keys, counts, found = drawn(64, 9)
     wanted = [[expected(key, count, k) for k in range(9)] for key, count in zip(keys, counts, strict=True)]
     assert np.array_equal(found, wanted)

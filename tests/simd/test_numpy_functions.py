@@ -188,7 +188,7 @@ CLOSE = {
 """Functions of the C library, whose last digits are not NumPy's."""
 
 CHOICES = ("imum", "np.fm", "np.clip")
-"""Words in the names of those of which NumPy does not say which zero of two they choose."""
+"""Words in the names of functions for which NumPy does not say which zero of two they choose."""
 
 ALL = {**EXACT, **CLOSE}
 

@@ -254,7 +254,7 @@ def test_a_damaged_file_is_compiled_again(own, damage):
     assert not compiles()
 
 
-def test_a_file_that_cannot_be_finished_is_none(own, monkeypatch):
+def test_a_file_that_cannot_be_finished_is_removed(own, monkeypatch):
     """A full disk, and a process that is interrupted."""
 
     class Full:
@@ -280,7 +280,7 @@ def test_a_file_that_cannot_be_finished_is_none(own, monkeypatch):
     assert list(own.iterdir()) == []
 
 
-def test_a_folder_that_cannot_be_is_none(own):
+def test_a_folder_that_cannot_be_made_is_not_used(own):
     """A file is in its place: each process compiles for itself, without a message."""
     own.write_text("")
     with warnings.catch_warnings():
@@ -414,7 +414,7 @@ def test_use_is_noted_once_a_day(own):
         assert (file.stat().st_mtime > now - 60) == is_noted
 
 
-def test_the_folder_is_that_of_the_variable_else_in_the_users_cache(monkeypatch, tmp_path):
+def test_the_folder_comes_from_the_variable_else_it_is_in_the_users_cache(monkeypatch, tmp_path):
     monkeypatch.setenv(FOLDER, str(tmp_path / "x"))
     assert folder() == tmp_path / "x"
     monkeypatch.delenv(FOLDER)

@@ -132,7 +132,7 @@ def test_products_are_fused_unless_asked_otherwise():
     assert rounded.tobytes() != fused.tobytes()
 
 
-def test_errors_are_those_of_the_source_with_its_lines():
+def test_an_error_shows_the_traced_function_in_its_traceback():
     def refuse(given):
         for n in loop(given.begin, given.end):
             raise ValueError(f"at {n}")

@@ -32,7 +32,7 @@ def test_blocks_are_all_columns_in_equal_groups_of_lanes(columns, lanes, num_thr
 
 
 @pytest.mark.parametrize("given", [0, -1, 1.5, True, "2", None, available() + 1])
-def test_what_is_no_number_of_threads(given):
+def test_bad_numbers_of_threads_are_refused(given):
     with pytest.raises(ParameterError, match="num_threads: expected"):
         check_threads(given)
 

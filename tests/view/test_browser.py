@@ -147,7 +147,7 @@ class Tab:
         self.page.wait_for_selector("body[data-ready]", timeout=120_000)
 
     def check_drawn(self, columns):
-        """Check that forces and the numbers of a page that pauses are those of the engine, bitwise."""
+        """Check that forces and the numbers of a page that pauses are the engine's, bitwise."""
         end = self.time
         last = end - 1.01 * RESOLUTION
         for name, column in (("normal", "normal"), ("forces", "grf"), ("forces", "friction")):
@@ -255,7 +255,7 @@ def test_buttons_and_keys(tab):
     page.get_by_label("follow").check()
 
 
-def test_the_play_speed_is_that_of_its_slider(tab):
+def test_the_play_speed_follows_its_slider(tab):
     passed = {}
     for speed in ("0.05", "2"):
         tab.set("speed", speed)
@@ -335,7 +335,7 @@ def test_each_slider_changes_the_forces_as_the_engine_says(tab, url):
 
 
 def test_sliders_that_are_moved_while_an_episode_starts_anew(tab):
-    """Both act, whatever comes first; the episode is that of an engine with these settings."""
+    """Both act, whatever comes first; the episode equals an engine's with these settings."""
     tab.press("Play")
     race = """() => {
         const slider = document.querySelector('#touch-friction')

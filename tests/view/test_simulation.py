@@ -47,7 +47,7 @@ def exported(env_id, seconds, seed=0, **arguments):
 
 
 @pytest.mark.parametrize(("env_id", "speed"), [(LEG, 1.0), (LEG, 0.05), (HORSE, 2.0), (TERRAIN, 0.3)])
-def test_what_is_drawn_is_what_export_writes_to_the_digit(env_id, speed):
+def test_drawn_numbers_equal_exported_numbers_to_the_digit(env_id, speed):
     seconds = 0.2 if speed < 0.1 else 0.8
     player, drawn = played(Simulation(env_id), seconds, speed)
     record = exported(env_id, 1.0)
@@ -274,7 +274,7 @@ def test_one_episode_follows_the_other_and_memory_is_bounded(monkeypatch):
 
 
 @pytest.mark.parametrize("env_id", [LEG, HORSE])
-def test_numbers_of_a_stance_are_those_of_the_record(env_id):
+def test_numbers_of_a_stance_agree_with_the_record(env_id):
     simulation = Simulation(env_id)
     player, _ = played(simulation, 2.0)
     record = exported(env_id, 2.0)

@@ -91,7 +91,7 @@ def test_a_page_says_that_its_policy_takes_long_and_pauses_meanwhile(waiting):
     page.tab._tick()
     page.tab._send()
     assert page.tab.wire.told["playing"] is False
-    # When the policy answers at last, what was asked for is done, and states are those of the engine.
+    # When the policy answers at last, what was asked for is done, and states are the engine's.
     policy.may.set()
     page.wait()
     page.tick(0.04)

@@ -298,7 +298,7 @@ def test_an_error_of_a_new_page_is_reported_on_it(tmp_path, monkeypatch):
     assert refused.template_variables["reason"] == "RuntimeError: out of order"
 
 
-def test_bars_of_the_reward_are_those_of_the_moment_that_is_shown(page):
+def test_bars_of_the_reward_belong_to_the_moment_that_is_shown(page):
     player = page.player
     names = [name for name, _ in player.numbers]
     first = 3 + names.index(player.simulation.terms[0])

@@ -1,0 +1,139 @@
+"""Learners inside JAX beside `agents/ppo_flat.py`: curves of the mean return over equal steps and seconds."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterable
+from typing import Any
+
+import jax
+import numpy as np
+
+from agents import runs
+from agents.settings import FOLDER, algorithm_class, load_settings, model_arguments
+from examples.jax_ppo import Ppo
+from examples.jax_shac import Shac
+from hoof_env.envs.policies import Scripted
+from hoof_env.evaluation.episodes import make_rows, play_rows
+
+ID = "hoof_env/HorseLeg-v0"
+STEPS = 102_400  # a multiple of the windows and rollouts of all learners
+SEEDS = range(5)
+LOOKS = 10
+"""Scores of a curve."""
+
+STARTS = range(2_000_000, 2_000_064)
+"""Episodes of a score, which no training meets."""
+
+Curve = list[dict[str, float]]
+"""Steps, processor seconds and mean return of each score."""
+
+
+class Judge:
+    """Scores of policies: the mean return of the same episodes of the compiled environment."""
+
+    def __init__(self, id: str = ID) -> None:
+        envs = make_rows(id, len(STARTS))
+        assert envs is not None
+        self.envs: Any = envs
+        self.dt = envs.dt
+
+    def score(self, policy: Any) -> float:
+        """Return the mean return of a policy with `predict`."""
+        return float(np.mean([episode["return"] for episode in play_rows(self.envs, policy, STARTS)]))
+
+    def score_network(self, network: Any, bound: Callable[[Any], Any]) -> float:
+        """Return the mean return of the bounded output of a network."""
+        layers = [tuple(np.asarray(x) for x in layer) for layer in network]
+
+        def act(observation: Any, _: Any) -> Any:
+            x = np.asarray(observation, np.float32)
+            for weights, biases in layers[:-1]:
+                x = np.tanh(x @ weights + biases)
+            weights, biases = layers[-1]
+            return bound(x @ weights + biases)
+
+        return self.score(Scripted(act, self.dt))
+
+
+def curve_of(progress: Iterable[Any], steps: int, score: Callable[[Any], float]) -> Curve:
+    """Return the curve of a training, which yields steps, what is learned and a mean. Scores take no time."""
+    curve: Curve = []
+    spent, since = 0.0, time.process_time()
+    for taken, learned, _ in progress:
+        jax.block_until_ready(learned)
+        if taken * LOOKS // steps > len(curve):
+            spent += time.process_time() - since
+            curve.append({"steps": taken, "seconds": spent, "return": score(learned)})
+            since = time.process_time()
+    return curve
+
+
+def learn_flat(steps: int, seed: int, judge: Judge) -> Curve:
+    """Return the curve of `ppo_flat` with its settings, whose learning rate falls over these steps."""
+    from stable_baselines3.common.callbacks import BaseCallback
+    from stable_baselines3.common.vec_env import VecMonitor
+
+    settings = load_settings(FOLDER / "ppo_flat.yml", ID)
+    many = VecMonitor(runs.make_vec_env(ID, settings["n_envs"], 1))
+    settings["n_timesteps"] = steps
+    model = algorithm_class("ppo_flat")(env=many, seed=seed, num_threads=1, **model_arguments(settings))
+    curve: Curve = []
+    spent, since = 0.0, time.process_time()
+
+    class Looks(BaseCallback):
+        """Callback that scores the policy after updates."""
+
+        def _on_rollout_start(self) -> None:
+            self.look()
+
+        def look(self) -> None:
+            nonlocal spent, since
+            if self.num_timesteps * LOOKS // steps > len(curve):
+                spent += time.process_time() - since
+                value = judge.score(self.model)
+                curve.append({"steps": self.num_timesteps, "seconds": spent, "return": value})
+                since = time.process_time()
+
+        def _on_step(self) -> bool:
+            return True
+
+    looks = Looks()
+    model.learn(steps, callback=looks)
+    looks.look()
+    return curve
+
+
+def measure(steps: int = STEPS, seeds: Iterable[int] = SEEDS) -> dict[str, Any]:
+    """Return the curves of all learners, and the seconds that compiling took."""
+    judge = Judge()
+    curves: dict[str, list[Curve]] = {}
+    compiled: dict[str, float] = {}
+
+    def note(name: str, seed: int, curve: Curve) -> None:
+        curves.setdefault(name, []).append(curve)
+        print(f"{name}, seed {seed}: {curve[-1]}", flush=True)
+
+    since = time.process_time()
+    shac = Shac(ID)
+    next(shac.train(1, 0))
+    compiled["SHAC"] = time.process_time() - since
+    for seed in seeds:
+        score = lambda actor: judge.score_network(actor["mean"], np.tanh)  # noqa: E731
+        note("SHAC", seed, curve_of(shac.train(steps, seed), steps, score))
+    since = time.process_time()
+    ppo = Ppo(ID)
+    next(ppo.train(steps, 0, LOOKS))
+    compiled["PPO in one program"] = time.process_time() - since
+    for seed in seeds:
+        score = lambda agent: judge.score_network(agent["actor"], lambda x: np.clip(x, -1.0, 1.0))  # noqa: E731
+        note("PPO in one program", seed, curve_of(ppo.train(steps, seed, LOOKS), steps, score))
+    learn_flat(2048, 0, judge)  # loads the trainer's kernels
+    for seed in seeds:
+        note("ppo_flat, equal steps", seed, learn_flat(steps, seed, judge))
+    rate = np.median([curve[-1]["steps"] / curve[-1]["seconds"] for curve in curves["ppo_flat, equal steps"]])
+    for name in ("SHAC", "PPO in one program"):
+        seconds = np.median([curve[-1]["seconds"] for curve in curves[name]])
+        for seed in seeds:
+            note(f"ppo_flat, seconds of {name}", seed, learn_flat(int(rate * seconds), seed, judge))
+    return {"id": ID, "steps": steps, "compiled": compiled, "curves": curves}

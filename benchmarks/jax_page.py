@@ -1,0 +1,177 @@
+"""Page docs/evidence/jax.md and its pictures, from what `benchmarks.jax_evidence` measured."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from hoof_env._output import markdown_table
+from hoof_env._plotting import AMBER, BLUE, GREEN, GREY, ORANGE, STYLE, check_matplotlib, save_png
+
+Found = dict[str, Any]
+"""Results and what they were measured with, by part."""
+
+COLOURS = (ORANGE, BLUE, GREEN, AMBER, GREY)
+ABOUT = ("jax", "processor", "system", "date", "commit")
+OVER = {"steps": "steps", "seconds": "processor seconds"}
+
+HEAD = """\
+# Inside JAX: learners, derivatives, speed
+
+Written by `python -m benchmarks.jax_evidence`. Seconds are of the processor, without compiling; returns are
+means of 64 episodes of the compiled environment that no training met, and a row's figure is the median of its
+runs with the lowest and the highest. [Inside JAX](../jax.md) says what the programs are."""
+
+LEARNERS = """\
+## SHAC and PPO in one program, beside `ppo_flat`
+
+`examples/jax_shac.py` and `examples/jax_ppo.py` on `{id}`, {steps:,} steps, {runs} seeds each; `ppo_flat`
+with its settings, whose learning rate falls over the steps given, once for equal steps, and once for the
+median seconds of each of the two. {compiled}
+
+{table}
+
+![Return against steps and against processor seconds](jax/learners.png)"""
+
+GAITS = """\
+## A gait by its derivative, beside CMA-ES
+
+`examples/jax_gait.py` on `{id}`: a gait that is locked to the crank, 20 numbers, from {runs} random starts
+with a return of {first}, {steps:,} control steps of simulated time each. CMA-ES begins at the same gaits with
+a standard deviation of 0.3 and 12 candidates. Its episodes take 10 s, or 2 s, of which more fit into the same
+time; the score is the mean of its distribution. Compiling the derivative took {compiled:.0f} s.
+
+{table}
+
+![Return against simulated time](jax/gaits.png)"""
+
+DERIVATIVES = """\
+## Derivatives through windows
+
+`examples/jax_gradient.py`, in float64, 16 starts: the derivative of the return along one direction of a
+constant action, and its distance from the central difference of 0.001, relative to it; medians.
+
+{table}
+
+![Size of derivatives and their distance from differences, by window](jax/derivatives.png)"""
+
+SPEED = """\
+## Steps inside `jax.jit`
+
+`python -m benchmarks.jax_speed` on `{id}`, a linear policy: microseconds of processor (of wall clock) of a
+vector step.
+
+{table}"""
+
+
+def spread(values: list[float], digits: int = 1) -> str:
+    """Format the median, and the lowest and highest in brackets."""
+    low, middle, high = (f"{x:.{digits}f}" for x in (min(values), np.median(values), max(values)))
+    return f"{middle} ({low} to {high})"
+
+
+def table_of_curves(curves: dict[str, Any]) -> str:
+    """Return the table of the last scores of curves."""
+    rows = []
+    for name, runs in curves.items():
+        last = [run[-1] for run in runs]
+        steps, seconds = (np.median([score[key] for score in last]) for key in OVER)
+        best = spread([max(score["return"] for score in run) for run in runs])
+        rows.append([name, f"{steps:,.0f}", f"{seconds:.1f}", spread([x["return"] for x in last]), best])
+    return markdown_table(("learner", "steps", "seconds", "last return", "best score of a run"), rows)
+
+
+def seconds_of(compiled: dict[str, float]) -> str:
+    """Return the sentence of what compiling took."""
+    return "Compiling took " + " and ".join(f"{x:.0f} s ({name})" for name, x in compiled.items()) + "."
+
+
+def page(found: Found) -> str:
+    """Return the page of what was measured."""
+    parts = [HEAD]
+    results = {part: each["result"] for part, each in found.items()}
+    if "learners" in found:
+        given = results["learners"]
+        curves = given["curves"]
+        runs = len(next(iter(curves.values())))
+        parts.append(
+            LEARNERS.format(
+                id=given["id"],
+                steps=given["steps"],
+                runs=runs,
+                compiled=seconds_of(given["compiled"]),
+                table=table_of_curves(curves),
+            )
+        )
+    if "gaits" in found:
+        given = results["gaits"]
+        first = spread(given["first"])
+        about = {key: given[key] for key in ("id", "steps", "compiled")}
+        table = table_of_curves(given["curves"])
+        parts.append(GAITS.format(runs=len(given["first"]), first=first, table=table, **about))
+    if "derivatives" in found:
+        rows = [
+            [name, f"{row['seconds']:g}", f"{row['size']:.3g}", f"{row['apart']:.2g}"]
+            for name, each in results["derivatives"].items()
+            for row in each
+        ]
+        head = ("body", "window [s]", "size of the derivative", "distance from the difference")
+        parts.append(DERIVATIVES.format(table=markdown_table(head, rows)))
+    if "speed" in found:
+        from benchmarks.jax_speed import table as table_of_speed
+
+        given = results["speed"]
+        parts.append(SPEED.format(id=given["id"], table=table_of_speed(given["rows"])))
+    rows = [[part, *(each["about"][key] for key in ABOUT)] for part, each in found.items()]
+    parts.append(f"## Measured with\n\n{markdown_table(('part', *ABOUT), rows)}")
+    return "\n\n".join(parts) + "\n"
+
+
+def draw(found: Found, folder: Path) -> None:
+    """Draw what was measured into a folder."""
+    check_matplotlib()
+    import matplotlib.pyplot as plt
+
+    def axes(count: int) -> Any:
+        return plt.subplots(1, count, figsize=(4.2 * count, 3.4), layout="constrained", squeeze=False)
+
+    with plt.rc_context(STYLE):
+        for part, keys in (("learners", ("steps", "seconds")), ("gaits", ("steps",))):
+            if part not in found:
+                continue
+            figure, ((*places,),) = axes(len(keys))
+            for axis, key in zip(places, keys, strict=True):
+                for (name, runs), colour in zip(
+                    found[part]["result"]["curves"].items(), COLOURS, strict=False
+                ):
+                    _draw_runs(axis, name, runs, key, colour)
+                axis.set(xlabel=OVER[key], ylabel="mean return of 64 episodes")
+            if len(keys) > 1:
+                places[1].set_xscale("log")
+            places[0].legend(loc="lower right", fontsize=7)
+            save_png(figure, folder / f"{part}.png")
+            plt.close(figure)
+        if "derivatives" in found:
+            figure, ((*places,),) = axes(2)
+            for (name, rows), colour in zip(found["derivatives"]["result"].items(), COLOURS, strict=False):
+                seconds = [row["seconds"] for row in rows]
+                for axis, key in zip(places, ("size", "apart"), strict=True):
+                    axis.loglog(seconds, [row[key] for row in rows], "o-", color=colour, label=name)
+            for axis, what in zip(
+                places, ("size of the derivative", "distance from the difference"), strict=True
+            ):
+                axis.set(xlabel="window [s]", ylabel=what)
+            places[0].legend()
+            save_png(figure, folder / "derivatives.png")
+            plt.close(figure)
+
+
+def _draw_runs(axis: Any, name: str, runs: Any, key: str, colour: str) -> None:
+    """Draw the median of runs, and each of them thinly."""
+    length = min(len(run) for run in runs)
+    x = np.array([[score[key] for score in run[:length]] for run in runs])
+    y = np.array([[score["return"] for score in run[:length]] for run in runs])
+    axis.plot(x.T, y.T, color=colour, lw=0.5, alpha=0.5)
+    axis.plot(np.median(x, 0), np.median(y, 0), color=colour, lw=1.8, label=name)

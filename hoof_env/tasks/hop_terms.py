@@ -1,0 +1,48 @@
+"""Reward and observation of a leg that carries itself, in place of `reward.TERMS` and `observation.ENTRIES`.
+
+The reward pays for travel and charges force, work, slip and a fall. Nothing is paid for bearing weight, which
+this leg cannot avoid."""
+
+from __future__ import annotations
+
+from hoof_env.simd import Lanes, Number
+from hoof_env.tasks.observation import ENTRIES
+from hoof_env.tasks.reward import Outcome, Term, energy, failure, loading, progress, slip
+
+
+def peak(step: Outcome, weight: Number) -> Lanes:
+    """Return the charge for the increase of the square of the stance's peak GRF, in units of the weight.
+
+    The square, because the sum of the peaks themselves orders nothing: a leg that bears its weight in half as
+    many stances has peaks twice as high, and their sum is the same.
+    """
+    rise = step.sums.peak_grf_increase
+    # A step in which the peak rises ends that rise at its highest force: b^2 - a^2 = (b - a) (2 b - (b - a))
+    return -weight * rise * (2.0 * step.sums.highest_grf - rise) / (step.weight * step.weight)
+
+
+HOP_TERMS = (
+    Term("progress", 10.0, "1/m", "forward travel, up to the commanded speed", progress),
+    Term(
+        "peak",
+        0.3,
+        "-",
+        "minus the square of each stance's peak GRF divided by the weight, as it increases",
+        peak,
+    ),
+    Term(
+        "loading",
+        10.0,
+        "s/MN",
+        "minus the increase of the stance's steepest rise of the normal force, while its peak grows",
+        loading,
+    ),
+    Term("energy", 1.0, "1/kJ", "minus the positive work of both drives; braking is not recovered", energy),
+    # As much as a metre of progress pays, so that no way of sliding does
+    Term("slip", 10.0, "1/m", "minus the distance that the hoof slides in stance, in both directions", slip),
+    Term("failure", 5.0, "1/s", "once, minus the rest of `episode_seconds`, if the episode fails", failure),
+)
+"""Terms of the reward of `HorseLegHop-v0`, in the order in which they are added."""
+
+HOP_ENTRIES = tuple(entry for entry in ENTRIES if entry.name != "bearing allowance")
+"""Entries that can be observed on `HorseLegHop-v0`."""
