@@ -28,11 +28,11 @@ from numpy.typing import NDArray
 from agents import runs
 from agents.command import parse, run
 from agents.evolution import generations, make_strategy, require
-from agents.horse_gaits import landings, speed_of
+from agents.horse_gaits import speed_of
 from agents.judges import Bars, searched_bars
 from hoof_env.dynamics.layout import Features, stride_sums
 from hoof_env.dynamics.observables import stance_figures
-from hoof_env.errors import check_choice, parse_json
+from hoof_env.errors import HoofEnvError, check_choice, parse_json
 from hoof_env.evaluation.episodes import make_rows
 from hoof_env.simd.threads import limit_threads
 from hoof_env.tasks.horse import HIP_HEIGHT
@@ -47,6 +47,10 @@ SECONDS = 6.0
 SETTLED = 2.0
 """Candidates of a generation, episodes of each, their length and the time after which figures count [s]."""
 BINS = 32  # of a turn of the crank, in which the force of a pair is averaged
+
+PHASES = np.arange(0.0, 0.5, 0.025)  # of starts that are tried [strides]
+DROPPED = 512  # starts from each
+AT_ONCE = 1.4  # [s]
 
 STRIDES = (1.3, 1.6, 1.95, 2.3)  # of the gaits that searches begin with [hip heights]
 LEADS = np.arange(0.0, 0.5, 0.05)  # of these [strides]
@@ -203,7 +207,9 @@ class Rig:
         sums = {name: np.zeros((len(LEGS), n)) for name in self.names}
         upright = np.ones(n, bool)
         returns = np.zeros(n)
-        lags = np.zeros(n, complex)
+        # Sums over landings of fore and of hind hooves
+        landed = np.zeros((len(PAIRS), n), complex)
+        place = np.zeros((1 + len(LEGS), n))
         forces = np.zeros((len(PAIRS), BINS, n))
         counts = np.full((len(PAIRS), BINS, n), 1e-9)
         column = np.arange(n)
@@ -216,6 +222,7 @@ class Rig:
             upright &= ~failed
             returns += np.where(upright, rewards, 0.0)
             measured = infos["measured"]
+            before = place[1:]
             place = np.array([measured[name] for name in ("x", *(f"{leg}_crank_angle" for leg in LEGS))])
             if k == settled - 1:
                 began = place
@@ -228,7 +235,13 @@ class Rig:
                     squares += forward**2 + up**2
                     work = forward * measured["vx"] + up * measured["vy"]
                     limb_work += np.maximum(work, 0.0)
-                lags += landings(rows, np.array([measured[f"{leg}_stance_began"] for leg in LEGS]))
+                for i, leg in enumerate(LEGS):
+                    # The time of a landing within the step, from the crank's angle
+                    turned = (measured[f"{leg}_stance_began"] - before[i]) % (2 * np.pi)
+                    part = np.clip(turned / np.maximum((place[1 + i] - before[i]) % (2 * np.pi), 1e-9), 0, 1)
+                    # Two turns a stride: left and right are half a stride apart
+                    phase = 2 * rows[:, 0] * (k + part) * envs.dt
+                    landed[i // 2] += measured[f"{leg}_stances"] * np.exp(1j * phase)
                 at = (place[1:] / (2 * np.pi) * BINS).astype(int) % BINS
                 for i, leg in enumerate(LEGS):
                     # The mean force over the step, but for a factor
@@ -243,7 +256,7 @@ class Rig:
         for k, pair in enumerate(PAIRS):
             figures[f"dip_{pair}"] = dips(forces[k] / counts[k])
         figures["speed_ratio"] = figures["reached"] / speed
-        return self._means(figures, lags, returns, upright, m, starts)
+        return self._means(figures, landed[0] * landed[1].conj(), returns, upright, m, starts)
 
     def _figures(
         self, sums: dict[str, Floats], seconds: float, travelled: Floats, turns: Floats
@@ -282,7 +295,7 @@ class Rig:
         return means
 
 
-def costs_of(figures: dict[str, Floats], bars: Bars, criterion: str = "force") -> Floats:
+def costs_of(figures: dict[str, Floats], bars: Bars, criterion: str = "force", fall: float = FALL) -> Floats:
     """Return the cost of gaits, shape (m,): distances from bars over `SCALES`, falls, and one of
     `CRITERIA`."""
     cost = np.zeros(len(figures["fell"]))
@@ -293,7 +306,7 @@ def costs_of(figures: dict[str, Floats], bars: Bars, criterion: str = "force") -
         # Far from the bar a cost grows more slowly, so that no figure hides all others
         cost += MISS * np.where(np.isfinite(far), far / (1 + far / 20), 20.0)
     name, price = CRITERIA[criterion]
-    total: Floats = cost + FALL * figures["fell"] + price * np.nan_to_num(figures[name], nan=10.0)
+    total: Floats = cost + fall * figures["fell"] + price * np.nan_to_num(figures[name], nan=10.0)
     return total
 
 
@@ -343,6 +356,12 @@ class Args:
     """generations from the best of these"""
     seed: int = 0
     """of searches and their episodes"""
+    starts: int = STARTS
+    """episodes of each candidate"""
+    fall: float = FALL
+    """cost of a gait that always falls"""
+    spread: float = AGAIN
+    """of a search that goes on, in the box of the gaits"""
 
 
 class Finder:
@@ -353,11 +372,20 @@ class Finder:
         froude: Froude number of the commanded speed.
         seed: seed of the searches and their episodes.
         criterion: one of `CRITERIA`.
+        starts: episodes of each candidate.
+        fall: cost of a gait that always falls.
         **settings: arguments of the environment.
     """
 
     def __init__(
-        self, kind: str, froude: float, seed: int, criterion: str = "force", **settings: Any
+        self,
+        kind: str,
+        froude: float,
+        seed: int,
+        criterion: str = "force",
+        starts: int = STARTS,
+        fall: float = FALL,
+        **settings: Any,
     ) -> None:
         require("agents.kinematic_gaits", "cma")
         self.kind = kind
@@ -366,14 +394,16 @@ class Finder:
         self.seed = seed
         self.criterion = criterion
         self.count = 0
-        self.rig = Rig(POPULATION * STARTS, **settings)
+        self.starts = starts
+        self.fall = fall
+        self.rig = Rig(POPULATION * starts, **settings)
 
     def costs(self, gaits: Floats) -> list[float]:
         """Return the costs of gaits, at most `POPULATION`; every call has other starts."""
         self.count += 1
-        seed = 100_000 * (self.seed + 1) + STARTS * self.count
-        figures = self.rig.play(gaits, self.speed, seed, STARTS)
-        found: list[float] = costs_of(figures, self.bars, self.criterion).tolist()
+        seed = 100_000 * (self.seed + 1) + self.starts * self.count
+        figures = self.rig.play(gaits, self.speed, seed, self.starts)
+        found: list[float] = costs_of(figures, self.bars, self.criterion, self.fall).tolist()
         return found
 
     def begin(self, stride: float) -> Floats:
@@ -394,9 +424,9 @@ class Finder:
 
     def check(self, gait: Floats) -> dict[str, Any]:
         """Return a gait and its figures over starts of their own."""
-        starts = POPULATION * STARTS
+        starts = POPULATION * self.starts
         figures = self.rig.play(gait[None], self.speed, 10**7, starts)
-        cost = float(costs_of(figures, self.bars, self.criterion)[0])
+        cost = float(costs_of(figures, self.bars, self.criterion, self.fall)[0])
         shown = {name: round(float(values[0]), 4) for name, values in figures.items()}
         return {"gait": gait.tolist(), "cost": round(cost, 4), **shown}
 
@@ -440,7 +470,7 @@ class Records:
 def find(kind: str, froude: float, args: Args, records: Records) -> dict[str, Any]:
     """Return the best gait of a kind at a Froude number: searches from each stride, and one from the best of
     these."""
-    finder = Finder(kind, froude, args.seed, args.criterion)
+    finder = Finder(kind, froude, args.seed, args.criterion, args.starts, args.fall)
     title = f"{kind} at {froude:g} by {args.criterion}, seed {args.seed}"
 
     def improve(first: Floats, spread: float, count: int) -> Any:
@@ -449,13 +479,48 @@ def find(kind: str, froude: float, args: Args, records: Records) -> dict[str, An
     if args.begin is not None:
         known = parse_json(args.begin.read_text(encoding="utf-8"))
         best = np.array(known[check_choice("gait", f"kinematic-{kind}", known)]["gait"])
-        return records.keep(f"{title}, from {args.begin.name}", improve(best, AGAIN, args.more))
+        return records.keep(f"{title}, from {args.begin.name}", improve(best, args.spread, args.more))
     begun = [
         records.keep(f"{title}, stride {stride:g}", improve(finder.begin(stride), SPREAD, args.first))
         for stride in STRIDES
     ]
     best = np.array(min(begun, key=lambda one: float(one["cost"]))["gait"])
-    return records.keep(f"{title}, best", improve(best, AGAIN, args.more))
+    return records.keep(f"{title}, best", improve(best, args.spread, args.more))
+
+
+def phase_of(gait: Floats, speed: float) -> float | None:
+    """Return the phase of the stride at which episodes in a gait should start: the middle of the longest run
+    of `PHASES` from which no horse falls at once; None if none falls from any.
+
+    A start is level and at rest but for its speed, which a gait with flight may not take at any phase.
+
+    Raises:
+        HoofEnvError: horses fall from each phase.
+    """
+    envs: Any = make_rows(ENV_ID, DROPPED, num_threads=limit_threads(2))
+    idle = np.zeros((DROPPED, 16), np.float32)
+    falls = []
+    for phase in PHASES:
+        options = {"gait": gait, "target_speed": speed, "phase": float(phase)}
+        envs.reset(seed=[2 * 10**6 + k for k in range(DROPPED)], options=options)
+        fell = np.zeros(DROPPED, bool)
+        for _ in range(round(AT_ONCE / envs.dt)):
+            fell |= envs.step(idle)[2]
+        falls.append(int(fell.sum()))
+    if not any(falls):
+        return None
+    # Twice around, for the run may pass the end; left and right are alike half a stride apart
+    runs_of = [0]
+    for count in falls * 2:
+        runs_of.append(runs_of[-1] + 1 if count == 0 else 0)
+    longest = min(max(runs_of), len(PHASES))
+    if longest == 0:
+        raise HoofEnvError(
+            f"the gait at {speed:.2f} m/s: expected a phase from which no horse falls, got none"
+        )
+    last = runs_of.index(max(runs_of)) - 1
+    middle: float = round((last - (longest - 1) / 2) / len(PHASES) / 2 % 0.5, 4)
+    return middle
 
 
 def main(argv: list[str] | None = None) -> None:
@@ -466,7 +531,10 @@ def main(argv: list[str] | None = None) -> None:
     for kind, froude in zip(args.gaits, args.froude, strict=True):
         found = find(kind, froude, args, records)
         # A gait is filed under the speed that it reaches
-        shipped[f"kinematic-{kind}"] = {"speed": round(found["reached"], 3), "gait": found["gait"]}
+        speed = round(found["reached"], 3)
+        phase = phase_of(np.array(found["gait"]), speed)
+        start = {} if phase is None else {"phase": phase}
+        shipped[f"kinematic-{kind}"] = {"speed": speed, **start, "gait": found["gait"]}
     runs.write_text(args.shipped, json.dumps(shipped, indent=1) + "\n")
     print(f"written: {args.out}, {args.shipped}")
 

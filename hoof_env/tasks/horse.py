@@ -52,6 +52,7 @@ from hoof_env.tasks.horse_gaits import (
     crank_angles,
     gait_numbers,
     horse_gaits,
+    kinematic_phases,
     kinematic_speeds,
     rates,
     refer_to_target,
@@ -197,6 +198,8 @@ class Horse:
             name: {"gait": name, "target_speed": speed * self.speed_scale}
             for name, speed in kinematic_speeds().items()
         }
+        for name, phase in kinematic_phases().items():
+            self.policy_starts[name]["phase"] = phase
         self.gait = None if s.gait is None else self.gaits[check_choice("gait", s.gait, self.gaits)]
         self.harmonics = 2 if s.harmonics is None else count("harmonics", s.harmonics, most=2)
         filters = "quick" if s.filters is None else check_choice("filters", s.filters, FILTERS)

@@ -179,6 +179,12 @@ def kinematic_speeds() -> dict[str, float]:
     return {name: float(found["speed"]) for name, found in _data("kinematic").items()}
 
 
+def kinematic_phases() -> dict[str, float]:
+    """Return the phases of the stride [strides] at which kinematic gaits start, of those that do not start at
+    any: a trunk that begins level and at rest drops too far in some."""
+    return {name: float(found["phase"]) for name, found in _data("kinematic").items() if "phase" in found}
+
+
 def gait_numbers(name: str, given: Any, gaits: Mapping[str, HorseGait], size: float) -> Floats:
     """Return the numbers of a gait, shape (16,), or of several, shape (n, 16).
 

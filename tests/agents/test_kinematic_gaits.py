@@ -10,7 +10,7 @@ from agents.gait_figures import play
 from agents.horse_gaits import speed_of
 from agents.judges import searched_bars
 from hoof_env.envs.policies import make_policy
-from hoof_env.errors import ParameterError
+from hoof_env.errors import HoofEnvError, ParameterError
 from hoof_env.evaluation.episodes import make_rows
 from hoof_env.tasks.horse_gaits import bounds, horse_gaits, kinematic_speeds
 
@@ -83,7 +83,7 @@ def test_the_rig_measures_what_the_judges_measure():
         for pair in ("fore", "hind"):
             assert found[f"duty_{pair}"][0] == pytest.approx(judged[f"duty_{pair}"], abs=0.02)
             assert found[f"slip_{pair}"][0] == pytest.approx(judged[f"slip_{pair}"], abs=0.02)
-        assert (found["lag"][0] - judged["lag"] + 0.25) % 0.5 - 0.25 == pytest.approx(0, abs=0.02)
+        assert (found["lag"][0] - judged["lag"] + 0.25) % 0.5 - 0.25 == pytest.approx(0, abs=0.01)
         assert found["stride_over_hip"][0] == pytest.approx(judged["stride_over_hip"], rel=0.02)
         assert found["transport"][0] == pytest.approx(judged["transport"], rel=0.03)
         assert found["reached"][0] == pytest.approx(judged["reached"], rel=0.02)
@@ -113,6 +113,7 @@ def test_the_command_finds_a_gait_and_goes_on_where_it_stopped(tmp_path, monkeyp
     monkeypatch.setattr(search, "STRIDES", (1.6,))
     monkeypatch.setattr(search, "STARTS", 1)
     monkeypatch.setattr(search, "SECONDS", 3.0)
+    monkeypatch.setattr(search, "DROPPED", 8)
     out, shipped = tmp_path / "found.json", tmp_path / "shipped.json"
     argv = ["--gaits", "walk", "--froude", "0.2", "--first", "2", "--more", "1", "--out", str(out)]
     search.main([*argv, "--shipped", str(shipped)])
@@ -132,6 +133,29 @@ def test_the_command_finds_a_gait_and_goes_on_where_it_stopped(tmp_path, monkeyp
     with pytest.raises(ParameterError, match=r"kinematic-walk"):
         search.main(["--gaits", "trot", "--froude", "1", "--begin", str(shipped), "--out", str(out)])
     capsys.readouterr()
+
+
+def test_a_start_is_in_the_middle_of_the_phases_from_which_none_falls(monkeypatch):
+    class Horses:
+        """Fall at phases from 0.1 to 0.3 strides."""
+
+        dt = 0.7
+        phase = 0.0
+
+        def reset(self, seed, options):
+            self.phase = options["phase"]
+
+        def step(self, actions):
+            return None, None, np.full(len(actions), 0.09 < self.phase < 0.31)
+
+    monkeypatch.setattr(search, "make_rows", lambda *_, **__: Horses())
+    # Free are 0.325 to 0.475 and 0 to 0.075
+    assert search.phase_of(np.zeros(16), 3.6) == pytest.approx(0.45)
+    monkeypatch.setattr(Horses, "step", lambda self, actions: (None, None, np.zeros(len(actions), bool)))
+    assert search.phase_of(np.zeros(16), 3.6) is None
+    monkeypatch.setattr(Horses, "step", lambda self, actions: (None, None, np.ones(len(actions), bool)))
+    with pytest.raises(HoofEnvError, match=r"3\.60 m/s: expected a phase"):
+        search.phase_of(np.zeros(16), 3.6)
 
 
 @pytest.mark.parametrize("name", kinematic_speeds())

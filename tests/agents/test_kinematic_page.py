@@ -48,7 +48,7 @@ def test_the_page_is_written_with_its_figures_and_pictures(tmp_path, monkeypatch
     assert "nan" not in text
     folder = tmp_path / "horse_gaits"
     assert set(json.loads((folder / "figures.json").read_text())["families"]) == {
-        "predicted", "trot-like", "kinematic"
+        "predicted", "trot-like", "kinematic", "from any phase"
     }  # fmt: skip
     assert (folder / "forces.png").stat().st_size > 5000
     # Written again from what it keeps, it lists the same searches
