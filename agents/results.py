@@ -509,9 +509,16 @@ def overview(folder: Path = RESULTS) -> str:
             cell(rows[kind], "return").partition(" ")[0] if kind in rows else "" for kind in head_kinds()
         ]
         spread = runs_cell(rows["shipped"]) if "shipped" in rows else ""
-        bold = f"**{best.mean['return']:.1f}** ({KINDS[best.kind]})" if best else ""
+        bold = f"**{best.mean['return']:.1f}** ({title_of(best)})" if best else ""
         lines.append([f"`{name}-v0`", *found[:3], bold, *found[3:], spread])
     return markdown_table(head, lines)
+
+
+def title_of(row: Row) -> str:
+    """Return the name of a row's policy; a gait of an id with a motor has a clock in place of the crank."""
+    task = next((task for task in TASKS.values() if task.id == row.env_id), None)
+    has_clock = row.kind == "open-loop" and task is not None and task.settings({}).drive == "motor"
+    return "best gait with a clock" if has_clock else KINDS[row.kind]
 
 
 def head_kinds() -> tuple[str, ...]:
