@@ -33,8 +33,8 @@ FIRST = {"results": ("score",)}
 """Sub-commands."""
 
 WITH_ENV = {
-    "bar", "dataset", "distribute", "experiments.training", "export", "open_loop", "results", "ship", "train",
-    "tune",
+    "bar", "dataset", "distribute", "experiments.training", "export", "open_loop", "order", "results", "ship",
+    "train", "tune",
 }  # fmt: skip
 """Commands that take any environment; the rest has its own."""
 

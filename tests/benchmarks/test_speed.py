@@ -97,7 +97,7 @@ def test_a_process_times_every_case_of_its_own_package(tmp_path):
     seconds = compare.run_cases(compare.ROOT, runs=1, share=0.02)
     assert len(seconds) == 6
     assert min(seconds.values()) > 0
-    with pytest.raises(RuntimeError, match="expected hoof_env of"):
+    with pytest.raises(RuntimeError, match="expected hoof_env in"):
         compare.run_cases(tmp_path, runs=1, share=0.02)
 
 
@@ -181,7 +181,7 @@ def test_a_process_counts_what_it_and_its_children_spend(tmp_path, monkeypatch):
     work = "import time\nwhile time.process_time() < 0.5: pass"
     inside = str(compare.ROOT / "hoof_env" / "__init__.py")
     assert compare_first.run(side, (inside, work), tmp_path) > 0.5
-    with pytest.raises(RuntimeError, match="expected hoof_env of"):
+    with pytest.raises(RuntimeError, match="expected hoof_env in"):
         compare_first.run(side, (str(tmp_path), ""), tmp_path)
 
 

@@ -215,6 +215,7 @@ ASKS = {
     "agents/export.py": "compares two policies over drawn observations",
     "agents/levels.py": "hands on what a policy returns, some of it replaced by random actions",
     "agents/ship.py": "hands on what a policy returns, with noise",
+    "benchmarks/jax_gaits.py": "plays the first steps of an episode by many gaits side by side",
 }
 """Files that ask a policy for actions, and what for."""
 
