@@ -124,6 +124,7 @@ def draw(found: Found, folder: Path) -> None:
     """Draw what was measured into a folder."""
     check_matplotlib()
     import matplotlib.pyplot as plt
+    from matplotlib.ticker import LogLocator, NullFormatter
 
     def axes(count: int) -> Any:
         return plt.subplots(1, count, figsize=(4.2 * count, 3.4), layout="constrained", squeeze=False)
@@ -142,6 +143,9 @@ def draw(found: Found, folder: Path) -> None:
                 axis.set(xlabel=OVER[key], ylabel="mean return of 64 episodes")
             if len(keys) > 1:
                 places[1].set_xscale("log")
+                places[1].xaxis.set_major_locator(LogLocator(subs=(1.0, 3.0)))
+                places[1].xaxis.set_major_formatter("{x:g}")
+                places[1].xaxis.set_minor_formatter(NullFormatter())
             places[0].legend(loc="lower right", fontsize=7)
             save_png(figure, folder / f"{part}.png")
             plt.close(figure)

@@ -84,7 +84,7 @@ def infos_of(batch: EpisodeBatch, ended: bool = True) -> dict[str, NDArray[Any]]
         infos["target_speed"] = batch.rows.named.target[:n].copy()
     infos["measured"] = measured.T.view(batch.measurements.kind)
     infos.update(zip(batch.terms, batch.rows.named.terms[:, :n].copy(), strict=True))
-    infos["unweighted"] = name_columns(batch.rows.unweighted[:, :n].T.copy(), batch.term_names)
+    infos["unweighted"] = name_columns(batch.rows.unweighted[:, :n].copy().T, batch.term_names)
     if batch.plan.costs.names:
         infos["cost"] = batch.rows.costs.sum(axis=0)
         infos.update(zip(batch.plan.costs.keys, batch.rows.costs.copy(), strict=True))
