@@ -19,6 +19,9 @@ from hoof_env.evaluation.episodes import make_rows, play_rows
 ID = "hoof_env/HorseLeg-v0"
 STEPS = 102_400  # a multiple of the windows and rollouts of all learners
 SEEDS = range(5)
+SHAC_SEEDS = range(5, 10)
+"""Seeds of SHAC, whose settings were chosen by trainings with seeds 0 and 1."""
+
 LOOKS = 10
 """Scores of a curve."""
 
@@ -104,7 +107,7 @@ def learn_flat(steps: int, seed: int, judge: Judge) -> Curve:
     return curve
 
 
-def measure_shac(steps: int = STEPS, seeds: Iterable[int] = SEEDS) -> dict[str, Any]:
+def measure_shac(steps: int = STEPS, seeds: Iterable[int] = SHAC_SEEDS) -> dict[str, Any]:
     """Return the curves of SHAC and of `ppo_flat`; see `_beside_flat`."""
     return _beside_flat("SHAC", lambda: Shac(ID).train, lambda actor: (actor["mean"], np.tanh), steps, seeds)
 
