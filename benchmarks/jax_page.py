@@ -86,6 +86,11 @@ def table_of_curves(curves: dict[str, Any]) -> str:
     return markdown_table(("learner", "steps", "seconds", "last return", "best score of a run"), rows)
 
 
+def thousands(x: float, _: int) -> str:
+    """Format a number of steps."""
+    return f"{x / 1000:,.0f}k"
+
+
 def page(found: Found) -> str:
     """Return the page of what was measured."""
     parts = [HEAD]
@@ -141,11 +146,11 @@ def draw(found: Found, folder: Path) -> None:
                 ):
                     _draw_runs(axis, name, runs, key, colour)
                 axis.set(xlabel=OVER[key], ylabel="mean return of 64 episodes")
-            if len(keys) > 1:
-                places[1].set_xscale("log")
-                places[1].xaxis.set_major_locator(LogLocator(subs=(1.0, 3.0)))
-                places[1].xaxis.set_major_formatter("{x:g}")
-                places[1].xaxis.set_minor_formatter(NullFormatter())
+            for axis, label in zip(places if len(keys) > 1 else (), (thousands, "{x:g}"), strict=False):
+                axis.set_xscale("log")
+                axis.xaxis.set_major_locator(LogLocator(subs=(1.0, 3.0)))
+                axis.xaxis.set_major_formatter(label)
+                axis.xaxis.set_minor_formatter(NullFormatter())
             places[0].legend(loc="lower right", fontsize=7)
             save_png(figure, folder / f"{part}.png")
             plt.close(figure)
