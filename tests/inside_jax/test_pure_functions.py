@@ -109,7 +109,8 @@ def test_booms_contexts_and_sensors_are_those_of_the_kernels():
     assert found[3] <= 2.0**-20
 
 
-def test_a_gradient_through_a_second_is_that_of_differences():
+def test_a_gradient_through_ten_steps_equals_differences():
+    """Central ones: below a step of 1e-4 their round-off grows, above it their own error."""
     env, params = make("HorseLeg")
     state = jax.tree.map(lambda array: array[0], params.starts)
     key = jax.random.key(0)
@@ -126,10 +127,10 @@ def test_a_gradient_through_a_second_is_that_of_differences():
     value, slope = jax.value_and_grad(travel)(action)
     assert np.isfinite(value)
     assert (slope != 0.0).all()
-    small = 1e-6
+    small = 1e-4
     for k, unit in enumerate(np.eye(4)):
         by_differences = (travel(action + small * unit) - travel(action - small * unit)) / (2 * small)
-        np.testing.assert_allclose(slope[k], by_differences, rtol=1e-5)
+        np.testing.assert_allclose(slope[k], by_differences, rtol=1e-6)
 
 
 def test_derivatives_by_the_state_are_the_same_backward_and_forward():
