@@ -89,6 +89,8 @@ def card(
         is_suspended = surroundings(env).trunk == "suspended"
         summaries = {task.id: task.summary for task in TASKS.values()}
         summary = summaries.get(env_id) or (type(env.unwrapped).__doc__ or "").partition("\n")[0]
+    of_runs = f"the best of {score['runs']} runs by mean return in 100 other episodes" * (score["runs"] > 1)
+    chosen = "; ".join(filter(None, (of_runs, score.get("chosen"))))
     return render_template(
         "model_card.md.j2",
         env_id=env_id,
@@ -99,6 +101,8 @@ def card(
         settings=config.strip(),
         score=score,
         spread=float(np.std(score["returns"])),
+        chosen=chosen or "the only run",
+        is_chosen=bool(chosen),
         is_one_episode=len(score["returns"]) > 1 and np.ptp(score["returns"]) == 0.0,
         titles=[METRICS[key].title.replace("\n", " ") for key in keys],
         rows=[

@@ -73,16 +73,21 @@ class Args:
     """a run folder of agents.train, or a folder with several beneath it"""
     env_id: tuple[str, ...] = ()
     """only these ids"""
+    chosen: str = ""
+    """how a run that was picked by hand was picked, a phrase for its card; among the runs given, the best by
+    return is found"""
     out: Path = POLICIES
     """folder for the policies' folders; in another one than this they have all files"""
 
 
 @dataclass(frozen=True)
 class Choice:
-    """Run that is shipped, and the number of runs of which it is the best."""
+    """Run that is shipped, the number of runs of which it is the best by return, and how it was picked by hand
+    before that, if it was."""
 
     saved: runs.SavedModel
     among: int = 1
+    by_hand: str = ""
 
 
 def find_runs(folder: Path) -> dict[str, list[runs.SavedModel]]:
@@ -112,18 +117,18 @@ def find_runs(folder: Path) -> dict[str, list[runs.SavedModel]]:
     return models
 
 
-def choose(saved: Sequence[runs.SavedModel], env_id: str) -> Choice:
+def choose(saved: Sequence[runs.SavedModel], env_id: str, by_hand: str = "") -> Choice:
     """Return the run with the highest mean return in `CHOOSING_SEEDS`."""
     from tqdm import tqdm
 
     if len(saved) == 1:
-        return Choice(saved[0])
+        return Choice(saved[0], by_hand=by_hand)
     values = []
     with runs.make_env(env_id) as env:
         for model in tqdm(saved, desc=f"runs of {env_id}", leave=False, disable=None):
             episodes = score_vector(model.load(env, env_id), env_id, CHOOSING_SEEDS)
             values.append(float(np.mean([episode["return"] for episode in episodes])))
-    return Choice(saved[int(np.argmax(values))], len(saved))
+    return Choice(saved[int(np.argmax(values))], len(saved), by_hand)
 
 
 def ship(choice: Choice, env_id: str, out: Path) -> dict[str, Any]:
@@ -153,6 +158,8 @@ def ship(choice: Choice, env_id: str, out: Path) -> dict[str, Any]:
         policy = OnnxPolicy(stage / FILE)  # the shipped file is scored, not the model
         scores = [Score("policy", score_vector(policy, played_on, SCORE_SEEDS)), *gaits(played_on)]
         score = score_record(policy, scores, env_id, played_on) | {"runs": choice.among}
+        if choice.by_hand:
+            score["chosen"] = choice.by_hand
         if env_id != trained_on:
             record["trained_on"] = trained_on
         for name in COPIED:
@@ -311,7 +318,8 @@ def main(argv: list[str] | None = None) -> None:
     }
     ids = [check_choice("env_id", env_id, sources) for env_id in args.env_id] or list(sources)
     check_folder(args.out)
-    choices = {source: choose(models[source], source) for source in {sources[env_id] for env_id in ids}}
+    needed = {sources[env_id] for env_id in ids}
+    choices = {source: choose(models[source], source, args.chosen) for source in needed}
     for env_id in ids:
         score = ship(choices[sources[env_id]], env_id, args.out)
         means = {name: of_policy["mean"]["return"] for name, of_policy in score["policies"].items()}

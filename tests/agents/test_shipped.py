@@ -139,7 +139,8 @@ def test_folder(folder):
     spread = "" if is_one else f" +/- {np.std(score['returns']):.2f}"
     assert f"value: {np.mean(score['returns']):.2f}{spread}, name" in card
     assert ("one deterministic episode" in card) == (folder.name == "HorseLegFixed-v0") == is_one
-    assert ("There was one training" in card) == (score["runs"] == 1)
+    assert ("There was one training" in card) == (score["runs"] == 1 and "chosen" not in score)
+    assert score.get("chosen", "") in card
     assert ("the best of" in card) == (score["runs"] > 1)
     film = "../HorseLeg-v0/film.gif" if folder.name == "HorseLegMO-v0" else "film.gif"
     assert f"![{folder.name}]({film})" in card
