@@ -2,8 +2,8 @@
 
 The animal is above, beside its footfall. Below are, over the strides that are filmed, the normal and the
 horizontal force on each hoof over the mass of the animal. Bands are the published ranges of stance peaks in
-`agents/judges.json`, and dashed lines published peaks without a spread: a horse's curve rises into the band
-and falls, or rises, to the line.
+`agents/judges.json`, and dashed lines are published peaks without a spread: a horse's normal force peaks
+inside the band, and its horizontal force peaks at the line.
 """
 
 from __future__ import annotations

@@ -8,8 +8,8 @@ first two seconds do not count. `agents/judges.json` has the horse's figures, th
 nothing in it may enter a reward or a setting.
 
 Rows that are marked `searched` there are given to the search for kinematic gaits (`agents.kinematic_gaits`).
-Of such a gait, and of what is trained around it, they are printed as searched, inside or outside of the bar,
-and never count as met; what it was not given judges it. Of other policies all rows judge.
+For such a gait, and for an agent trained around it, these rows are printed as searched, inside or outside of
+the bar, and never count as met: the other rows judge it. For any other policy all rows judge.
 
 A horse's figure at a Froude number is compared with that of the gait at the nearest speed. Ours counts only
 if the policy falls in a tenth of the episodes at most and keeps the commanded speed to 15 %, the hooves slip
@@ -199,13 +199,18 @@ def _walk(judges: dict[str, Any], standing: list[dict[str, Any]]) -> Iterator[tu
 
 
 def _trot(judges: dict[str, Any], standing: list[dict[str, Any]]) -> Iterator[tuple[str, ...]]:
-    """Yield rows of the trot: peaks and signs at one speed, and duty factors and strides at several."""
+    """Yield rows of the trot: lag, peaks and signs at one speed, and duty factors and strides at several."""
     trots = trots_of(standing)
     lowest = judges["reported"]["walk_to_trot"]["horse"]
     # Slower ones would be compared with peaks that no horse has at a walk's speed
     quick = [trot for trot in trots if trot["froude_reached"] >= lowest]
     what = f"trot-like gait from Froude number {lowest:g} on"
     trot = at_speed(judges["trot"]["froude"], quick, what, near=np.inf)
+    if trot.figures and trot.figures.get("searched"):
+        # Of other gaits the lag is what makes them trot-like: it would always be met
+        folded = trot.figures | {"lag": min(trot.figures["lag"], 0.5 - trot.figures["lag"])}
+        judge = judges["trot"]["lag"]
+        yield judged("trot-like: lag", Gait(folded, trot.flaw), "lag", judge, [judge["bar"]])
     for name, judge in judges["trot"].items():
         if name not in ("froude", "lag"):
             unit = " [N/kg]" if name.startswith(("peak", "net")) else ""

@@ -2,12 +2,12 @@
 
 The searches of `agents.horse_gaits` know the return alone. These are also given the kinematics of living
 horses: the rows of `agents/judges.json` that are marked `searched`, which are lag, duty factors, number of
-force peaks and length of the stride. Of gaits that have them the one is wanted with the least mean square of
-the forces on the hooves, which is high where a peak is or where legs pull against each other. By
-`--criterion` it is the least positive work of single limbs on the centre of mass (Donelan, Kram and Kuo 2002,
-J. Biomech. 35:117) or of the drives, the highest return, the lowest peaks or the slowest loading. None of
-these has a figure of a horse, and what the gaits are judged by, peaks, braking, propulsion, impulses and
-loading of horses, is not known to the search.
+force peaks and length of the stride. Many gaits have these, and a criterion decides: the least mean square of
+the forces on the hooves, which is high at peaks and where legs pull against each other. `--criterion` chooses
+another one: the least positive work of single limbs on the centre of mass (Donelan, Kram and Kuo 2002,
+J. Biomech. 35:117) or of the drives, the highest return, the lowest peaks or the slowest loading. No criterion
+contains a figure of a horse, and the search is not given the figures that judge its gaits: peaks, braking,
+propulsion, impulses and loading of horses.
 
 A search begins with the reference gait of its speed, with a stride of 1.3 to 2.3 hip heights and several
 leads of the fore pair. The best lead of each stride is improved, and then the best of these. Searches that
@@ -339,17 +339,17 @@ class Args:
     """Arguments of the command."""
 
     gaits: tuple[str, ...] = ("walk", "trot")
-    """what is searched for: walk, trot"""
+    """gaits to search for: walk, trot"""
     froude: tuple[float, ...] = (0.2, 0.85)
     """Froude number of each"""
     criterion: str = "force"
-    """what decides between gaits with the wanted kinematics: force, limbs, work, return, peak or loading"""
+    """criterion between gaits with the wanted kinematics: force, limbs, work, return, peak or loading"""
     out: Path = Path("runs/kinematic.json")
-    """what was found; one that exists is gone on with"""
+    """file of the searches; one that exists is continued"""
     shipped: Path = Path("runs/kinematic-gaits.json")
-    """what of it comes with the package, as hoof_env/data/horse/kinematic.json"""
+    """file of the gaits found, in the form of hoof_env/data/horse/kinematic.json"""
     begin: Path | None = None
-    """gaits from which searches go on in place of those of several strides, as `shipped` has them"""
+    """file of gaits from which searches start, in the form of `shipped`; otherwise from several strides"""
     first: int = 120
     """generations from each stride"""
     more: int = 300

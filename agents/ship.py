@@ -82,8 +82,8 @@ class Args:
 
 @dataclass(frozen=True)
 class Choice:
-    """Run that is shipped, the number of runs of which it is the best by return, and how it was picked by hand
-    before that, if it was."""
+    """Run that is shipped, the number of runs of which it has the highest return, and how it was picked by
+    hand before that, if it was."""
 
     saved: runs.SavedModel
     among: int = 1

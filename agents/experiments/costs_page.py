@@ -49,7 +49,7 @@ of the steps, `episodes_within` the share of the episodes that cost `BUDGET` or 
 
 COLUMNS = ("env_id", "agent", "seed", "steps", *FIGURES, "commit")
 
-GAITS = ("zero", "walk", "run")
+GAITS = ("zero", "walk", "run", "carrying_walk")
 """Policies without learning that are shown beside the agents."""
 
 SHIPPED = {"hoof_env/HorseLegSafe-v0": "HorseLeg-v0", "hoof_env/HorseSafe-v0": "Horse-v0"}

@@ -1,5 +1,5 @@
-"""The page of a leg that carries itself: learners and policies that need no learning, their forces beside a
-horse's, and the order in which the reward puts gaits."""
+"""Page of a leg that carries itself: learners beside policies that need no learning, their forces beside a
+horse's, and which gaits the reward prefers."""
 
 from __future__ import annotations
 
@@ -62,7 +62,7 @@ SEEDS = (0, 1, 2)
 
 GAITS_OF_A_DRAW = 1024
 
-CONDITIONS = {"hardly sliding": order.SLIDING, "sliding, too": math.inf}
+CONDITIONS = {"that hardly slide": order.SLIDING, "of any slip": math.inf}
 """Largest share of the way for which gaits slide whose order is measured, by name."""
 
 
@@ -254,9 +254,9 @@ brackets the lowest and the highest; a single number is of one policy. Trained b
 
 {table}
 
-* **Gain** is the return less the zero action's, divided by the same of the best policy without feedback.
+* **Gain** is what a policy returns more than the zero action, over what the best policy without feedback does.
 * **Stock** learners are Stable-Baselines3's, with `PPO("MlpPolicy", env)` and one environment.
-* **Crank and gait alone** is more than blind: a motor drives the crank, which the ground slows down.
+* **Crank and gait alone** sees more than a blind policy: the ground slows down the crank, which a motor drives.
 * **The best constant gait and the gait with a clock** see nothing. They were searched by CMA-ES
   (`python -m agents.open_loop`), the first by four numbers, the second by {numbers}: a harmonic of a clock,
   and its frequency. A search goes on until its last quarter gains less than a hundredth:
@@ -275,12 +275,13 @@ duty factor. A half sine of duty factor 0.5 peaks at pi weights.
 ## Which gaits the reward prefers
 
 Partial rank correlations of the return with figures of a gait, at given speed: {gaits:,} gaits that last and
-travel at {slowest:g} m/s or more, drawn about two gaits of a hop (`python -m agents.order`). Of gaits hardly
-sliding less than {sliding:.0%} of the way is. Means of {draws} draws, in brackets the lowest and the highest.
+travel at {slowest:g} m/s or more, drawn about two gaits of a hop (`python -m agents.order`). A gait hardly
+slides if its hoof slides for less than {sliding:.0%} of the distance. Means of {draws} draws, in brackets the lowest
+and the highest.
 
 {order}
 
-Gaits that slide have small peaks and pay for the slip instead: among all gaits the slip decides.
+Gaits that slide have small peaks and pay for slip instead, so that slip decides among all gaits.
 """
 
 
