@@ -28,7 +28,7 @@ def ranges_of(kind: str, froude: float) -> dict[str, dict[str, Any]]:
     """Return published ranges of a walk's or a trot's stance peaks, by pair: "bands", pairs of values of the
     normal force, and "lines", values of the horizontal force, negative ones braking [N/kg].
 
-    A walk's lines are published for the fore legs of foals, at the Froude number; for hind legs there is none.
+    A walk's lines are published for fore legs of foals, at the Froude number, and for no hind leg.
     """
     judges = read_judges()
     found: dict[str, dict[str, Any]] = {pair: {"bands": [], "lines": []} for pair in PAIRS}

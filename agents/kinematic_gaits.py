@@ -4,8 +4,8 @@ The searches of `agents.horse_gaits` know the return alone. These are also given
 horses: the rows of `agents/judges.json` that are marked `searched`, which are lag, duty factors, number of
 force peaks and length of the stride. Many gaits have these, and a criterion decides: the least mean square of
 the forces on the hooves, which is high at peaks and where legs pull against each other. `--criterion` chooses
-another one: the least positive work of single limbs on the centre of mass (Donelan, Kram and Kuo 2002,
-J. Biomech. 35:117) or of the drives, the highest return, the lowest peaks or the slowest loading. No criterion
+another one: the least positive work of single limbs on the centre of mass (Donelan, Kram and Kuo 2002, J.
+Biomech. 35:117) or of the drives, the highest return, the lowest peaks or the slowest loading. No criterion
 contains a figure of a horse, and the search is not given the figures that judge its gaits: peaks, braking,
 propulsion, impulses and loading of horses.
 

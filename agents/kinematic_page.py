@@ -223,9 +223,10 @@ def summary(rows: Sequence[Sequence[str]], figures: Sequence[Figures], episodes:
     return (
         f"Of the rows that the kinematic gaits were searched with, {inside} are inside of their bars and "
         f"{outside} outside. Falls in {episodes} starts: {fell}; hooves slip {slip:.3f} m a stance at most. "
-        f"Of the rows that judge them, these are met ({len(met)}): {', '.join(met) or 'none'}; and these are missed "
-        f"({len(missed)}), by the distance from the nearest end of the bar: {', '.join(missed) or 'none'}. The hind peak "
-        "of a walk is derived and the length of its stride an estimate: no print was found of either."
+        f"Of the rows that judge them {len(met)} are met: {', '.join(met) or 'none'}; "
+        f"{len(missed)} are missed, by the distance from the nearest end of the bar: "
+        f"{', '.join(missed) or 'none'}. The hind peak of a walk is derived and the length of its stride an "
+        "estimate: no print was found of either."
     )
 
 
@@ -294,7 +295,7 @@ the walk by force."""
 
 NOT_A_HORSE = {
     "walk": "a hind leg lies nearly flat behind the animal in its swing, because the linkage folds backward. "
-    "Hooves go 0.05 to 0.10 m into the ground, as their springs give, where a horse's fetlock sinks. The fore "
+    "Hooves go 0.05 to 0.1 m into the ground, as their springs give, where a horse's fetlock sinks. The fore "
     "legs bear two thirds of the weight. Horizontal forces change their sign several times a stance, where a "
     "horse's hoof brakes once and then propels, and the force on a hind hoof has a plateau in place of two "
     "peaks. Neck and head do not move.",

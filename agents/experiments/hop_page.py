@@ -254,9 +254,9 @@ brackets the lowest and the highest; a single number is of one policy. Trained b
 
 {table}
 
-* **Gain** is what a policy returns more than the zero action, over what the best policy without feedback does.
+* **Gain** is the return above the zero action's, over the same of the best policy without feedback.
 * **Stock** learners are Stable-Baselines3's, with `PPO("MlpPolicy", env)` and one environment.
-* **Crank and gait alone** sees more than a blind policy: the ground slows down the crank, which a motor drives.
+* **Crank and gait alone** is more than blind: the ground slows down the crank, which a motor drives.
 * **The best constant gait and the gait with a clock** see nothing. They were searched by CMA-ES
   (`python -m agents.open_loop`), the first by four numbers, the second by {numbers}: a harmonic of a clock,
   and its frequency. A search goes on until its last quarter gains less than a hundredth:
@@ -276,8 +276,8 @@ duty factor. A half sine of duty factor 0.5 peaks at pi weights.
 
 Partial rank correlations of the return with figures of a gait, at given speed: {gaits:,} gaits that last and
 travel at {slowest:g} m/s or more, drawn about two gaits of a hop (`python -m agents.order`). A gait hardly
-slides if its hoof slides for less than {sliding:.0%} of the distance. Means of {draws} draws, in brackets the lowest
-and the highest.
+slides if its hoof slides for less than {sliding:.0%} of the distance. Means of {draws} draws, in brackets the
+lowest and the highest.
 
 {order}
 

@@ -5,8 +5,10 @@ this leg cannot avoid."""
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 from hoof_env.simd import Lanes, Number
-from hoof_env.tasks.observation import ENTRIES
+from hoof_env.tasks.observation import ENTRIES, TRUE_RATE, Scale, tanh_of
 from hoof_env.tasks.reward import Outcome, Term, energy, failure, loading, progress, slip
 
 
@@ -44,5 +46,19 @@ HOP_TERMS = (
 )
 """Terms of the reward of `HorseLegHop-v0`, in the order in which they are added."""
 
-HOP_ENTRIES = tuple(entry for entry in ENTRIES if entry.name != "bearing allowance")
+SCALES = {
+    # A motor's crank also turns back, and beyond the largest rate that a gait may ask for
+    TRUE_RATE: tanh_of(10.0),
+    # Forces rise by 50 to 600 weights a second: ten times as fast as on a suspension
+    "steepest rise of the force": Scale(
+        "tanh(x / (300 weights / s))", lambda x, scene: x / (300.0 * scene.episode.weight), True
+    ),
+}
+"""Scales that differ from those of other ids, by entry."""
+
+HOP_ENTRIES = tuple(
+    replace(entry, scale=SCALES.get(entry.name, entry.scale))
+    for entry in ENTRIES
+    if entry.name != "bearing allowance"
+)
 """Entries that can be observed on `HorseLegHop-v0`."""

@@ -274,14 +274,16 @@ TASKS: Mapping[str, Task] = MappingProxyType(
         "hop": Task(
             "HorseLegHop",
             "A horse's leg that carries itself: it hops.",
-            "The trunk is on a boom, free to move forward and up and down, while its pitch is held. There"
-            " is no suspension: the ground bears the whole weight through this one leg. A motor drives the"
-            " crank, which the ground slows down. The pastern is a spring between the leg's hoof points"
-            " and the soles, which sink into the ground by 1 cm. An episode begins near the apex of a hop,"
-            " at any speed up to 4 m/s. The boom also takes the torque of the hip, with which a horse"
-            " would have to turn its trunk.",
+            "The trunk is on a boom, free to move forward and up and down, while its pitch is held."
+            " There is no suspension and no drag: the ground bears the whole weight through this one"
+            " leg. A motor drives the crank, which the ground slows down. The pastern is a spring"
+            " between the leg's hoof points and the soles, which sink into the ground by 1 cm. An"
+            " episode begins near the apex of a hop, at any speed up to 4 m/s. The boom also takes the"
+            " torque of the hip, with which a horse would have to turn its trunk.",
             {
                 "trunk": "boom",
+                # Its bearings and the air are left out: the leg brakes as much as it propels
+                "trunk_drag": 0.0,
                 "drive": "motor",
                 "stiffness": 2e6,
                 "exponent": 1.5,

@@ -36,7 +36,7 @@ def test_published_gaits_have_the_figures_of_a_replay():
 
 
 def test_a_correlation_at_a_given_third_figure():
-    """Two figures that follow a third one are not correlated at its given value; two with opposite rests are, by -1."""
+    """At a given third figure two that follow it have no correlation, and opposite rests have one of -1."""
     generator = np.random.default_rng(0)
     given, one, other = generator.normal(size=(3, 4000))
     assert abs(order.partial_rank_correlation(given + 0.1 * one, given + 0.1 * other, given)) < 0.1
