@@ -295,6 +295,8 @@ def pool(each: list[list[dict[str, Any]]]) -> list[dict[str, Any]]:
         standing = [policy for policy in at_this_speed if "lag" in policy]
         mean_figures: dict[str, Any] = {name: at_this_speed[0][name] for name in ("speed", "froude")}
         mean_figures["intervals"] = {}
+        # A figure that one of them was searched with is no result of all
+        mean_figures["searched"] = any(policy.get("searched") for policy in at_this_speed)
         for name in SHOWN if standing else ("fell",):
             counted = at_this_speed if name == "fell" else standing
             values = [policy[name] for policy in counted if np.isfinite(policy[name])]

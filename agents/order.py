@@ -16,6 +16,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.stats import rankdata
 
 from agents.command import parse, run
 from agents.open_loop import family_of
@@ -47,7 +48,7 @@ class Args:
     """Arguments of the command."""
 
     env_id: str = "hoof_env/HorseLegHop-v0"
-    """id of one leg"""
+    """id of one leg whose episodes start in a gait of the task's own"""
     gaits: int = 1024
     """gaits that travel"""
     seed: int = 0
@@ -57,7 +58,7 @@ class Args:
 def partial_rank_correlation(one: Floats, other: Floats, given: Floats) -> float:
     """Return the correlation of the ranks of two figures, shape (n,), without what the ranks of a third one
     explain of each."""
-    ranks = [np.argsort(np.argsort(values)).astype(float) for values in (one, other, given)]
+    ranks = [rankdata(values) for values in (one, other, given)]
     known = np.column_stack([np.ones(len(given)), ranks[2]])
     rest = [values - known @ np.linalg.lstsq(known, values, rcond=None)[0] for values in ranks[:2]]
     return float(np.corrcoef(*rest)[0, 1])
@@ -68,9 +69,11 @@ def travelling_gaits(env_id: str, count: int, seed: int, sliding: float = SLIDIN
     their episodes.
 
     Raises:
-        ParameterError: hardly any gait of the id travels.
+        ParameterError: the task has no gait of its own to start in, or hardly any gait travels.
     """
     env: Any = make_env(env_id).unwrapped
+    if "gait" not in getattr(getattr(env, "task", None), "start", ()):
+        raise ParameterError(f"env_id: expected an id whose task starts in a gait of its own, got {env_id}")
     envs: Any = make_rows(env_id, ROWS)
     family = family_of(env, "phase", 2)._replace(clock=False)
     best = open_loop_record(gait_file(env_id, "constant"))["parameters"]
@@ -110,6 +113,7 @@ def main(argv: list[str] | None = None) -> None:
     """Print the correlations."""
     args = parse(Args, argv, "python -m agents.order", __doc__)
     check_number("gaits", args.gaits, low=16, high=1e6)
+    check_number("seed", args.seed, low=0)
     for name, value in correlations(travelling_gaits(args.env_id, args.gaits, args.seed)).items():
         print(f"{name:20} {value:6.2f}")
 

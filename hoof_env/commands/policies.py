@@ -77,8 +77,10 @@ def list_ids(env_id: str | None = None) -> None:
     """
     from hoof_env.policies.catalogue import good_returns, summaries
     from hoof_env.policies.find import names_of, shipped_policy
+    from hoof_env.tasks.registry import TASKS
 
     known = summaries()
+    costly = {task.id for task in TASKS.values() if task.defaults.get("cost")}
     if env_id is not None and env_id not in known:
         raise ParameterError(f"env_id: expected one of {', '.join(known)}, got {brief(env_id)}")
     for name in known if env_id is None else [env_id]:
@@ -86,6 +88,8 @@ def list_ids(env_id: str | None = None) -> None:
         sizes = f"{ships.action_space.shape[0]} actions, {ships.observation_space.shape[0]} observations"
         say(f"{name}: {known[name]}")
         say(f"    {sizes}; mean returns: {good_returns(name.removeprefix('hoof_env/'))}")
+        if name in costly:
+            say(f"    a return is nothing without its cost: hoof-env evaluate shipped zero --env-id {name}")
     if env_id is None:
         installed = [extra for extra, module in EXTRAS.items() if find_spec(module)]
         missing = [extra for extra in EXTRAS if extra not in installed]

@@ -313,13 +313,21 @@ class EpisodeBatch:
         return self._start(which, generators, options)
 
     def _checked_start(self) -> dict[str, Any]:
-        """Return the task's own reset options, in the form that `_start` takes.
+        """Return the task's own reset options, in the form that `_start` takes, but for those that a setting
+        replaces: a gait, or a kind of trunk that keeps its height or stands still.
 
         Raises:
             ParameterError: an option that this body, trunk or leg cannot have.
         """
+        settings, start = self.plan.asked, dict(self.task.start)
+        if settings.gait is not None:
+            start.pop("gait", None)
+        if settings.trunk != self.task.settings({}).trunk:
+            held = {"fixed": ("height", "speed"), "rail": ("height",)}
+            for name in held.get(settings.trunk, ()):
+                start.pop(name, None)
         try:
-            return self._check_options(self.task.start)
+            return self._check_options(start)
         except ParameterError as error:
             raise ParameterError(f"{self.task.id}: start: {error}") from None
 

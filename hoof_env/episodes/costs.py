@@ -87,7 +87,8 @@ class Costs:
         if "leaning" in given and s.trunk not in LEANING:
             raise ParameterError(
                 f"cost['leaning']: expected a trunk that is {' or '.join(LEANING)}, got a {s.trunk} one, of"
-                f" which {'no weight is borne' if s.trunk == 'fixed' else 'the legs bear all weight'}"
+                f" which {'no weight is borne' if s.trunk == 'fixed' else 'the legs bear all weight'}; pass"
+                f" cost={ {name: limit for name, limit in given.items() if name != 'leaning'} }"
             )
         highest = {"leaning": 1.0}
         limits = {

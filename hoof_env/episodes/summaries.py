@@ -112,6 +112,7 @@ def summaries_of(batch: EpisodeBatch, envs: Sequence[int] | NDArray[np.int64]) -
     steps = np.rint(seconds / batch.plan.dt)
     cost = np.full(len(work), np.inf)
     np.divide(work, weight * distance, out=cost, where=distance > 0)
+    costs = dict(zip(batch.plan.costs.keys, batch.rows.cost_sums[:, envs], strict=True))
     return {
         # Rounded, because the sum of the steps of ten seconds is 9.99...
         "seconds": np.array([round(count * batch.plan.dt, 12) for count in steps]),
@@ -130,7 +131,7 @@ def summaries_of(batch: EpisodeBatch, envs: Sequence[int] | NDArray[np.int64]) -
         "support_share": 1 - mean / weight,
         "failed": (batch.rows.named.ended[envs] == FAILED).astype(np.float64),
         "success": is_success(batch, envs).astype(np.float64),
-        **dict(zip(batch.plan.costs.keys, batch.rows.cost_sums[:, envs], strict=True)),
+        **({"cost": np.sum([*costs.values()], axis=0), **costs} if costs else {}),
     }
 
 

@@ -69,6 +69,7 @@ METRICS = {
     "duty_factor": Metric("duty\nfactor"),
     "cost_of_transport": Metric("cost of\ntransport"),
     "failed": Metric("failed"),
+    "cost": Metric("cost", digits=1),
     "loading_rate_n_s": Metric("loading rate\nkN/s", 1e-3, 1),
 }
 """Columns of reports: "return", figures of the episode (`hoof_env.episodes.summaries.SUMMARY`), and
@@ -149,6 +150,8 @@ def evaluate(
         find = _find_same if published else find_policy
         # All are found before the first is played.
         found = {name: find(name, env, known) for name in policies}
+        for name, policy in found.items():
+            _tell_of_own_command(name, policy, published)
         tell = _Progress(len(found) * len(seeds))
         scores = []
         for name, policy in found.items():
@@ -162,6 +165,21 @@ def evaluate(
                 raise _of_policy(name, error) from error
             scores.append(Score(name, played))
     return Evaluation(known, arguments, seeds, scores)
+
+
+def _tell_of_own_command(name: str, policy: Any, published: bool) -> None:
+    """Warn of a policy that starts with a commanded speed of its own: its episodes are not the others'.
+
+    Raises:
+        ParameterError: the episodes of the published tables are asked for.
+    """
+    speed = (getattr(policy, "start", None) or {}).get("target_speed")
+    if speed is None:
+        return
+    text = f"policy {name}: plays at its own commanded speed, {float(speed):.2f} m/s, and not at the task's"
+    if published:
+        raise ParameterError(f"{text}: expected a policy for the task's commands in the published episodes")
+    warnings.warn(f"{text}: do not compare its return with other policies'", stacklevel=3)
 
 
 def _seeds(episodes: int | None, seed: int | None, published: bool) -> range:
@@ -246,13 +264,20 @@ def published_lines(scores: Sequence[Score]) -> str:
     if len(trained) > 1:
         rows.append(Scored(f"IQM of {len(trained)}", over_seeds(trained), trained))
     titles = ["policy", "return", *(title for title, *_ in TABLE.values())]
-    return markdown_table(titles, [[row.name, row.intervals["return"].text(), *cells(row)] for row in rows])
+    lines = [[row.name, row.intervals["return"].text(), *cells(row)] for row in rows]
+    if "cost" in scores[0].estimates:
+        titles.append("cost")
+        # The mean over trained policies has none: each keeps its limit or does not
+        costs = [score.estimates["cost"].text() for score in scores]
+        for line, cost in zip(lines, [*costs, *[""] * (len(lines) - len(costs))], strict=True):
+            line.append(cost)
+    return markdown_table(titles, lines)
 
 
 def text_table(scores: Sequence[Score]) -> str:
     """Return the same figures for a terminal: a line of means for each policy, and their intervals below."""
-    columns = {"return": ("return", 1, 1.0), **TABLE, "failed": ("failed", 2, 1.0)}
-    known = [over_episodes(score.episodes) for score in scores]
+    columns = {"return": ("return", 1, 1.0), **TABLE, "failed": ("failed", 2, 1.0), "cost": ("cost", 1, 1.0)}
+    known = [{**score.estimates, **over_episodes(score.episodes)} for score in scores]
     shown = {key: column for key, column in columns.items() if key in known[0]}
     lines = [["policy", *(title for title, *_ in shown.values())]]
     for score, intervals in zip(scores, known, strict=True):

@@ -195,14 +195,16 @@ def names_of(env: gym.Env[Any, Any]) -> list[str]:
 
 
 def default_policy(env: gym.Env[Any, Any]) -> str:
-    """Return the name of the policy to play if none is named."""
+    """Return the name of the policy to play if none is named: zero actions where the task starts in a gait of
+    its own, else the horse's reference, the run, or the first gait of a preset without one."""
+    if "gait" in env.unwrapped.task.start:  # type: ignore[attr-defined]
+        return "zero"
     names = policy_names(env)
     return next((name for name in ("reference", "run") if name in names), names[0])
 
 
 def find_policy(name: str | None, env: gym.Env[Any, Any], env_id: str, seed: int = 0) -> Any:
-    """Return a policy for an environment, as `load_policy` does; None is "reference" of a horse, else "run",
-    or the first gait of a preset without one.
+    """Return a policy for an environment, as `load_policy` does; None is that of `default_policy`.
 
     Args:
         name: the policy, a text.

@@ -118,7 +118,7 @@ def draw_starts(
     `check_options`).
 
     No episode starts with a hoof inside the ground: a trunk that moves up and down starts higher instead, and
-    under any other trunk the crank angle is drawn again.
+    under any other trunk the crank angle is drawn again. A height that is a number is taken as it is.
 
     Args:
         options: checked reset options.
@@ -156,7 +156,7 @@ def draw_starts(
     # Ground as high as this touches a hoof point's sole.
     ground = ground + hoof_length
     if trunk.kind in ("suspended", "boom"):
-        if "height" not in options:
+        if not isinstance(options.get("height"), float):
             height = np.maximum(height, ground - hoof_height(profile, chosen, theta))
     elif isinstance(turn, tuple):
         # Only rows with a hoof inside the ground draw again, so that neighbours do not change a row's bits.

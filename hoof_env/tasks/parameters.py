@@ -142,7 +142,10 @@ def hoof_spring(settings: Settings) -> HoofSpring | None:
     damping = settings.hoof_damping
     if stiffness is None:
         if damping is not None:
-            raise ParameterError(f"hoof_damping: expected a hoof_stiffness with it, got {brief(damping)}")
+            raise ParameterError(
+                f"hoof_damping: expected a hoof_stiffness with it, got {brief(damping)}; a rigid hoof has"
+                " hoof_stiffness=None, hoof_damping=None and hoof_length=0"
+            )
         return None
     check_number("hoof_stiffness", stiffness, low=0, exclusive_low=True)
     length = check_number("hoof_length", settings.hoof_length, low=0, high=MAX_HOOF_LENGTH)

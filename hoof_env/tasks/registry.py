@@ -380,8 +380,8 @@ def task_of(name: Any) -> Task:
     """Find a task.
 
     Args:
-        name: name in `TASKS`, id of a registered task, or "module:id", which imports the module first if the
-            id is not registered yet.
+        name: name in `TASKS`, id of one of them or of a registered task, or "module:id", which imports the
+            module first if the id is not registered yet.
 
     Raises:
         ParameterError: there is no such task.
@@ -394,7 +394,9 @@ def task_of(name: Any) -> Task:
         except ModuleNotFoundError as error:
             raise ParameterError(f"task: {name!r} is not registered here, and {error}") from None
     tasks = {**TASKS, **_OWN}
-    return tasks[check_choice("task", env_id if module else name, tasks)]
+    keys = {task.id: key for key, task in TASKS.items()}
+    name = env_id if module else name
+    return tasks[check_choice("task", keys.get(name, name) if isinstance(name, str) else name, tasks)]
 
 
 def _task_like(name: str, names: tuple[list[str], ...]) -> Task:
@@ -467,7 +469,7 @@ def register(
 
     Args:
         env_id: "namespace/Name-v0".
-        base: name in `TASKS` or a registered id, the source of settings, terms and entries.
+        base: name in `TASKS` or an id, the source of settings, terms and entries.
         terms: reward terms, appended to the base's; a term of the same name replaces the base's.
         entries: observation entries, appended to the base's; their groups are observed by default.
         contact_law: function of penetration [m], its rate [m/s], inverse approach speed [s/m] and the
@@ -487,7 +489,10 @@ def register(
         raise ParameterError(
             f"env_id: expected 'namespace/Name-v0' of a namespace of yours, got {brief(env_id)}"
         )
-    old = task_of(base)
+    try:
+        old = task_of(base)
+    except ParameterError as error:
+        raise ParameterError(f"{env_id}: base: {error}") from None
     _check_laws(env_id, contact_law, action_map)
     if start is not None and not isinstance(start, Mapping):
         raise ParameterError(f"{env_id}: start: expected a mapping of reset options, got {brief(start)}")
