@@ -22,7 +22,7 @@ from agents.judge_pictures import COLOURS, DPI, LETTERS, WIDTH, ranges_of
 from hoof_env import records
 from hoof_env.constants import GRAVITY
 from hoof_env.dynamics.memory import LIFT_OFF
-from hoof_env.errors import check_number
+from hoof_env.errors import ParameterError, brief, check_choice, check_number
 from hoof_env.film import check_film, write_film
 from hoof_env.policies.find import find_policy
 from hoof_env.record.instant import instants
@@ -35,6 +35,8 @@ OUT = Path(__file__).parents[1] / "docs" / "images"
 HEIGHT = 640
 SCENE = (500, 350)
 """Height of the film, and width and height of the animal in it [pixels]."""
+KINDS = ("walk", "trot")
+"""Gaits of living horses whose forces are drawn."""
 FPS = 10.0
 SLOW = 2.0  # times slower than the horse
 STRIDES = 2  # that are filmed
@@ -89,6 +91,10 @@ def play(name: str, size: float, seed: int) -> Filmed:
     """Play a policy and keep `STRIDES` of its strides, once it is settled."""
     with records.make_env(ENV_ID, {"size": size}) as env:
         policy = find_policy(name, env, ENV_ID)
+        if "gait" not in getattr(policy, "start", ()):
+            raise ParameterError(
+                f"--policies: expected policies that play one gait, as kinematic-walk, got {brief(name)}"
+            )
         inner: Any = env.unwrapped
         here = records.surroundings(env)
         rate = HorseGait.from_array(inner.body.reference(np.ones(1), policy.start["gait"])[0]).rate
@@ -230,6 +236,13 @@ def main(argv: list[str] | None = None) -> None:
     """Film gaits."""
     args = parse(Args, argv, "python -m agents.horse_film", __doc__)
     check_number("--size", args.size, low=0, exclusive_low=True)
+    if not args.policies or len(args.policies) != len(args.kinds):
+        raise ParameterError(
+            f"--kinds: expected one of {', '.join(KINDS)} for each policy, got {len(args.kinds)} for"
+            f" {len(args.policies)}"
+        )
+    for kind in args.kinds:
+        check_choice("--kinds", kind, KINDS)
     for name, kind in zip(args.policies, args.kinds, strict=True):
         path = args.out / f"{name}.gif"
         check_film(path, FPS)

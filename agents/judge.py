@@ -245,7 +245,12 @@ def _reported(judges: dict[str, Any], standing: list[dict[str, Any]]) -> Iterato
         else:
             counting = [trot for trot in trots_of(standing) if not rejection_reason(trot, PAIRS)]
             first = min(counting, key=lambda trot: float(trot["froude_reached"]), default=None)
-            gait = Gait(first, "" if first else "there is no trot-like gait that counts")
+            if first is None:
+                gait = Gait(None, "there is no trot-like gait that counts")
+            elif first is min(standing, key=lambda one: float(one["froude_reached"])):
+                gait = Gait(None, "no slower gait was played, from which it would change")
+            else:
+                gait = Gait(first)
             yield judged(name, gait, "froude_reached", judge, [])
 
 

@@ -25,7 +25,7 @@ from agents.judges import searched_bars
 from agents.kinematic_gaits import peaked
 from hoof_env._output import markdown_table
 from hoof_env.envs.policies import make_policy
-from hoof_env.errors import count, parse_json
+from hoof_env.errors import DataFileError, count, parse_json
 from hoof_env.evaluation.episodes import make_rows
 from hoof_env.tasks.horse_gaits import horse_gaits, kinematic_phases, kinematic_speeds
 
@@ -110,6 +110,20 @@ class Args:
     """starts of each gait"""
     out: Path = EVIDENCE
     """folder of the page"""
+
+
+def read_searches(path: Path) -> dict[str, Figures]:
+    """Return the searches in a file of `agents.kinematic_gaits`, by name.
+
+    Raises:
+        DataFileError: there is no such file, or it has another content.
+    """
+    try:
+        searches: dict[str, Figures] = parse_json(path.read_text(encoding="utf-8"))["searches"]
+        search_rows(searches)
+    except (OSError, ValueError, KeyError, TypeError) as error:
+        raise DataFileError(f"{path}: expected searches of agents.kinematic_gaits: {error!r}") from None
+    return searches
 
 
 def from_any_phase(envs: Any) -> list[Figures]:
@@ -235,7 +249,7 @@ def write(args: Args) -> None:
     episodes = count("--episodes", args.episodes)
     searches: dict[str, Figures] = {}
     for path in args.searches:
-        searches |= parse_json(path.read_text(encoding="utf-8"))["searches"]
+        searches |= read_searches(path)
     envs = make_rows(ENV_ID, episodes)
     families = played(envs)
     loose = {"from any phase": from_any_phase(envs)}
@@ -295,14 +309,14 @@ the walk by force."""
 
 NOT_A_HORSE = {
     "walk": "a hind leg lies nearly flat behind the animal in its swing, because the linkage folds backward. "
-    "Hooves go 0.05 to 0.1 m into the ground, as their springs give, where a horse's fetlock sinks. The fore "
-    "legs bear two thirds of the weight. Horizontal forces change their sign several times a stance, where a "
-    "horse's hoof brakes once and then propels, and the force on a hind hoof has a plateau in place of two "
-    "peaks. Neck and head do not move.",
-    "trot": "hooves go 0.09 to 0.15 m into the ground, and a hind leg lies flat behind the animal in its "
-    "swing. Within a stance a hoof first propels and then brakes, the reverse of a horse, and on balance "
-    "fore legs propel and hind legs brake, the reverse, too. The fore legs bear two thirds of the weight. "
-    "Neck and head do not move.",
+    "Hooves go into the ground ([how deep](#falls-slip-and-depth)), as their springs give, where a horse's "
+    "fetlock sinks. The fore legs bear two thirds of the weight. Horizontal forces change their sign several "
+    "times a stance, where a horse's hoof brakes once and then propels, and the force on a hind hoof has a "
+    "plateau in place of two peaks. Neck and head do not move.",
+    "trot": "hooves go into the ground, and a hind leg lies flat behind the animal in its swing. Within a "
+    "stance a hoof first propels and then brakes, the reverse of a horse, and on balance fore legs propel "
+    "and hind legs brake, the reverse, too. The fore legs bear two thirds of the weight. Neck and head do "
+    "not move.",
 }
 """What the films show that is not a horse's, by gait."""
 
