@@ -107,6 +107,7 @@ def write(args: Args) -> Path:
     if folder.exists():
         raise OutputError(f"{folder}: expected no dataset there; choose another --dataset-id or --out")
     try:
+        import h5py  # noqa: F401  # with which Minari writes
         import minari
         import minari.data_collector  # which asks for more than reading does
     except ImportError:

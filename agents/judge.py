@@ -60,10 +60,11 @@ WALK = (
     "duty_hind",
     "two_peaked_fore",
     "stride_over_hip",
+    "two_peaked_hind",
     "peak_fore",
     "peak_hind",
 )
-"""Figures by which a walk is judged, of which the first five are searched with."""
+"""Figures by which a walk is judged."""
 
 
 @dataclass

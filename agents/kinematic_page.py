@@ -13,6 +13,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 from tyro.conf import Positional
 
 from agents import runs
@@ -100,6 +101,10 @@ FILMS = """Walk: {walk}
 Trot: {trot}"""
 
 
+BY_WORK = "walk by work"
+"""Name of the walk that shipped first."""
+
+
 @dataclass(frozen=True)
 class Args:
     """Arguments of the command."""
@@ -146,8 +151,17 @@ def played(envs: Any) -> dict[str, list[Figures]]:
             play(envs, make_policy(name, envs), speed) | {"searched": True, "name": name}
             for name, speed in kinematic_speeds().items()
         ],
+        BY_WORK: [earlier_walk(envs)],
     }
     return found
+
+
+def earlier_walk(envs: Any) -> Figures:
+    """Return the figures of the walk that shipped before, which was searched by work."""
+    stored = parse_json((EVIDENCE / NAME / "earlier.json").read_text(encoding="utf-8"))["kinematic-walk"]
+    zero = make_policy("reference", envs)
+    figures = play(envs, zero, stored["speed"], np.array(stored["gait"]))
+    return figures | {"searched": True, "name": BY_WORK}
 
 
 def judged_rows(families: Mapping[str, Sequence[Figures]]) -> list[list[str]]:
@@ -240,7 +254,7 @@ def summary(rows: Sequence[Sequence[str]], figures: Sequence[Figures], episodes:
         f"Of the rows that judge them {len(met)} are met: {', '.join(met) or 'none'}; "
         f"{len(missed)} are missed, by the distance from the nearest end of the bar: "
         f"{', '.join(missed) or 'none'}. The hind peak of a walk is derived and the length of its stride an "
-        "estimate: no print was found of either."
+        "estimate: no published value was found of either."
     )
 
 
@@ -299,6 +313,11 @@ python -m agents.kinematic_gaits --gaits walk --froude 0.2 --first 100 --more 40
 python -m agents.kinematic_gaits --gaits trot --froude 0.93 --criterion work --starts 14 --fall 400 \\
     --spread 0.015 --more 150 --begin docs/evidence/horse_gaits/begin.json
 ```
+
+**The criterion of the walk was not chosen blindly.** A walk by work (`walk by work` in the tables,
+[its numbers](horse_gaits/earlier.json)) shipped first. After its peaks had been seen to be above a horse's
+ranges the criterion was changed to the forces on the hooves, which lowers peaks: that the hind peak of the
+walk is inside its range is partly the result of this choice.
 
 The search for the walk measured the lag by the angles of the cranks at landings, as of commit bc2ec6e5, and
 later ones measure it by the times of landings. The named gait of the trot is the end of earlier searches by

@@ -19,6 +19,9 @@ from hoof_env.constants import GRAVITY
 from hoof_env.envs.open_loop import gait_file, open_loop_record
 from hoof_env.errors import DataFileError, parse_json
 from hoof_env.evaluation.episodes import FINAL_SEEDS, make_rows, score_vector
+from hoof_env.policies.actor import Actor
+from hoof_env.policies.find import find_policy
+from hoof_env.tasks.registry import task_of
 
 PUBLISHED = Path(__file__).parents[2] / "docs" / "evidence"
 """Folder of the page and its figures."""
@@ -72,6 +75,26 @@ def figures_of(episodes: Sequence[Mapping[str, Any]]) -> dict[str, float]:
     return {name: float(column[np.isfinite(column)].mean()) for name, column in columns.items()}
 
 
+def greatest_deflections(name: str) -> dict[str, float]:
+    """Return how far the hoof's springs give at most in an episode of a stored policy, at the ends of control
+    steps [m]: the median over episodes, and the largest."""
+    envs: Any = make_rows(ID, len(FINAL_SEEDS))
+    with runs.make_env(ID) as env:
+        actor = Actor(find_policy(name, env, ID))
+    actor.begin(envs.num_envs)
+    observation, _ = envs.reset(seed=list(FINAL_SEEDS), options=actor.start)
+    going = np.ones(envs.num_envs, bool)
+    deepest = np.zeros(envs.num_envs)
+    while going.any():
+        observation, _, terminated, truncated, infos = envs.step(actor.act(observation))
+        going &= ~(terminated | truncated)
+        for part in ("toe", "heel"):
+            deflection = infos["measured"][f"{part}_deflection_normal"]
+            deepest = np.where(going, np.maximum(deepest, deflection), deepest)
+        actor.restart(terminated | truncated)
+    return {"median": float(np.median(deepest)), "largest": float(deepest.max())}
+
+
 def key_of(entry: Entry) -> str:
     """Return the key of an entry in `NAMES`."""
     return " ".join(filter(None, (entry.algo, entry.variant)))
@@ -114,6 +137,7 @@ def publish(plan: Sequence[Entry], folder: Path, out: Path) -> dict[str, Any]:
         "weight_n": weight,
         "learners": learners,
         "gaits": {name: rounded(figures_of(score_vector(name, ID, FINAL_SEEDS))) for name in GAITS},
+        "deflections": {name: rounded(greatest_deflections(name)) for name in GAITS},
         "order": {name: orders(sliding) for name, sliding in CONDITIONS.items()},
         "search": searched(),
         "commit": runs.versions().get("commit", ""),
@@ -237,6 +261,12 @@ def passed(data: Mapping[str, Any], key: str) -> str:
     )
 
 
+def deflection_text(data: Mapping[str, Any]) -> str:
+    """Write how far springs give."""
+    each = data["deflections"].items()
+    return ", ".join(f"{GAITS[name]} {one['median']:.2f} ({one['largest']:.2f})" for name, one in each)
+
+
 def searches(data: Mapping[str, Any]) -> str:
     """Write what the searches spent."""
     return "\n".join(
@@ -272,6 +302,11 @@ A horse's fore limb bears 1.3 to 1.4 weights at a gallop, 12.8 to 14 N/kg (McGui
 has three more legs: this one bears everything alone, so that over a stance it bears the weight divided by the
 duty factor. A half sine of duty factor 0.5 peaks at pi weights.
 
+The springs between the leg's hoof points and the soles are {length:g} m long, and have no stop. Median over
+episodes of how far they give at most, and the largest of all, in m: {deflections}. A galloping horse's distal
+limb shortens by 0.127 m under 12.8 N/kg, half the load of this one leg. Where a spring gives by more than its
+length, the leg's point is below the sole, which pictures show as a hoof in the ground.
+
 ## Which gaits the reward prefers
 
 Partial rank correlations of the return with figures of a gait, at given speed: {gaits:,} gaits that last and
@@ -304,6 +339,8 @@ def write(out: Path, data: Mapping[str, Any]) -> Path:
         sliding=order.SLIDING,
         draws=len(SEEDS),
         order=order_table(data),
+        length=task_of("hop").defaults["hoof_length"],
+        deflections=deflection_text(data),
     )
     runs.write_text(out / PAGE_FILE, text)
     return out / PAGE_FILE
