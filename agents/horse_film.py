@@ -52,7 +52,7 @@ class Args:
     kinds: tuple[str, ...] = ("walk", "trot")
     """gait of living horses with which each is compared: walk or trot"""
     size: float = 1.0
-    """length of the animal relative to that of a horse of 475 kg"""
+    """length of the animal relative to a horse of 475 kg"""
     seed: int = 0
     """of the episode"""
     out: Path = OUT

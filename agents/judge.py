@@ -11,7 +11,7 @@ Rows that are marked `searched` there are given to the search for kinematic gait
 For such a gait, and for an agent trained around it, these rows are printed as searched, inside or outside of
 the bar, and never count as met: the other rows judge it. For any other policy all rows judge.
 
-A horse's figure at a Froude number is compared with that of the gait at the nearest speed. Ours counts only
+A horse's figure at a Froude number is compared with the gait at the nearest speed. Ours counts only
 if the policy falls in a tenth of the episodes at most and keeps the commanded speed to 15 %, the hooves slip
 less than 0.10 m a stance and land 0.95 to 1.05 times a turn of their crank, and the Froude number of the
 speed that was reached is within 0.1 of the horse's. The last does not hold for the peaks of a trot: they are

@@ -54,7 +54,7 @@ def kind_of(gait: dict[str, Any]) -> str:
 
 
 def panels(shown: list[dict[str, Any]], rows: int, height: float, **shared: Any) -> tuple[Any, list[Any]]:
-    """Return a figure and the axes of each gait, shape (rows,); `height` is that of a row [inches]."""
+    """Return a figure and the axes of each gait, shape (rows,); `height` is a row's [inches]."""
     from matplotlib.figure import Figure
 
     blocks = -(-len(shown) // ABREAST)

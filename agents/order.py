@@ -3,10 +3,10 @@
     python -m agents.order                                    1,024 gaits of hoof_env/HorseLegHop-v0
 
 Gaits are drawn about the gait in which an episode starts and the best constant gait of the id, with
-harmonics of the crank angle. A gait counts that lasts, travels at half a metre a second or more, and slides
-for less than a tenth of its way: another one does not travel on its hoof. Of two gaits of the same speed a
-biomechanist prefers the smaller peak of a stance and the slower rise of its force: partial rank correlations
-of the return with them, at given speed, should be well below 0.
+harmonics of the crank angle. A gait counts if it lasts, travels at half a metre a second or more, and slides
+for less than a tenth of the distance, so that it travels on its hoof. Of two gaits of the same speed a
+biomechanist prefers the one with the smaller peak and the slower rise of the force: the partial rank
+correlations of the return with both, at given speed, should be well below 0.
 """
 
 from __future__ import annotations

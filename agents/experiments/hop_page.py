@@ -66,7 +66,7 @@ SEEDS = (0, 1, 2)
 GAITS_OF_A_DRAW = 1024
 
 CONDITIONS = {"that hardly slide": order.SLIDING, "of any slip": math.inf}
-"""Largest share of the way for which gaits slide whose order is measured, by name."""
+"""Largest slip over distance of the gaits in a draw, by name of the condition."""
 
 
 def figures_of(episodes: Sequence[Mapping[str, Any]]) -> dict[str, float]:
@@ -316,7 +316,7 @@ lowest and the highest.
 
 {order}
 
-Gaits that slide have small peaks and pay for slip instead, so that slip decides among all gaits.
+Gaits that slide have small peaks and pay for slip instead.
 """
 
 

@@ -204,7 +204,7 @@ def default_policy(env: gym.Env[Any, Any]) -> str:
 
 
 def find_policy(name: str | None, env: gym.Env[Any, Any], env_id: str, seed: int = 0) -> Any:
-    """Return a policy for an environment, as `load_policy` does; None is that of `default_policy`.
+    """Return a policy for an environment, as `load_policy` does; None is `default_policy`'s.
 
     Args:
         name: the policy, a text.

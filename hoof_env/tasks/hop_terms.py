@@ -54,7 +54,7 @@ SCALES = {
         "tanh(x / (300 weights / s))", lambda x, scene: x / (300.0 * scene.episode.weight), True
     ),
 }
-"""Scales that differ from those of other ids, by entry."""
+"""Scales that differ from other ids', by entry."""
 
 HOP_ENTRIES = tuple(
     replace(entry, scale=SCALES.get(entry.name, entry.scale))

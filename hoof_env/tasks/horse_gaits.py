@@ -180,8 +180,8 @@ def kinematic_speeds() -> dict[str, float]:
 
 
 def kinematic_phases() -> dict[str, float]:
-    """Return the phases of the stride [strides] at which kinematic gaits start, of those that do not start at
-    any: a trunk that begins level and at rest drops too far in some."""
+    """Return the phase [strides] at which a kinematic gait starts, by name, for gaits that cannot start at
+    every phase: a trunk that starts level and at rest drops too far at some."""
     return {name: float(found["phase"]) for name, found in _data("kinematic").items() if "phase" in found}
 
 
