@@ -6,8 +6,8 @@ Stable-Baselines3's PPO with a multiplier m >= 0 for `info["cost"]`. Before each
 
     m <- max(0, m + step of Adam along (J_C - d)),
 
-with J_C the mean cost of the last episodes, one of each environment, and d the limit. The policy follows the
-advantages
+with J_C the mean cost of the last n episodes that ended, of n environments, and d the limit. The policy
+follows the advantages
 
     (A - m A_C) / (1 + m)
 

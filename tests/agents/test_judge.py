@@ -469,3 +469,10 @@ def test_pictures_have_the_figures_of_the_judges(tmp_path, monkeypatch):
     lag, duty, _ = judge_pictures.speeds({"one": [{**TROT, "transport": 1.0}]}).axes
     points = {(line.get_label(), *line.get_xydata()[0]) for panel in (lag, duty) for line in panel.lines}
     assert {("horses, walk", 0.2, 0.21), ("horses, walk", 0.2, 0.7)} <= points
+
+
+def test_pooled_figures_of_a_searched_gait_do_not_count_as_met():
+    walk = dict.fromkeys(judge.SHOWN, 1.0) | figures(searched=True)
+    found = verdicts_of(*judge.pool([[walk], [walk]]))
+    assert found["walk: lag"] == found["walk: duty_fore"] == "searched, inside"
+    assert found["walk: peak_fore"] == "met"

@@ -44,6 +44,11 @@ def test_pictures_and_records_have_the_soles():
     assert record["toe_y"].min() > -0.02
 
 
+def test_a_leg_that_bears_all_does_not_observe_its_share():
+    names = gym.make("hoof_env/HorseLeg-v0", observation=("context",), **BOOM).unwrapped.observation_names
+    assert names == ("stiffness of the ground", "friction", "weight")
+
+
 @pytest.mark.parametrize(
     ("env_id", "kwargs", "message"),
     [

@@ -374,3 +374,21 @@ def test_a_state_with_other_costs_is_refused():
             env.set_state({**state, "cost_sums": bad})
     with pytest.raises(ParameterError, match=r"cost: .*peak"):
         gym.make(LEG).unwrapped.set_state(state)
+
+
+def test_a_force_at_its_limit_is_no_violation():
+    env = gym.make(LEG, cost={"excess": 0.0})
+    forces = [info["cost_excess"] for info in played(env, 60)]
+    k = int(np.argmax(forces))
+    again = gym.make(LEG, cost={"indicator": forces[k]})
+    assert forces[k] > 0.0
+    assert played(again, 60)[k]["cost_indicator"] == 0.0
+    below = gym.make(LEG, cost={"indicator": np.nextafter(forces[k], 0.0)})
+    assert played(below, 60)[k]["cost_indicator"] == 1.0
+
+
+def test_summaries_have_the_sum_of_all_costs():
+    env = gym.make(LEG, cost=LIMITS, episode_seconds=1.0)
+    infos = played(env)
+    summary = env.unwrapped.episode_summary()
+    assert summary["cost"] == pytest.approx(sum(info["cost"] for info in infos), rel=1e-12)

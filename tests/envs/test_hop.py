@@ -116,3 +116,44 @@ def test_soles_sink_by_less_than_2_cm_and_no_start_is_in_the_ground():
         deepest = max(deepest, depth.max())
         assert step or depth.max() < 0.0
     assert 0.005 < deepest < 0.02
+
+
+def test_nothing_resists_the_motion_of_the_trunk_but_the_ground():
+    """In the air the speed is constant, and on the ground momentum changes by the friction alone."""
+    env = gym.make(ID, sim_dt=2.5e-4).unwrapped
+    env.reset(seed=1, options={"speed": 3.0})
+    env.record()
+    env.reset(seed=1, options={"speed": 3.0})
+    momentum, impulse = env.engine.state["momentum_x"][0], 0.0
+    for _ in range(25):
+        env.step(np.zeros(4, np.float32))
+        record = env.record()
+        force = (record["toe_friction"] + record["heel_friction"])[:, 0, 0]
+        impulse += np.sum((force[1:] + force[:-1]) / 2 * np.diff(record["time"][:, 0]))
+    gained = env.engine.state["momentum_x"][0] - momentum
+    assert abs(impulse) > 1.0  # it has landed
+    assert gained == pytest.approx(impulse, rel=0.02)  # a drag of HorseLeg's would take a quarter
+
+
+@pytest.mark.parametrize(
+    ("kwargs", "least"), [({}, 0.0), ({"preset": "fourbar"}, -0.01), ({"hoof_length": 0.6}, -0.01)]
+)
+def test_no_drawn_start_has_its_sole_in_the_ground(kwargs, least):
+    env = gym.make(ID, **kwargs).unwrapped
+    for seed in range(8):
+        info = env.reset(seed=seed)[1]
+        soles = min(info["measured"][f"{point}_y"] for point in ("toe", "heel")) - env.settings.hoof_length
+        assert soles >= least
+
+
+def test_a_gait_that_is_set_beats_the_gait_of_the_task():
+    env = gym.make(ID, gait="run")
+    run = env.unwrapped.gaits["run"].to_array()
+    np.testing.assert_array_equal(env.reset(seed=0)[1]["gait"], run)
+    assert not np.array_equal(gym.make(ID).reset(seed=0)[1]["gait"], run)
+
+
+@pytest.mark.parametrize("trunk", ["rail", "fixed"])
+def test_a_trunk_that_keeps_its_height_starts_there(trunk):
+    env = gym.make(ID, trunk=trunk)
+    assert env.reset(seed=0)[1]["height"] == env.unwrapped.engine.trunk.height

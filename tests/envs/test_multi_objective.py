@@ -48,6 +48,14 @@ def test_a_new_term_goes_to_its_objective_and_one_without_to_all():
         Term("own", 1.0, "1", "own", lambda step, weight: weight, objective="joy")
 
 
+def test_a_cost_is_part_of_no_objective():
+    cost = Term("own", 1.0, "1", "own", lambda step, weight: weight, is_cost=True)
+    info = {**TERMS, "reward_failure": 0.0}
+    np.testing.assert_array_equal(
+        vector_reward({**info, cost.key: 5.0}, (*REWARD, cost)), vector_reward(info, REWARD)
+    )
+
+
 @pytest.mark.parametrize("weights", [(1, 0, 0), (0, 1, 0), (0, 0, 1), (0.2, 0.3, 0.5)])
 def test_a_fall_costs_every_preference_the_same(weights):
     fell, stood = (vector_reward({**TERMS, "reward_failure": failure}) for failure in (-700.0, 0.0))
