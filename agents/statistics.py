@@ -10,6 +10,9 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 
+import numpy as np
+from numpy.typing import ArrayLike
+
 from hoof_env._output import markdown_table
 from hoof_env.evaluation.statistics import TABLE, Scored, cells, estimate
 
@@ -23,6 +26,13 @@ def described(values: Sequence[float]) -> dict[str, float]:
     found = estimate(values)
     has_interval = math.isfinite(found.low) and found.low < found.high
     return {"mean": found.mean, **({"low": found.low, "high": found.high} if has_interval else {})}
+
+
+def spread(values: ArrayLike, digits: int, factor: float = 1.0) -> str:
+    """Write the mean of values over trainings, times a factor, and in brackets their lowest and highest."""
+    scaled = factor * np.asarray(values, np.float64)
+    mean, low, high = (f"{x:.{digits}f}" for x in (scaled.mean(), scaled.min(), scaled.max()))
+    return f"{mean} ({low} to {high})" if len(scaled) > 1 else mean
 
 
 def dominates(figures: Mapping[str, float], run: Mapping[str, float]) -> bool:

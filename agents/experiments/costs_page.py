@@ -15,6 +15,7 @@ from agents import runs
 from agents.experiments.outcomes import is_done, read_outcome
 from agents.experiments.plans import Entry, Run
 from agents.runs import SavedModel, TrainedPolicy
+from agents.statistics import spread
 from hoof_env._output import markdown_table
 from hoof_env.errors import DataFileError, ParameterError
 from hoof_env.evaluation.episodes import FINAL_SEEDS, score_vector
@@ -175,12 +176,6 @@ def row_of(key: tuple[str, str, str], figures: dict[str, Any]) -> dict[str, str]
 def of(rows: Sequence[dict[str, str]], name: str) -> Any:
     """Return a figure of some rows."""
     return np.array([float(row[name]) for row in rows])
-
-
-def spread(values: Any, digits: int, factor: float = 1.0) -> str:
-    """Write a mean and the extremes over trainings."""
-    mean, low, high = (f"{factor * x:.{digits}f}" for x in (values.mean(), values.min(), values.max()))
-    return f"{mean} ({low} to {high})" if len(values) > 1 else mean
 
 
 def table(rows: Sequence[dict[str, str]]) -> str:

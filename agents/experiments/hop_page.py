@@ -14,6 +14,7 @@ import numpy as np
 from agents import order, runs
 from agents.experiments.outcomes import is_done, read_outcome
 from agents.experiments.plans import Entry, Run
+from agents.statistics import spread
 from hoof_env._output import markdown_table
 from hoof_env.constants import GRAVITY
 from hoof_env.envs.open_loop import gait_file, open_loop_record
@@ -166,14 +167,6 @@ def searched() -> list[dict[str, Any]]:
         {name: one[name] for name in names} | {"return": round(one["mean"]["return"], 2)}
         for one in record["restarts"]
     ]
-
-
-def spread(values: Sequence[float], digits: int) -> str:
-    """Write a mean, and the extremes over trainings."""
-    mean = f"{np.mean(values):.{digits}f}"
-    if len(values) == 1:
-        return mean
-    return f"{mean} ({min(values):.{digits}f} to {max(values):.{digits}f})"
 
 
 def line_of(title: str, seeds: Sequence[Mapping[str, float]], data: Mapping[str, Any]) -> list[str]:
