@@ -30,9 +30,9 @@ def described(values: Sequence[float]) -> dict[str, float]:
 
 def spread(values: ArrayLike, digits: int, factor: float = 1.0) -> str:
     """Write the mean of values over trainings, times a factor, and in brackets their lowest and highest."""
-    scaled = factor * np.asarray(values, np.float64)
-    mean, low, high = (f"{x:.{digits}f}" for x in (scaled.mean(), scaled.min(), scaled.max()))
-    return f"{mean} ({low} to {high})" if len(scaled) > 1 else mean
+    each = np.asarray(values, np.float64)
+    mean, low, high = (f"{factor * x:.{digits}f}" for x in (each.mean(), each.min(), each.max()))
+    return f"{mean} ({low} to {high})" if len(each) > 1 else mean
 
 
 def dominates(figures: Mapping[str, float], run: Mapping[str, float]) -> bool:
