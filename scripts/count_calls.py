@@ -13,7 +13,6 @@ from pathlib import Path
 from typing import Any
 
 PACKAGE = str(Path(__file__).parents[1] / "hoof_env")
-TRACED = ("simd",)
 
 
 def called(act: Callable[[], Any]) -> tuple[Any, set[tuple[str, str]]]:
