@@ -21,7 +21,9 @@ NUMBER = r"-?\d+\.\d+"
 @pytest.mark.parametrize(
     ("name", "arguments", "last"),
     [
-        ("jax_ppo", ("--steps", "20480"), rf" 20,480 steps, .* return +{NUMBER}"),
+        pytest.param(
+            "jax_ppo", ("--steps", "20480"), rf" 20,480 steps, .* return +{NUMBER}", marks=pytest.mark.smoke
+        ),
         ("jax_shac", ("--steps", "800"), rf" 800 steps, .* reward +{NUMBER}"),
         ("jax_gait", ("--steps", "800"), rf"(\[+( *{NUMBER}\.?){{4}}\]+\s*)+"),
         ("jax_gradient", ("--starts", "2"), rf"\| 2 \| {NUMBER} \| .* \|"),

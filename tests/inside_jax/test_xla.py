@@ -74,7 +74,7 @@ def check_same(envs, actions, states):
 @pytest.mark.parametrize(
     ("id", "count", "settings"),
     [
-        ("HorseLeg", 9, {"episode_seconds": 0.5}),
+        pytest.param("HorseLeg", 9, {"episode_seconds": 0.5}, marks=pytest.mark.smoke),
         ("HorseLegSpeed", 3, {"episode_seconds": 0.5, "target_seconds": 0.2}),
         ("HorseLeg", 3, {"push_seconds": 0.2, "push_impulse": 40.0, "episode_seconds": 0.5}),
         ("HorseLegTerrain", 3, {"episode_seconds": 0.4}),
