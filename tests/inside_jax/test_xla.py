@@ -236,6 +236,22 @@ def test_a_handle_is_used_once():
     step(envs.xla()[0], zeros(envs))
 
 
+def test_what_is_no_handle_is_refused_and_not_followed():
+    """Zeros in its place, as templates of a learner's state have them; a part of one; another type."""
+    envs = make()
+    envs.reset(seed=0)
+    handle, recv, send, step = envs.xla()
+    words = r"expected the one that envs\.xla\(\) or the last call returned"
+    actions = zeros(envs)
+    for function in (recv, lambda x: send(x, actions), lambda x: step(x, actions)):
+        fails(words + ".* zeros in its place", jax.jit(function), jnp.zeros_like(handle))
+        for wrong in (handle[:8], handle.astype(np.float32), None, 7):
+            with pytest.raises(ParameterError, match=words):
+                function(wrong)
+    _, states = jax.jit(step)(handle, actions)
+    assert np.isfinite(states.observations).all()
+
+
 def test_a_handle_may_outlive_its_environments():
     """But the functions keep them alive."""
     envs, twin = make(), make()
