@@ -4,7 +4,7 @@
     python -m examples.jax_gait --steps 60000
 
 Each of the four gait parameters is a constant plus two harmonics of the crank angle: 20 numbers, which begin
-at random. Each step of Adam takes the derivative of the mean reward over half a second; episodes continue from
+at random. A step of Adam takes the derivative of the mean reward over half a second; episodes continue from
 one such window to the next. Prints the mean reward of a control step in each tenth of the steps. Compiling
 takes one to three minutes.
 """
