@@ -262,7 +262,8 @@ class XlaSteps:
                 raise ParameterError(
                     f"env_id: expected None, as all environments step together, got {env_id!r}"
                 )
-            kind = jnp.result_type(actions)
+            actions = actions if hasattr(actions, "dtype") else np.asarray(actions)
+            kind = jnp.result_type(actions) if actions.dtype != object else actions.dtype
             if jnp.shape(actions) != shape or kind.kind not in "fiuV":  # V: halves, such as bfloat16
                 raise ParameterError(
                     f"actions: expected finite numbers in [-1, 1], shape {shape}, got {kind} of shape"

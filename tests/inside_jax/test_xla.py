@@ -280,7 +280,9 @@ def test_actions_must_be_finite_and_nothing_is_advanced():
     step(envs.xla()[0], zeros(envs))
 
 
-@pytest.mark.parametrize("wrong", [np.zeros((3, 1)), np.zeros((2, 4)), np.zeros((3, 4), bool)])
+@pytest.mark.parametrize(
+    "wrong", [np.zeros((3, 1)), np.zeros((2, 4)), np.zeros((3, 4), bool), [[0.0] * 4] * 2, None]
+)
 def test_actions_of_another_shape_or_type_are_refused(wrong):
     envs = make()
     envs.reset(seed=0)
@@ -290,6 +292,8 @@ def test_actions_of_another_shape_or_type_are_refused(wrong):
             function(handle, wrong)
     with pytest.raises(ParameterError, match="env_id: expected None"):
         step(handle, zeros(envs), np.arange(3))
+    _, states = step(handle, zeros(envs).tolist())
+    assert np.isfinite(states.observations).all()
 
 
 def test_steps_before_a_reset_or_after_the_end_or_close_are_refused():
