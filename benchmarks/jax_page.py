@@ -17,6 +17,7 @@ Found = dict[str, Any]
 COLOURS = (ORANGE, BLUE, GREEN, AMBER, GREY)
 ABOUT = ("jax", "processor", "system", "date", "commit")
 RETURNS = "return", "published"
+LEGEND = {1: 2, 2: 3}  # columns of a legend by the number of plots
 OVER = {"steps": "steps", "seconds": "processor seconds"}
 
 HEAD = """\
@@ -187,7 +188,8 @@ def draw(found: Found, folder: Path) -> None:
                 axis.xaxis.set_major_locator(LogLocator(subs=(1.0, 3.0)))
                 axis.xaxis.set_major_formatter(label)
                 axis.xaxis.set_minor_formatter(NullFormatter())
-            places[0].legend(loc="lower right", fontsize=7)
+            handles, labels = places[0].get_legend_handles_labels()
+            figure.legend(handles, labels, loc="outside lower center", ncols=LEGEND[len(keys)], fontsize=7)
             save_png(figure, folder / f"{part}.png")
             plt.close(figure)
         if "derivatives" in found:
