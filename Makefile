@@ -23,7 +23,7 @@ help:
 	@echo 'make test-peers  the engine against MuJoCo and Exudyn, which it installs'
 	@echo 'make test-oldest the wheel on the oldest dependencies that pyproject.toml names, some minutes'
 	@echo 'make test-lab    force records and datasets with OpenSim, ezc3d and Minari, in an environment under .lab/'
-	@echo 'make test-jax    what runs inside jax.jit, in an environment under .jax/; ARGS="-k smoke": a minute'
+	@echo 'make test-jax    what runs inside jax.jit, in an environment under .jax/; ARGS="-m smoke": a minute'
 	@echo 'make test-ecosystem  every RL library on every id, in environments under .ecosystem/: 6 GB, one to two hours'
 	@echo 'make bench       how fast engine and environments are beside MuJoCo, Exudyn and EnvPool'
 	@echo 'make baselines   the agents of agents/plans/full.yml, hours; ARGS="--plan nightly": a small part, minutes'

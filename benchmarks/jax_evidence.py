@@ -1,12 +1,12 @@
-"""Evidence of what runs inside JAX: learners, gaits by derivatives, derivatives by windows, speed.
+"""Evidence for what runs inside JAX: learners, gaits by derivatives, derivatives through windows, speed.
 
     python -m benchmarks.jax_evidence                    measures everything: one to two hours
-    python -m benchmarks.jax_evidence --parts shac       that part anew
-    python -m benchmarks.jax_evidence --parts            the page anew, from what was measured
+    python -m benchmarks.jax_evidence --parts shac       measures that part again
+    python -m benchmarks.jax_evidence --parts            writes the page again, from what was measured
 
-Writes docs/evidence/jax.md and what is beside it in docs/evidence/jax. Needs
-`pip install "hoof-env[jax,train,plot,identify]"`. Seconds are of the processor, so that other programs on the
-machine matter little.
+Writes docs/evidence/jax.md, and the data and pictures of docs/evidence/jax. Needs
+`pip install "hoof-env[jax,train,plot,identify]"`. Seconds are processor time, on which other programs on the
+machine have little influence.
 """
 
 from __future__ import annotations
@@ -40,6 +40,7 @@ def derivatives() -> dict[str, Any]:
 
 
 PARTS: dict[str, Callable[[], Any]] = {
+    "blind": jax_learners.measure_blind,
     "shac": jax_learners.measure_shac,
     "ppo": jax_learners.measure_ppo,
     "gaits": jax_gaits.measure,

@@ -9,18 +9,24 @@ from typing import Any
 import jax
 import numpy as np
 
-from agents import runs
+from agents import results, runs
 from agents.settings import FOLDER, algorithm_class, load_settings, model_arguments
 from examples.jax_ppo import Ppo
 from examples.jax_shac import Shac
 from hoof_env.envs.policies import Scripted
 from hoof_env.evaluation.episodes import make_rows, play_rows
+from hoof_env.policies.find import find_policy
 
 ID = "hoof_env/HorseLeg-v0"
 STEPS = 102_400  # a multiple of the windows and rollouts of all learners
-SEEDS = range(5)
-SHAC_SEEDS = range(5, 10)
-"""Seeds of SHAC, whose settings were chosen by trainings with seeds 0 and 1."""
+SEEDS = {"shac": range(5, 10), "ppo": range(5)}
+"""Seeds of the trainings of each part. SHAC's settings were chosen by trainings with seeds 0 and 1."""
+
+BLIND = "zero", "constant", "open-loop"
+"""Rows of `results/` whose policies see nothing."""
+
+APART, ATTEMPTS = 0.05, 4
+"""Share by which equal seconds may differ, and how often the number of steps is chosen anew for that."""
 
 LOOKS = 10
 """Scores of a curve."""
@@ -107,12 +113,51 @@ def learn_flat(steps: int, seed: int, judge: Judge) -> Curve:
     return curve
 
 
-def measure_shac(steps: int = STEPS, seeds: Iterable[int] = SHAC_SEEDS) -> dict[str, Any]:
+def learn_flat_for(seconds: float, curves: list[Curve], seeds: Iterable[int], judge: Judge) -> list[Curve]:
+    """Return the curves of `ppo_flat` over as many steps as take the given time.
+
+    Args:
+        seconds: processor seconds that the median training is to take, within `APART` of them.
+        curves: curves of trainings of which the rate of steps is known.
+        seeds: seeds of the trainings.
+        judge: judge of policies.
+
+    Raises:
+        RuntimeError: the median of the last attempt took another time, as on a machine whose load changes.
+    """
+    taken = 0.0
+    for _ in range(ATTEMPTS):
+        rate = np.median([curve[-1]["steps"] / curve[-1]["seconds"] for curve in curves])
+        curves = [learn_flat(int(rate * seconds), seed, judge) for seed in seeds]
+        taken = float(np.median([curve[-1]["seconds"] for curve in curves]))
+        if abs(taken / seconds - 1.0) <= APART:
+            return curves
+    raise RuntimeError(f"ppo_flat took {taken:.2f} s: expected {seconds:.2f} s within {APART:.0%}")
+
+
+def measure_blind() -> dict[str, Any]:
+    """Return the mean returns of policies that see nothing in the judge's episodes, and what their rows of
+    `results/` have: returns of the published episodes, and the episodes that a search took."""
+    judge = Judge()
+    rows = {
+        kind: results.read_row(results.RESULTS / f"{ID.rpartition('/')[2]}-{kind}.json") for kind in BLIND
+    }
+    return {
+        results.KINDS[kind]: {
+            "return": judge.score(find_policy(row.policy, judge.envs, ID)),
+            "published": row.mean["return"],
+            "episodes": row.effort.get("episodes", 0),
+        }
+        for kind, row in rows.items()
+    }
+
+
+def measure_shac(steps: int = STEPS, seeds: Iterable[int] = SEEDS["shac"]) -> dict[str, Any]:
     """Return the curves of SHAC and of `ppo_flat`; see `_beside_flat`."""
     return _beside_flat("SHAC", lambda: Shac(ID).train, lambda actor: (actor["mean"], np.tanh), steps, seeds)
 
 
-def measure_ppo(steps: int = STEPS, seeds: Iterable[int] = SEEDS) -> dict[str, Any]:
+def measure_ppo(steps: int = STEPS, seeds: Iterable[int] = SEEDS["ppo"]) -> dict[str, Any]:
     """Return the curves of PPO in one program and of `ppo_flat`; see `_beside_flat`."""
 
     def trainer() -> Any:
@@ -149,14 +194,13 @@ def _beside_flat(
     train = trainer()
     next(train(steps, 0))  # the shapes of a whole training
     compiled = time.process_time() - since
+    learn_flat(2048, 0, judge)  # loads the trainer's kernels
     for seed in seeds:
         score = lambda learned: judge.score_network(*network(learned))  # noqa: E731
         note(name, seed, curve_of(train(steps, seed), steps, score))
-    learn_flat(2048, 0, judge)  # loads the trainer's kernels
-    for seed in seeds:
         note("ppo_flat, equal steps", seed, learn_flat(steps, seed, judge))
-    seconds = np.median([curve[-1]["seconds"] for curve in curves[name]])
-    rate = np.median([curve[-1]["steps"] / curve[-1]["seconds"] for curve in curves["ppo_flat, equal steps"]])
-    for seed in seeds:
-        note("ppo_flat, equal seconds", seed, learn_flat(int(rate * seconds), seed, judge))
+    seconds = float(np.median([curve[-1]["seconds"] for curve in curves[name]]))
+    of_equal_steps = curves["ppo_flat, equal steps"]
+    for seed, curve in zip(seeds, learn_flat_for(seconds, of_equal_steps, seeds, judge), strict=True):
+        note("ppo_flat, equal seconds", seed, curve)
     return {"id": ID, "steps": steps, "compiled": compiled, "curves": curves}

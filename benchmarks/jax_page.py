@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from benchmarks.jax_learners import SEEDS
 from hoof_env._output import markdown_table
 from hoof_env._plotting import AMBER, BLUE, GREEN, GREY, ORANGE, STYLE, check_matplotlib, save_png
 
@@ -15,21 +16,32 @@ Found = dict[str, Any]
 
 COLOURS = (ORANGE, BLUE, GREEN, AMBER, GREY)
 ABOUT = ("jax", "processor", "system", "date", "commit")
+RETURNS = "return", "published"
+LEGEND = {1: 2, 2: 3}  # columns of a legend by the number of plots
 OVER = {"steps": "steps", "seconds": "processor seconds"}
 
 HEAD = """\
 # Inside JAX: learners, derivatives, speed
 
-Written by `python -m benchmarks.jax_evidence`. Seconds are of the processor, without compiling; returns are
-means of 64 episodes of the compiled environment that no training met, and a row's figure is the median of its
-runs with the lowest and the highest. [Inside JAX](../jax.md) says what the programs are."""
+Written by `python -m benchmarks.jax_evidence`. Seconds are processor time without compiling. A return is the
+mean of 64 episodes of the compiled environment in which nothing was trained; a row gives the median of its
+runs, with the lowest and the highest in brackets. [Inside JAX](../jax.md) describes the programs."""
+
+BLIND = """\
+## Without feedback
+
+Policies that see nothing, in the same 64 episodes as the learners below. They are those of
+[the published results](../agents.md), whose returns are means of 100 other episodes. A learner that stays
+below the best of them does no better than a leg that sees nothing.
+
+{table}"""
 
 LEARNERS = """\
 ## {name}, beside `ppo_flat`
 
-`{file}` on `{id}`, {steps:,} steps, {runs} seeds; `ppo_flat` with its settings, whose learning rate
-falls over the steps given, once for equal steps and once for the median seconds of the other. Compiling took
-{compiled:.0f} s.
+`{file}` on `{id}`, {steps:,} steps, seeds {seeds}; `ppo_flat` with its settings and the same seeds,
+whose learning rate falls over the steps given, once for equal steps and once for as many as take the same
+time: its median is {apart:.0f} % away. Compiling took {compiled:.0f} s.
 
 {table}
 
@@ -42,9 +54,9 @@ GAITS = """\
 ## A gait by its derivative, beside CMA-ES
 
 `examples/jax_gait.py` on `{id}`: a gait that is locked to the crank, 20 numbers, from {runs} random starts
-with a return of {first}, {steps:,} control steps of simulated time each. CMA-ES begins at the same gaits with
-a standard deviation of 0.3 and 12 candidates. Its episodes take 10 s, or 2 s, of which more fit into the same
-time; the score is the mean of its distribution. Compiling the derivative took {compiled:.0f} s.
+with a return of {first}, and {steps:,} control steps each. CMA-ES begins at the same gaits with a standard
+deviation of 0.3 and 12 candidates, in episodes of 10 s, or of 2 s, of which more fit into as many steps; the
+mean of its distribution is what is scored. Compiling the derivative took {compiled:.0f} s.
 
 {table}
 
@@ -63,8 +75,9 @@ constant action, and its distance from the central difference of 0.001, relative
 SPEED = """\
 ## Steps inside `jax.jit`
 
-`python -m benchmarks.jax_speed` on `{id}`, a linear policy: microseconds of processor (of wall
-clock) of a vector step. The kernel alone is what no caller can save; reading the clock adds to it.
+`python -m benchmarks.jax_speed` on `{id}`, a linear policy: microseconds of processor time (of wall
+clock) for a vector step, each the least of many short measurements. No caller can save the time of the kernel
+alone, to which reading the clock adds.
 
 {table}"""
 
@@ -86,6 +99,14 @@ def table_of_curves(curves: dict[str, Any]) -> str:
     return markdown_table(("learner", "steps", "seconds", "last return", "best score of a run"), rows)
 
 
+def unequal(curves: dict[str, Any], name: str) -> float:
+    """Return by how much the seconds of `ppo_flat` that were to be equal differ from a learner's, as a share
+    of these."""
+    both = name, "ppo_flat, equal seconds"
+    ours, theirs = (np.median([run[-1]["seconds"] for run in curves[each]]) for each in both)
+    return float(abs(theirs / ours - 1.0))
+
+
 def thousands(x: float, _: int) -> str:
     """Format a number of steps."""
     return f"{x / 1000:,.0f}k"
@@ -95,12 +116,27 @@ def page(found: Found) -> str:
     """Return the page of what was measured."""
     parts = [HEAD]
     results = {part: each["result"] for part, each in found.items()}
+    if "blind" in found:
+        rows = [
+            [
+                name,
+                f"{each['episodes']:,}" if each["episodes"] else "",
+                *(f"{each[key]:.1f}" for key in RETURNS),
+            ]
+            for name, each in results["blind"].items()
+        ]
+        head = ("policy", "episodes of its search", "return", "published return")
+        parts.append(BLIND.format(table=markdown_table(head, rows)))
     for part, (name, file) in FILES.items():
         if part in found:
             given = results[part]
             about = {key: given[key] for key in ("id", "steps", "compiled")}
-            table, runs = table_of_curves(given["curves"]), len(given["curves"][name])
-            parts.append(LEARNERS.format(name=name, file=file, part=part, table=table, runs=runs, **about))
+            about |= {
+                "seeds": f"{SEEDS[part][0]} to {SEEDS[part][-1]}",
+                "apart": 100 * unequal(given["curves"], name),
+            }
+            table = table_of_curves(given["curves"])
+            parts.append(LEARNERS.format(name=name, file=file, part=part, table=table, **about))
     if "gaits" in found:
         given = results["gaits"]
         first = spread(given["first"])
@@ -145,13 +181,15 @@ def draw(found: Found, folder: Path) -> None:
                     found[part]["result"]["curves"].items(), COLOURS, strict=False
                 ):
                     _draw_runs(axis, name, runs, key, colour)
+                _draw_blind(axis, found)
                 axis.set(xlabel=OVER[key], ylabel="mean return of 64 episodes")
             for axis, label in zip(places if len(keys) > 1 else (), (thousands, "{x:g}"), strict=False):
                 axis.set_xscale("log")
                 axis.xaxis.set_major_locator(LogLocator(subs=(1.0, 3.0)))
                 axis.xaxis.set_major_formatter(label)
                 axis.xaxis.set_minor_formatter(NullFormatter())
-            places[0].legend(loc="lower right", fontsize=7)
+            handles, labels = places[0].get_legend_handles_labels()
+            figure.legend(handles, labels, loc="outside lower center", ncols=LEGEND[len(keys)], fontsize=7)
             save_png(figure, folder / f"{part}.png")
             plt.close(figure)
         if "derivatives" in found:
@@ -167,6 +205,13 @@ def draw(found: Found, folder: Path) -> None:
             places[0].legend()
             save_png(figure, folder / "derivatives.png")
             plt.close(figure)
+
+
+def _draw_blind(axis: Any, found: Found) -> None:
+    """Draw the returns of policies that see nothing, as lines across."""
+    if "blind" in found:
+        for (name, each), style in zip(found["blind"]["result"].items(), (":", "--", "-"), strict=True):
+            axis.axhline(each["return"], color=GREY, lw=0.8, ls=style, label=name, zorder=0)
 
 
 def _draw_runs(axis: Any, name: str, runs: Any, key: str, colour: str) -> None:

@@ -2,9 +2,9 @@
 
     python -m benchmarks.jax_speed
 
-A linear policy acts; the processor time of a vector step, the least of several rounds that alternate, in one
-process. Wall-clock time is printed, too: on a busy machine it says little. The last column is what no caller
-can save: the kernel of the step, without the policy. Needs the extra `jax`.
+A linear policy acts; the processor time and the wall-clock time of a vector step, each the least of many
+short measurements that alternate, in one process. The column of the kernel is what no caller can save: the
+kernel of the step, without the policy. Needs the extra `jax`.
 """
 
 from __future__ import annotations
@@ -26,10 +26,15 @@ import hoof_env  # noqa: F401 - registers the environments
 from hoof_env._output import markdown_table
 
 ID = "hoof_env/HorseLeg-v0"
-COUNTS = 16, 128, 1024
 NAMES = LOOP, XLA, _, _ = "Python loop", "`envs.xla()`", "`io_callback`", "kernel alone"
-STEPS = 200
-ROUNDS = 9
+STEPS = {16: 200, 128: 200, 1024: 25}
+"""Steps of a measurement by rows: long beside the call of a program, and short, 30 ms at most, so that a busy
+machine leaves some uninterrupted."""
+
+EPISODE = 500
+"""Steps of an episode."""
+
+ROUNDS = 60
 
 
 def new_envs(count: int) -> Any:
@@ -46,7 +51,7 @@ def python_loop(count: int, weights: Any) -> Callable[[], Any]:
 
     def run() -> None:
         nonlocal observations
-        for _ in range(STEPS):
+        for _ in range(STEPS[count]):
             observations, *_ = envs.step(np.tanh(observations @ weights))
 
     return run
@@ -62,7 +67,7 @@ def inside_jit(count: int, weights: Any) -> Callable[[], Any]:
         handle, states = step(handle, jnp.tanh(observations @ weights))
         return (handle, states.observations), (states.rewards, states.terminated | states.truncated)
 
-    roll = jax.jit(lambda carry: jax.lax.scan(body, carry, length=STEPS)[0])
+    roll = jax.jit(lambda carry: jax.lax.scan(body, carry, length=STEPS[count])[0])
     handle, states = recv(handle)
     carry = handle, states.observations
 
@@ -86,7 +91,7 @@ def by_callback(count: int, weights: Any) -> Callable[[], Any]:
     def body(observations: Any, _: Any) -> Any:
         return io_callback(host, kinds, jnp.tanh(observations @ weights), ordered=True)
 
-    roll = jax.jit(lambda observations: jax.lax.scan(body, observations, length=STEPS)[0])
+    roll = jax.jit(lambda observations: jax.lax.scan(body, observations, length=STEPS[count])[0])
     observations = first
 
     def run() -> None:
@@ -100,11 +105,16 @@ def kernel_alone(count: int, weights: Any) -> Callable[[], Any]:
     """Return a loop that times nothing but the kernel of the step."""
     envs = new_envs(count)
     batch = envs.batch
+    taken = 0
 
     def run() -> Any:
-        envs.reset(seed=0)
+        nonlocal taken
+        if taken + STEPS[count] > EPISODE:
+            envs.reset(seed=0)
+            taken = 0
+        taken += STEPS[count]
         spent = np.zeros(2)
-        for _ in range(STEPS):
+        for _ in range(STEPS[count]):
             batch.rows.actions[:count] = np.tanh(batch.rows.observations[:count] @ weights)
             begin = np.array([time.process_time(), time.perf_counter()])
             batch.run_kernels()
@@ -117,7 +127,7 @@ def kernel_alone(count: int, weights: Any) -> Callable[[], Any]:
 def measure() -> dict[str, Any]:
     """Return microseconds of processor and of wall clock of a vector step, for each number of rows."""
     rows = []
-    for count in COUNTS:
+    for count in STEPS:
         envs = new_envs(count)
         shape = envs.single_observation_space.shape[0], envs.single_action_space.shape[0]
         weights = (np.random.default_rng(0).normal(size=shape) * 0.3).astype(np.float32)
@@ -128,7 +138,7 @@ def measure() -> dict[str, Any]:
                 start = np.array([time.process_time(), time.perf_counter()])
                 own: Any = run()
                 each[k] = np.array([time.process_time(), time.perf_counter()]) - start if own is None else own
-        least = times[1:].min(axis=0) / STEPS * 1e6
+        least = times[1:].min(axis=0) / (STEPS[count]) * 1e6
         rows.append({"rows": count, **dict(zip(NAMES, least.tolist(), strict=True))})
     return {"id": ID, "rows": rows}
 

@@ -1,12 +1,12 @@
-"""Gait improved by the derivative of the return: Adam on the numbers of a gait that is locked to the crank.
+"""Gait improved by the derivative of the return: Adam on the numbers of a gait locked to the crank.
 
     pip install "hoof-env[jax]"
     python -m examples.jax_gait --steps 60000
 
-The gait is a constant and two harmonics of the crank angle for each of the four parameters, 20 numbers, from
-a random start. The derivative is that of the mean reward of half a second; episodes go on from window to
-window. Prints the mean reward of a control step in each tenth of the steps. Compiling takes one to three
-minutes.
+Each of the four gait parameters is a constant plus two harmonics of the crank angle: 20 numbers, which begin
+at random. A step of Adam takes the derivative of the mean reward over half a second; episodes continue from
+one such window to the next. Prints the mean reward of a control step in each tenth of the steps. Compiling
+takes one to three minutes.
 """
 
 from __future__ import annotations
@@ -66,8 +66,8 @@ class Gait:
         return jnp.clip((jnp.clip(wanted, self._low, self._high) - heading) / self._reach, -1.0, 1.0)
 
     def improve(self, gait: Any, steps: int, seed: int) -> Iterator[tuple[int, Any, float]]:
-        """Improve a gait; yield the number of steps, the gait and the mean reward of a step after each
-        window."""
+        """Improve a gait. After each window, yield the number of steps so far, the gait, and the window's
+        mean reward of a step."""
         gait = jnp.asarray(gait, jnp.float32)
         key, of_starts = jax.random.split(jax.random.key(seed))
         begin = jax.jit(jax.vmap(self.env.reset, (0, None)))(jax.random.split(of_starts, ENVS), self.params)

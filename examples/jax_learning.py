@@ -1,4 +1,8 @@
-"""Perceptrons, Adam and printed progress in plain JAX, which the learners of these examples share."""
+"""Perceptrons, Adam and printed progress in plain JAX, shared by the learners of these examples.
+
+Adam is written out, in a dozen lines, so that the examples need nothing but JAX; the extra `jax` does not
+install optax.
+"""
 
 from __future__ import annotations
 

@@ -55,8 +55,8 @@ def loss(agent: Any, batch: Any) -> Any:
 
 
 def scaled(scale: Any, rewards: Any, ends: Any) -> Any:
-    """Return the scale with the steps of a rollout, and their rewards by it: the deviation of the discounted
-    returns so far, from the first step of an episode to each."""
+    """Return the scale after a rollout, and the rewards divided by it. The scale is the standard deviation of
+    the discounted returns from the start of an episode up to each step."""
     count, mean, square, running = scale
 
     def add(running: Any, row: Any) -> Any:
@@ -101,8 +101,8 @@ class Ppo:
         return agent, new_moments(agent), scale, handle, states.observations, zeros, key
 
     def train(self, steps: int, seed: int, parts: int = 10) -> Iterator[tuple[int, Any, float]]:
-        """Train an agent; after each of `parts` yield the number of steps, the agent, and the mean return of
-        the episodes that ended in it. Learning rates fall to 0."""
+        """Train an agent, at a learning rate that falls to 0. After each of `parts` equal parts, yield the
+        number of steps so far, the agent, and the mean return of the episodes that ended in that part."""
         carry = self.begin(seed)
         part = max(steps // (LENGTH * ENVS * parts), 1)
         left = (1.0 - jnp.arange(part * parts) / (part * parts)).reshape(parts, part)

@@ -1,5 +1,5 @@
-"""SHAC, the short-horizon actor-critic of Xu et al. (2022), in plain JAX: the actor climbs the derivative of
-the return of half a second, which goes through the contact, and a critic stands for what comes later.
+"""SHAC, the short-horizon actor-critic of Xu et al. (2022), in plain JAX. The actor climbs the derivative of
+half a second of return, through the contact; a critic estimates the return after it.
 
     pip install "hoof-env[jax]"
     python -m examples.jax_shac --steps 100000
@@ -23,10 +23,10 @@ ENVS, WINDOW = 16, 25
 GAMMA, LAMBDA, WIDTH = 0.99, 0.95, 64
 ACTOR_RATE, CRITIC_RATE = 2e-3, 2e-3
 SPREAD = 0.0
-"""First logarithm of the standard deviation of what is added to actions."""
+"""Logarithm of the standard deviation of the actions' noise, at the start of training."""
 
 SCALE = 20.0
-"""Unit of the critic's output: about what rewards of a few tenths add up to under `GAMMA`."""
+"""Unit of the critic's output: about the discounted sum of rewards of a few tenths."""
 
 VISITS, BATCHES = 16, 4
 """Epochs and batches of the critic after each window."""
@@ -62,7 +62,8 @@ class Shac:
         return learned, (observations, states), key
 
     def train(self, steps: int, seed: int) -> Iterator[tuple[int, Any, float]]:
-        """Train; yield the number of steps, the actor and the mean reward of a step after each window."""
+        """Train. After each window, yield the number of steps so far, the actor, and the window's mean reward
+        of a step."""
         carry = self.begin(seed)
         turns = max(steps // (ENVS * WINDOW), 1)
         for k in range(turns):

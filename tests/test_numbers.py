@@ -13,6 +13,7 @@ from collections.abc import Callable, Iterable, Iterator
 from functools import cache
 from importlib import import_module
 from pathlib import Path
+from statistics import median
 from typing import Any
 
 import gymnasium as gym
@@ -31,7 +32,10 @@ from hoof_env.tasks.reward import BEARING, MAX_STRIDE, check_weights
 ROOT = Path(__file__).parents[1]
 PAGES = (
     "README.md",
-    *(f"docs/{name}.md" for name in ("index", "agents", "engine", "help", "horse", "own_task", "paper")),
+    *(
+        f"docs/{name}.md"
+        for name in ("index", "agents", "engine", "help", "horse", "jax", "own_task", "paper")
+    ),
     *(f"docs/{name}.md" for name in ("project", "start", "task", "view", "elasticity", "parameters")),
     *(f"docs/environments/{path.name}" for path in sorted((ROOT / "docs/environments").glob("*.md"))),
 )
@@ -104,6 +108,28 @@ def engine_speed(*case: str) -> float:
     text = (ROOT / "benchmarks/results/512-bits/speed.md").read_text(encoding="utf-8")
     row = next(line for line in text.splitlines() if line.startswith(f"| {name} | 512 |"))
     return float(row.split("|")[{"rate": 3, "all": 4, "rigid": 5}[column]].split()[0])
+
+
+def inside_jax(part: str, which: str, figure: str) -> float:
+    """A figure of the evidence of what runs inside JAX: of the vector steps with some rows, or of the last
+    scores of the learner that is the first, second or third of its part."""
+    result = json.loads((ROOT / f"docs/evidence/jax/{part}.json").read_text(encoding="utf-8"))["result"]
+    if part == "speed":
+        found = next(row for row in result["rows"] if row["rows"] == int(which))
+        loop, program, kernel = (found[name] for name in ("Python loop", "`envs.xla()`", "kernel alone"))
+        return {
+            "gain": loop[0] - program[0],
+            "share": 100.0 * kernel[0] / loop[0],
+            "most": loop[0] / kernel[0],
+            "times": loop[0] / program[0],
+            "wall": loop[1] / program[1],
+        }[figure]
+    runs = list(result["curves"].values())[int(which)]
+    last = [run[-1] for run in runs]
+    ends = {"lowest": min, "highest": max, "median": median}
+    if figure in ends:
+        return ends[figure](score["return"] for score in last)
+    return median(score[figure] for score in last)
 
 
 def leg(figure: str) -> float:
@@ -299,6 +325,7 @@ SOURCES: dict[str, Callable[..., float]] = {
     "speed": speed,
     "engine_speed": engine_speed,
     "leg": leg,
+    "inside_jax": inside_jax,
     "horse": horse,
     "constant": constant,
     "limit": limit,
@@ -387,6 +414,19 @@ def test_seconds_to_learn_agree_with_the_benchmark():
     said = f"after {best[0]:g} seconds of learning (median of ten seeds, {best[2]:g} in the worst)"
     assert said in text
     assert f"within 5 % of its final return after {near[0]:g}" in text
+
+
+def test_speeds_inside_jax_are_those_of_the_evidence():
+    titles = (
+        "rows",
+        "Python loop",
+        "`envs.xla()`",
+        "`io_callback`",
+        "kernel alone",
+        "loop / xla",
+        "by wall clock",
+    )
+    assert table("docs/jax.md", *titles) == table("docs/evidence/jax.md", *titles)
 
 
 def test_reference_gaits_on_the_page_agree_with_the_evidence():

@@ -17,9 +17,9 @@ import numpy as np
 from gymnasium.vector import AutoresetMode
 from numpy.typing import NDArray
 
-from hoof_env.envs.xla_handler import BEFORE, GONE, INSTEAD, Word, handler
+from hoof_env.envs.xla_handler import BEFORE, GONE, HANDLE, INSTEAD, NO_HANDLE, SUM, Word, handler
 from hoof_env.episodes.step import NOT_A_NUMBER
-from hoof_env.errors import HoofEnvError, MissingExtraError, ParameterError
+from hoof_env.errors import HoofEnvError, MissingExtraError, ParameterError, brief
 
 if TYPE_CHECKING:
     from hoof_env.envs.vector import HorseLegVectorEnv
@@ -171,7 +171,8 @@ class XlaSteps:
     def _handle(self) -> Any:
         import jax.numpy as jnp
 
-        return jnp.asarray(np.array([self._words.ctypes.data, self._words[Word.USES]]).view(np.uint8))
+        address = self._words.ctypes.data
+        return jnp.asarray(np.array([address, self._words[Word.USES], SUM - address]).view(np.uint8))
 
     def look(self) -> None:
         """Let Python look before the next step, since the environments are used from Python."""
@@ -236,7 +237,7 @@ class XlaSteps:
         import jax
         import jax.numpy as jnp
 
-        handle = jax.ShapeDtypeStruct((2 * 8,), np.uint8)
+        handle = jax.ShapeDtypeStruct((HANDLE * 8,), np.uint8)
         results = [jax.ShapeDtypeStruct(array.shape, array.dtype) for array in self._outputs]
         names = tuple(self._infos)
         shape, rewards = self._shape, self._rewards.shape
@@ -251,24 +252,30 @@ class XlaSteps:
             infos = dict(zip(names, infos, strict=True))
             return following, States(observations, of_step, terminated, truncated, infos)
 
+        def checked_handle(given: Any) -> Any:
+            if not hasattr(given, "dtype") or (jnp.shape(given), given.dtype) != (handle.shape, handle.dtype):
+                raise ParameterError(f"{NO_HANDLE}: {brief(given)}")
+            return given
+
         def checked(handle: Any, actions: Any, env_id: Any) -> tuple[Any, Any]:
             if env_id is not None:
                 raise ParameterError(
                     f"env_id: expected None, as all environments step together, got {env_id!r}"
                 )
-            kind = jnp.result_type(actions)
+            actions = actions if hasattr(actions, "dtype") else np.asarray(actions)
+            kind = jnp.result_type(actions) if actions.dtype != object else actions.dtype
             if jnp.shape(actions) != shape or kind.kind not in "fiuV":  # V: halves, such as bfloat16
                 raise ParameterError(
                     f"actions: expected finite numbers in [-1, 1], shape {shape}, got {kind} of shape"
                     f" {jnp.shape(actions)}"
                 )
-            return handle, jnp.asarray(actions, np.float32)
+            return checked_handle(handle), jnp.asarray(actions, np.float32)
 
         receives, sends, steps = (_plain(call, has_results) for has_results in (True, False, True))
 
         def recv(handle: Any) -> tuple[Any, States]:
             """Return the next handle and the `States` of the last step, or of a reset."""
-            return receives(handle)
+            return receives(checked_handle(handle))
 
         def send(handle: Any, actions: Any, env_id: Any = None) -> Any:
             """Take a step; return the next handle."""

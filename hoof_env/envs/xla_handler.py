@@ -3,7 +3,8 @@
 XLA gives the address of a call frame, whose words are named below; the structs are in
 `xla/ffi/api/c_api.h`, version 0.x of the interface. The handler copies the actions into the arrays of the
 environments, calls the kernel of a step, and copies the outcome out; it calls Python for Python's part
-alone. The first operand is a handle: the address of `Word`s, and how often these were used.
+alone. The first operand is a handle: the address of `Word`s, how often these were used, and the address
+subtracted from `SUM`, without which the address is not followed.
 """
 
 from __future__ import annotations
@@ -17,6 +18,7 @@ from hoof_env.simd.addresses import (
     call_at,
     copy_bytes,
     lower_half,
+    new_text,
     new_words,
     numbers_at,
     replaced,
@@ -60,6 +62,17 @@ class Word(_Counted):
     MESSAGE = auto()  # address of Python's message
     OUTPUTS = auto()  # number of outputs after the rewards
 
+
+HANDLE = 3
+"""Words of a handle."""
+
+SUM = 0x686F_6F66_2D65_6E76
+"""Sum of the first and the last word of a handle."""
+
+NO_HANDLE = (
+    "handle: expected the one that envs.xla() or the last call returned, got other numbers, such as zeros in"
+    " its place"
+)
 
 BUSY, GONE = -1, -2
 
@@ -155,6 +168,24 @@ def answer(call: Pointer) -> Index:
     of an error's message, 0 without."""
     inputs, outputs = words_at(call[FRAME_INPUTS]), words_at(call[FRAME_OUTPUTS])
     given = words_at(words_at(inputs[0])[DATA])
+    message = Cell(0)
+    is_handle = given[HANDLE - 1] == SUM - given[0]
+
+    @when(is_handle)
+    def _() -> None:
+        message.value = use(call, given, outputs)
+
+    @when(~is_handle)
+    def _() -> None:
+        message.value = address_of(new_text(NO_HANDLE))
+
+    found: Index = message.value
+    return found
+
+
+def use(call: Pointer, given: Pointer, outputs: Pointer) -> Index:
+    """Answer a call with a handle; return the address of an error's message, 0 without."""
+    inputs = words_at(call[FRAME_INPUTS])
     words, uses = words_at(given[0]), given[1]
     message = Cell(words[Word.STALE])
 
@@ -178,6 +209,7 @@ def answer(call: Pointer) -> Index:
         result = words_at(words_at(outputs[0])[DATA])
         set_word(result, 0, given[0])
         set_word(result, 1, uses + 1)
+        set_word(result, 2, given[2])
         message.value = 0
 
         @when(failed.value != 0)

@@ -12,18 +12,19 @@ from gymnasium.utils import seeding
 
 from hoof_env.dynamics.advance import ONE_BY_ONE
 from hoof_env.dynamics.layout import engine_layout
+from hoof_env.envs.manual import MULTI_OBJECTIVE, task_of_id
 from hoof_env.episodes.batch import EpisodeBatch
 from hoof_env.episodes.observation_kernel import Observer
 from hoof_env.episodes.scene import Scene, TaskKind
 from hoof_env.episodes.step import step_rows
 from hoof_env.errors import ParameterError, count
 from hoof_env.jax.engine import JaxAdvance
-from hoof_env.jax.machine import Cells, Held, Jax
+from hoof_env.jax.machine import Cells, Held, Jax, Singles
 from hoof_env.simd import new_rows
 from hoof_env.simd.machines import running_on
 from hoof_env.simd.memory import Given
 from hoof_env.tasks.episode import ACTIONS, FAILED
-from hoof_env.tasks.registry import TASKS
+from hoof_env.tasks.registry import Task
 
 STARTS = 256
 """Default number of starts that are drawn."""
@@ -74,7 +75,8 @@ def make(id: str, *, dtype: Any = None, starts: int = STARTS, seed: int = 0, **s
     """Return an environment and its parameters.
 
     Args:
-        id: id of an environment of this package, of one leg or of a horse.
+        id: id of an environment, of one leg or of a horse: of this package, or your own, which may be
+            "module:id".
         dtype: float64, which needs `jax_enable_x64`, or float32; None for what JAX has now.
         starts: number of starts. The k-th is the start after `reset(seed=seed + k)` of the environment; a
             reset takes one of them at random.
@@ -104,6 +106,20 @@ def check_kind(dtype: Any) -> np.dtype[Any]:
             " kernels run jax.config.update('jax_enable_x64', True) first"
         )
     return kind
+
+
+def task_with_one_reward(id: str) -> Task:
+    """Return the task of an id.
+
+    Raises:
+        ParameterError: an unknown id, or one whose reward is a vector.
+    """
+    if id == MULTI_OBJECTIVE:
+        raise ParameterError(
+            f"id: expected an id with one reward, got {id!r}, whose objectives are sums of terms: take"
+            " 'hoof_env/HorseLeg-v0', whose info['terms'] has them"
+        )
+    return task_of_id(id)
 
 
 def refused(plan: Any) -> str:
@@ -141,13 +157,11 @@ class JaxEnv:
     """
 
     def __init__(self, id: str, dtype: Any, settings: Any) -> None:
-        tasks = {task.id: task for task in TASKS.values()}
-        if id not in tasks:
-            raise ParameterError(f"id: expected one of {', '.join(tasks)}, got {id!r}")
+        task = task_with_one_reward(id)
         self.id = id
         self._kind = check_kind(dtype)
-        self._settings = tasks[id].settings(settings)
-        self._batch = EpisodeBatch(tasks[id], self._settings, 1)
+        self._settings = task.settings(settings)
+        self._batch = EpisodeBatch(task, self._settings, 1)
         self._plan = plan = self._batch.plan
         if lacks := refused(plan):
             raise ParameterError(f"hoof_env.jax: {id}: {lacks}")
@@ -276,7 +290,7 @@ class JaxEnv:
             "unweighted": Cells([0.0] * len(self.terms)),
         }
         cells["acted"] = _cells(state.acted) if state.acted.size else cells["actions"]
-        body_actions = Cells([0.0] * (task.body.legs * ACTIONS))
+        body_actions = Singles([0.0] * (task.body.legs * ACTIONS))
         cells["mapped"] = body_actions if task.action_map else cells["acted"]
         with running_on(Jax(kind)):
             given: Any = Given(task.arrays, Held(self._constant | cells))

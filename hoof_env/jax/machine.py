@@ -44,6 +44,13 @@ class Cells(list[Any]):
         return self
 
 
+class Singles(Cells):
+    """Array of the caller whose elements the kernels keep in single precision: what is stored is rounded."""
+
+    def __setitem__(self, k: Any, x: Any) -> None:
+        super().__setitem__(k, single_precision(x))
+
+
 class Held:
     """Arrays of a call, as `memory.Given` takes them; see `memory.Arrays`.
 
@@ -60,6 +67,13 @@ class Held:
 def is_known(*values: Any) -> bool:
     """Return True if all are known while JAX traces."""
     return not any(isinstance(value, jax.Array) for value in values)
+
+
+def single_precision(x: Any) -> Any:
+    """Return the nearest number of single precision, of the type of x, with a slope of 1."""
+    if is_known(x):
+        return float(np.float32(x))
+    return x + jax.lax.stop_gradient(jax.lax.reduce_precision(x, 8, 23) - x)
 
 
 def plain(value: Any) -> Any:

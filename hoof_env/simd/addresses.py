@@ -6,6 +6,7 @@ kernel, but runs on no machine that computes at once.
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 
@@ -35,6 +36,16 @@ def words_at(address: Whole) -> Pointer:
 def new_words(count: int) -> Pointer:
     """Return memory on the stack for whole numbers."""
     return Pointer(CURRENT.machine.slot("i64", count), "i64")
+
+
+def new_text(text: str) -> Pointer:
+    """Return memory on the stack with a text, which ends with a byte 0."""
+    content = text.encode() + b"\0"
+    content += b"\0" * (-len(content) % 8)
+    words = new_words(len(content) // 8)
+    for k in range(len(content) // 8):
+        set_word(words, k, int.from_bytes(content[8 * k : 8 * k + 8], sys.byteorder, signed=True))
+    return words
 
 
 def set_word(words: Pointer, k: Whole, value: Whole) -> None:

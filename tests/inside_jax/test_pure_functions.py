@@ -8,6 +8,7 @@ import pytest
 import hoof_env
 from hoof_env import ParameterError
 from hoof_env.envs.xla import OLDEST
+from hoof_env.tasks import registry
 
 jax = pytest.importorskip("jax", reason="jax is no part of the environment of set-up: make test-jax")
 jnp = jax.numpy
@@ -29,7 +30,12 @@ def doubles():
 def make(id, **settings):
     import hoof_env.jax
 
-    return hoof_env.jax.make(f"hoof_env/{id}-v0", **{"starts": 4, **settings})
+    return hoof_env.jax.make(full(id), **{"starts": 4, **settings})
+
+
+def full(id):
+    """The whole of an id of the package, or one's own as it is."""
+    return id if "/" in id else f"hoof_env/{id}-v0"
 
 
 def stepped(env):
@@ -39,10 +45,11 @@ def stepped(env):
 
 def largest_differences(id, steps=STEPS, **settings):
     """Differences from the kernels over some steps from the same starts: of forces by the weight, of all
-    other numbers in the memory by their size, of rewards and of observations; and how many episodes ended."""
+    other numbers in the memory by their size, of rewards and their terms, and of observations; the number of
+    steps, of which the last is the first in which an episode ends; and the terms that were not 0."""
     env, _ = make(id, **settings)
     state = env.params_of(range(STARTS)).starts
-    envs = gym.make_vec(f"hoof_env/{id}-v0", num_envs=STARTS, autoreset_mode="DISABLED", **settings).unwrapped
+    envs = gym.make_vec(full(id), num_envs=STARTS, autoreset_mode="DISABLED", **settings).unwrapped
     observations, _ = envs.reset(seed=0)
     np.testing.assert_array_equal(state.observation, observations)
     step, keys = stepped(env), jax.random.split(jax.random.key(0), STARTS)
@@ -50,12 +57,12 @@ def largest_differences(id, steps=STEPS, **settings):
     memory, shape = envs.engine.arrays[0], envs.action_space.shape
     names = [k for k, name in enumerate(env.engine_names) if name.endswith(("_normal", "_friction"))]
     assert names
-    found = np.zeros(4)
+    found, charged = np.zeros(4), set()
     ended = np.zeros(STARTS, bool)
     for k in range(steps):
         if k % 5 == 0:
             actions = generator.uniform(-1, 1, shape).astype(np.float32)
-        observations, rewards, terminated, truncated, _ = envs.step(actions)
+        observations, rewards, terminated, truncated, infos = envs.step(actions)
         seen, state, reward, done, info = step(keys, state, actions)
         np.testing.assert_array_equal(info["terminated"], terminated)
         np.testing.assert_array_equal(info["truncated"], truncated)
@@ -63,31 +70,50 @@ def largest_differences(id, steps=STEPS, **settings):
         now = memory[:, :STARTS].T
         ended = np.asarray(done)
         apart = np.abs(np.asarray(state.engine) - now)[~ended]
+        terms = {name: infos[name] for name in env.terms}
+        charged |= {name for name, values in terms.items() if values.any()}
+        of_terms = [np.abs(info["terms"][name] - values).max() for name, values in terms.items()]
         here = (
             (apart[:, names] / envs.weight[~ended, None]).max(initial=0.0),
             (apart / (1.0 + np.abs(now[~ended]))).max(initial=0.0),
-            np.abs(reward - rewards).max(),
+            max(np.abs(reward - rewards).max(), *of_terms),
             np.abs(seen - observations)[~ended].max(initial=0.0),
         )
         found = np.maximum(found, here)
         if ended.any():
             break
-    return found, k + 1
+    return found, k + 1, charged
 
 
 @pytest.mark.parametrize(
-    "id", ["HorseLeg", "HorseLegRail", "HorseLegFixed", "HorseLegSpeed", "HorseLegTerrain", "Horse"]
+    "id",
+    [
+        "HorseLeg",
+        "HorseLegRail",
+        pytest.param("HorseLegFixed", marks=pytest.mark.smoke),
+        "HorseLegSpeed",
+        "HorseLegTerrain",
+        "Horse",
+    ],
 )
 def test_the_first_second_is_that_of_the_kernels(id):
-    found, count = largest_differences(id)
+    found, count, _ = largest_differences(id)
     print(id, count, found)
     assert count == STEPS
     assert (found[:3] < CLOSE).all(), found
     assert found[3] <= 2.0**-20  # single numbers
 
 
+def test_a_hop_is_that_of_the_kernels_until_a_leg_falls():
+    found, count, _ = largest_differences("HorseLegHop")
+    print("HorseLegHop", count, found)
+    assert 20 <= count < STEPS  # and falls in the same step
+    assert (found[:3] < CLOSE).all(), found
+    assert found[3] <= 2.0**-20
+
+
 def test_delays_histories_noise_and_motors_are_those_of_the_kernels():
-    found, count = largest_differences(
+    found, count, _ = largest_differences(
         "HorseLeg", 30, action_delay=1.5, observation_delay=1, observation_history=2, last_actions=2,
         noise={"trunk": 0.1}, drive="motor", hoof_stiffness=2e5, randomize={"friction": (0.2, 0.5)},
         episode_seconds=0.5,
@@ -99,7 +125,7 @@ def test_delays_histories_noise_and_motors_are_those_of_the_kernels():
 
 def test_booms_contexts_and_sensors_are_those_of_the_kernels():
     groups = gym.make("hoof_env/HorseLeg-v0").unwrapped.settings.observation
-    found, count = largest_differences(
+    found, count, _ = largest_differences(
         "HorseLeg", 30, trunk="boom", context_set="ground/train", context_visible=True,
         observation=(*groups, "pressure"), force_threshold=40.0,
     )  # fmt: skip
@@ -107,6 +133,52 @@ def test_booms_contexts_and_sensors_are_those_of_the_kernels():
     assert count >= 10
     assert (found[:3] < CLOSE).all(), found
     assert found[3] <= 2.0**-20
+
+
+def slide(step, weight):
+    """Return the speed of the loaded toe along the ground [m/s]."""
+    toe = step.leg.report.toe
+    return weight * np.where(toe.normal > 0.0, abs(toe.slide), 0.0)
+
+
+@pytest.fixture
+def own_id():
+    """An id with terms, a state, a cost, constants, entries, a law of contact and actions of its own."""
+    from examples import own_actions, own_task  # noqa: F401 - registers my_lab/Turf-v0
+
+    known, own = dict(gym.registry), dict(registry._OWN)
+    state = hoof_env.TermState("highest", 0.0, "N", "highest force of the episode")
+    hoof_env.register(
+        "tests/Own-v0",
+        base="my_lab/Turf-v0",
+        action_map=own_actions.STEPS,
+        terms=[
+            hoof_env.Term(
+                "impact", 0.5, "1/kN", "rise of the highest force", own_actions.impact,
+                constants=[own_actions.FREE], state=[state],
+            ),
+            hoof_env.Term("slide", 1.0, "s/m", "a toe that slides", slide, is_cost=True),
+        ],
+        entries=[
+            hoof_env.Entry(
+                "highest force so far", "own", "-", own_actions.highest_so_far,
+                hoof_env.Scale("tanh(x)", saturates=True), constants=[own_actions.FREE],
+            )
+        ],
+    )  # fmt: skip
+    yield "tests/Own-v0"
+    for kept, before in ((gym.registry, known), (registry._OWN, own)):
+        kept.clear()
+        kept.update(before)
+
+
+def test_functions_of_a_user_are_those_of_the_kernels(own_id):
+    found, count, charged = largest_differences(own_id, 30, constants={"free": 700.0})
+    print(own_id, count, found)
+    assert count == 30
+    assert (found[:3] < CLOSE).all(), found
+    assert found[3] <= 2.0**-20
+    assert {"reward_friction", "reward_comfort", "reward_impact", "cost_slide"} <= charged
 
 
 def test_a_gradient_through_ten_steps_equals_differences():
@@ -205,7 +277,10 @@ def test_single_precision_is_near():
         ("HorseLeg", {"cost": {"peak": 1.0}}, "cost: expected None"),
         ("HorseLeg", {"action_delay": (0, 2)}, "action_delay: expected one number"),
         ("HorseLeg", {"schedule": {"friction": (0.1, 0.4, 100)}}, "schedule"),
+        ("HorseLegMO", {}, "id: expected an id with one reward, got .*HorseLegMO-v0.*take .*HorseLeg-v0"),
+        ("HorseSafe", {}, "cost: expected None"),
         ("Nothing", {}, "id: expected one of .*HorseLeg-v0"),
+        ("my_lab/Nothing-v0", {}, "expected one of .*got 'my_lab/Nothing-v0'"),
         ("HorseLeg", {"dtype": "int32"}, "dtype: expected float32 or float64"),
         ("HorseLeg", {"starts": 0}, "starts"),
         ("HorseLeg", {"friction": -1.0}, "friction"),

@@ -74,7 +74,7 @@ def check_same(envs, actions, states):
 @pytest.mark.parametrize(
     ("id", "count", "settings"),
     [
-        ("HorseLeg", 9, {"episode_seconds": 0.5}),
+        pytest.param("HorseLeg", 9, {"episode_seconds": 0.5}, marks=pytest.mark.smoke),
         ("HorseLegSpeed", 3, {"episode_seconds": 0.5, "target_seconds": 0.2}),
         ("HorseLeg", 3, {"push_seconds": 0.2, "push_impulse": 40.0, "episode_seconds": 0.5}),
         ("HorseLegTerrain", 3, {"episode_seconds": 0.4}),
@@ -236,6 +236,22 @@ def test_a_handle_is_used_once():
     step(envs.xla()[0], zeros(envs))
 
 
+def test_what_is_no_handle_is_refused_and_not_followed():
+    """Zeros in its place, as templates of a learner's state have them; a part of one; another type."""
+    envs = make()
+    envs.reset(seed=0)
+    handle, recv, send, step = envs.xla()
+    words = r"expected the one that envs\.xla\(\) or the last call returned"
+    actions = zeros(envs)
+    for function in (recv, lambda x: send(x, actions), lambda x: step(x, actions)):
+        fails(words + ".* zeros in its place", jax.jit(function), jnp.zeros_like(handle))
+        for wrong in (handle[:8], handle.astype(np.float32), None, 7):
+            with pytest.raises(ParameterError, match=words):
+                function(wrong)
+    _, states = jax.jit(step)(handle, actions)
+    assert np.isfinite(states.observations).all()
+
+
 def test_a_handle_may_outlive_its_environments():
     """But the functions keep them alive."""
     envs, twin = make(), make()
@@ -264,7 +280,9 @@ def test_actions_must_be_finite_and_nothing_is_advanced():
     step(envs.xla()[0], zeros(envs))
 
 
-@pytest.mark.parametrize("wrong", [np.zeros((3, 1)), np.zeros((2, 4)), np.zeros((3, 4), bool)])
+@pytest.mark.parametrize(
+    "wrong", [np.zeros((3, 1)), np.zeros((2, 4)), np.zeros((3, 4), bool), [[0.0] * 4] * 2, None]
+)
 def test_actions_of_another_shape_or_type_are_refused(wrong):
     envs = make()
     envs.reset(seed=0)
@@ -274,6 +292,8 @@ def test_actions_of_another_shape_or_type_are_refused(wrong):
             function(handle, wrong)
     with pytest.raises(ParameterError, match="env_id: expected None"):
         step(handle, zeros(envs), np.arange(3))
+    _, states = step(handle, zeros(envs).tolist())
+    assert np.isfinite(states.observations).all()
 
 
 def test_steps_before_a_reset_or_after_the_end_or_close_are_refused():
