@@ -33,7 +33,7 @@ CARD = "card.md"
 FILM = "film.gif"
 SCORE = "score.json"
 
-SHOWN = ("return", "distance_m", "stance_peak_n", "weight_share", "cost_of_transport", "failed")
+SHOWN = ("return", "cost", "distance_m", "stance_peak_n", "weight_share", "cost_of_transport", "failed")
 """Columns of the card's table, keys of `METRICS`."""
 
 TITLES = {

@@ -37,7 +37,7 @@ from agents import runs
 from agents.blindness import prove
 from agents.cards import POLICIES
 from agents.command import parse, run
-from agents.ship import shown_command, write_index
+from agents.ship import GAITS, shown_command, write_index
 from hoof_env._output import markdown_table
 from hoof_env.envs.open_loop import check_blind, gait_file, open_loop_record
 from hoof_env.envs.policies import STANDS_FOR
@@ -554,16 +554,18 @@ def pages() -> list[Path]:
 
 def scores_of(env_id: str, data: dict[str, Any], folder: Path = RESULTS) -> dict[str, Any]:
     """Return the content of an id's score.json with the policies that rows have: zero action, best constant
-    gait, best gait locked to the crank, "blind", the best policy without feedback, and stock PPO."""
+    gait, best gait locked to the crank, "blind", the best policy without feedback, and stock PPO. Gaits
+    without a row stay as `agents.ship` scored them."""
     rows = rows_of(STANDS_FOR.get(env_id, env_id), folder)
     found: dict[str, Row] = {kind: rows[kind] for kind in ("zero", "constant", "open-loop") if kind in rows}
-    if "reference" in data["policies"]:
-        found.pop("zero", None)  # the same
+    kept = {name: value for name, value in data["policies"].items() if name not in KINDS or name in GAITS}
+    if "reference" in kept:
+        for same in (found, kept):
+            same.pop("zero", None)
     if best := best_blind(rows):
         found["blind"] = best
     found |= {"stock": rows["stock"]} if "stock" in rows else {}
-    policies = {name: value for name, value in data["policies"].items() if name not in KINDS}
-    policies |= {name: data["policies"][name] for name in ("run",) if name in data["policies"]}
+    policies = dict(kept)
     for name, row in found.items():
         mean = {key: row.mean[key] for key in METRICS if key in row.mean}
         bounds = {key: row.interval95.get(key) or (mean[key], mean[key]) for key in mean}
