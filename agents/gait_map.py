@@ -25,13 +25,14 @@ from numpy.typing import NDArray
 
 from agents import runs
 from agents.evolution import make_strategy, require
+from agents.gait_figures import froude_of
 from agents.horse_gaits import speed_of
 from agents.judge import MAX_ERROR, MAX_FALLS, MAX_SLIP, TURNS
 from agents.judges import Bars, read_judges
 from agents.kinematic_gaits import Rig, decode, encode, misses_of
 from hoof_env.errors import parse_json
 from hoof_env.tasks.horse import HIP_HEIGHT
-from hoof_env.tasks.horse_gaits import NAMES, PAIRS, horse_gaits
+from hoof_env.tasks.horse_gaits import NAMES, PAIRS, horse_gaits, kinematic_speeds
 
 Floats = NDArray[np.float64]
 
@@ -71,12 +72,13 @@ class Effort:
     near: int
 
 
-FIRST = Effort(16, 3, 48, 24)  # for the mixture
-EACH = Effort(12, 2, 30, 20)  # for each of the others
-SPREAD = 0.07  # of a search from a gait of another speed, in the box
-NEAR = 0.04  # of one from a gait of this speed
+FIRST = Effort(16, 3, 60, 24)  # for the mixture
+EACH = Effort(12, 2, 50, 20)  # for each of the others
+SPREAD = 0.03  # of a search from a gait of another speed, in the box
+NEAR = 0.03  # of one from a gait of this speed
 SECONDS = 4.0  # of a start
 SETTLED = 1.5  # from which on figures count [s]
+FINALISTS = 2  # best candidates for each objective, and known gaits, beside the found ones in the end
 CHECKED = 24  # starts by which a found gait is measured
 
 FIGURES = (
@@ -145,12 +147,14 @@ def stands(figures: dict[str, Any], kind: str, froude: float) -> bool:
     )
 
 
-def paced(gaits: Floats, speed: float, froude: float) -> Floats:
-    """Return gaits, shape (m, 16), with the rate of a horse's stride at a speed [m/s], within the box of the
-    search."""
-    changed = gaits.copy()
-    changed[:, 0] = 2 * np.pi * speed / (stride_at(froude) * HIP_HEIGHT)
-    return decode(encode(changed))
+def paced(gaits: Floats, froude: float, before: float) -> Floats:
+    """Return gaits of one Froude number for another, shape (3 m, 16): as they are, with the rate that keeps
+    their strides, and with that of a horse's stride, within the box of the search."""
+    speed = speed_of(froude)
+    kept, own = gaits.copy(), gaits.copy()
+    kept[:, 0] *= speed / speed_of(before)
+    own[:, 0] = 2 * np.pi * speed / (stride_at(froude) * HIP_HEIGHT)
+    return decode(encode(np.concatenate([gaits, kept, own])))
 
 
 def order_of(kind: str) -> list[tuple[float, float | None]]:
@@ -198,6 +202,21 @@ class Map:
         runs.write_text(self.path, head + ",\n".join(lines) + "\n]}\n")
 
 
+class Leading:
+    """The cheapest of candidates, `FINALISTS` at most."""
+
+    def __init__(self) -> None:
+        self.gaits: list[Floats] = []
+        self.costs: list[float] = []
+
+    def see(self, gaits: Floats, costs: Floats) -> None:
+        """Take candidates, shape (m, 16), and their costs, shape (m,), into account."""
+        known = [*zip(self.costs, self.gaits, strict=True), *zip(costs.tolist(), gaits, strict=True)]
+        first = sorted(known, key=lambda one: one[0])[:FINALISTS]
+        self.costs = [cost for cost, _ in first]
+        self.gaits = [gait for _, gait in first]
+
+
 class Searcher:
     """Searches for the gaits of one seed.
 
@@ -221,7 +240,7 @@ class Searcher:
     def play(self, rig: Rig, gaits: Floats, froude: float, starts: int) -> dict[str, Floats]:
         """Return figures of gaits, shape (m, 16), from starts that are others in every call."""
         self.played += 1
-        seed = 200_000_000 + 10_000_000 * self.seed + 4 * self.played
+        seed = 200_000_000 + 10_000_000 * self.seed + 32 * self.played
         return rig.play(gaits, speed_of(froude), seed, starts, SECONDS, SETTLED)
 
     def search(self, kind: str, froude: float, known: Floats, is_near: bool) -> list[dict[str, Any]]:
@@ -246,11 +265,21 @@ class Searcher:
 
         # The mixture
         figures = self.play(self.few, known, froude, first.starts)
-        best = known[int(np.argmin(cost(figures, MIXTURE)))]
+        ranks = np.argsort(cost(figures, MIXTURE))
+        best, finalists = known[ranks[0]], known[ranks[:FINALISTS]]
+        # Candidates of one objective are candidates of all
+        leading = {objective: Leading() for objective in OBJECTIVES}
+
+        def seen(gaits: Floats, figures: dict[str, Floats]) -> None:
+            for objective, of_objective in leading.items():
+                of_objective.see(gaits, cost(figures, objective))
+
         strategy = make_strategy(encode(best[None])[0], spread, first.population, number)
         for _ in range(first.near if is_near else first.far):
             points = strategy.ask()
-            figures = self.play(self.few, decode(np.array(points)), froude, first.starts)
+            gaits = decode(np.array(points))
+            figures = self.play(self.few, gaits, froude, first.starts)
+            seen(gaits, figures)
             strategy.tell(points, cost(figures, MIXTURE).tolist())
         found = [strategy.result.xfavorite]
         # The others, side by side
@@ -262,15 +291,20 @@ class Searcher:
             strategies.append(make_strategy(encode(best[None])[0], NEAR, each.population, number + 1 + k))
         for _ in range(each.near if is_near else each.far):
             asked = [one.ask() for one in strategies]
-            figures = self.play(self.many, decode(np.concatenate(asked)), froude, each.starts)
+            gaits = decode(np.concatenate(asked))
+            figures = self.play(self.many, gaits, froude, each.starts)
+            seen(gaits, figures)
             for k, objective in enumerate(SINGLE):
                 own = slice(k * each.population, (k + 1) * each.population)
                 of_one = {name: values[own] for name, values in figures.items()}
                 strategies[k].tell(asked[k], cost(of_one, objective).tolist())
-        # Means of the distributions, not their luckiest candidates
         found += [one.result.xfavorite for one in strategies]
-        gaits = decode(np.array(found)).round(4)
-        return self.rows(kind, froude, gaits, time.monotonic() - began)
+        # Means of the distributions, and what may be better: a candidate may have been lucky
+        best_seen = [gait for one in leading.values() for gait in one.gaits]
+        finalists = np.concatenate([decode(np.array(found)), best_seen, finalists]).round(4)
+        figures = self.play(self.many, finalists, froude, self.many.envs.num_envs // len(finalists))
+        best_of = [int(np.argmin(cost(figures, objective))) for objective in OBJECTIVES]
+        return self.rows(kind, froude, finalists[best_of], time.monotonic() - began)
 
     def rows(self, kind: str, froude: float, gaits: Floats, seconds: float) -> list[dict[str, Any]]:
         """Return the gaits of all objectives, shape (4, 16), with their figures over starts of their own."""
@@ -310,11 +344,12 @@ def search_all(path: Path, seeds: int, first: Effort = FIRST, each: Effort = EAC
                 continue
             searcher = searcher or Searcher(seed, first, each)
             if near is None:
-                known = horse_gaits()[f"kinematic-{kind}"].to_array()[None]
+                stored = horse_gaits()[f"kinematic-{kind}"].to_array()[None]
+                known = paced(stored, froude, froude_of(kinematic_speeds()[f"kinematic-{kind}"], HIP_HEIGHT))
+            elif kind == FREE:
+                known = gaits_of(found.at(froude, seed, [*KINDS]))
             else:
-                known = gaits_of(found.at(near, seed, [*KINDS] if kind == FREE else [kind]))
-            if near != froude:
-                known = np.concatenate([paced(known, speed_of(froude), froude), known])
+                known = paced(gaits_of(found.at(near, seed, [kind])), froude, near)
             rows = searcher.search(kind, froude, known, near == froude)
             found.keep(rows)
             standing = sum(stands_of(row) for row in rows)
