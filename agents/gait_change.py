@@ -64,7 +64,7 @@ of the three over {scales}. The stride is given, since a horse's grows steadily 
 gait: 1.66 Fr^0.215 hip heights, fitted to a trot's (Bullimore and Burn 2006), within {stride_bar}. Duty
 factors, number of peaks and all else are free. A gait counts if it falls in at most a tenth of its starts, is
 within 15 % of the speed, slips less than 0.10 m a stance, lands about once a turn and keeps the stride.
-CMA-ES, {seeds}.
+CMA-ES; seeds: {seeds}, of which not all have all speeds.
 
 **Found.** {found}
 
@@ -78,8 +78,9 @@ gait, and the lag of their walk.
 
 {changes}
 
-*Equal* are gaits that differ by less than {close}; *lag* is that of the best gait of all kinds, and it
-jumps where it differs by more than {jump} strides from one speed to the next.
+*Better* is also a gait where the other was not found. *Equal* are gaits that differ by less than {close}. The
+*lag* is that of the best gait of all kinds; it jumps where it differs by more than {jump} strides from one
+speed to the next.
 
 ## By speed
 
@@ -175,6 +176,23 @@ def seeds_of(rows: Sequence[Row]) -> list[int]:
     return [s for s in seeds if set(KINDS) <= {row["kind"] for row in rows if row["seed"] == s}]
 
 
+def compared(rows: Sequence[Row]) -> list[Row]:
+    """Return the rows of those seeds and Froude numbers at which both walk and trot were searched for: a gait
+    with more searches than the other would not be compared fairly."""
+    kinds: dict[tuple[int, float], set[str]] = {}
+    for row in rows:
+        kinds.setdefault((row["seed"], row["froude"]), set()).add(row["kind"])
+    return [row for row in rows if set(KINDS) <= kinds[row["seed"], row["froude"]]]
+
+
+def as_horses(rows: Sequence[Row], objective: str) -> bool:
+    """Return True if the better gait changes once up to Froude number 1, from walk to trot, and where horses
+    do."""
+    low, high = CHANGES["walk to trot"]
+    slow = [change for change in changes_of(rows, objective) if change[0] < 1]
+    return [change[2:] for change in slow] == [("walk", "trot")] and slow[0][0] <= high and slow[0][1] >= low
+
+
 def span(low: float, high: float) -> str:
     """Return two Froude numbers as text."""
     return f"{low:g} to {high:g}"
@@ -259,6 +277,12 @@ def told(rows: Sequence[Row]) -> str:
             text.append(
                 f"By {TITLES[objective]} the better gait does not change: {', '.join(kinds) or 'none'}"
             )
+    alike = [TITLES[objective] for objective in OBJECTIVES if as_horses(rows, objective)]
+    low, high = CHANGES["walk to trot"]
+    text.append(
+        f"A single change below Froude number 1, from walk to trot and between {low:g} and {high:g} as in "
+        f"horses, has the better gait by: {', '.join(alike) or 'none of them'}"
+    )
     return ". ".join(text) + "."
 
 
@@ -331,7 +355,7 @@ def write(found: Map, out: Path) -> None:
     """Write the page and its figure."""
     folder = out / NAME
     folder.mkdir(parents=True, exist_ok=True)
-    rows = found.rows
+    rows = compared(found.rows)
     draw(rows, folder / "map.png")
     judges = read_judges()
     seeds = {kind: len({row["seed"] for row in rows if row["kind"] == kind}) for kind in (*KINDS, FREE)}
@@ -344,7 +368,7 @@ def write(found: Map, out: Path) -> None:
         trot_lag=f"{judges['trot']['lag']['bar'][1]:g}",
         scales=", ".join(f"{scale:g}" for scale in SCALES.values()),
         stride_bar=f"{STRIDE_BAR:g} in the search and twice that to count",
-        seeds=", ".join(f"{number} seeds of {kind} gaits" for kind, number in seeds.items() if number),
+        seeds=", ".join(f"{kind} {number}" for kind, number in seeds.items()),
         found=told(rows),
         changes=markdown_table(CHANGE_HEAD, change_rows(rows)),
         close=f"{CLOSE:.0%}",
