@@ -44,8 +44,8 @@ the trunk's centre of mass moved backward. The gaits are unchanged, {episodes} s
 
 {table}
 
-Bars, where there are any, are those of the judges ([source](../../agents/judges.json)): fore peak of the walk
-{walk}, of the trot {trot} N/kg; share of the impulse that fore legs bear {share}; net fore force negative.
+Bars are those of [the judges](../../agents/judges.json): fore peak of the walk {walk}, of the trot {trot}
+N/kg. A horse's fore legs bear {share} of the impulse, and brake.
 
 {meaning}
 
@@ -59,9 +59,9 @@ of mass alone: it is the distance of the hind hooves behind it over the distance
 both as means over the load. Moving all hips forward takes the fore hooves away from it and the hind hooves to
 it. With 1.2 m between the hooves, as between the hips, and the trunk's share of the mass, as the legs move
 along, the fore share falls by 0.06 for each 0.1 m, and peaks follow it. The *sign* of the net horizontal
-force does not follow from the hips. Fore and hind legs pull against each other through cranks that move as they are
-commanded, and only their sum has to be zero on average. Which pair brakes is a question of the gait, which no
-criterion of the search asks.
+force does not follow from the hips. Fore and hind legs pull against each other through cranks that move as
+they are commanded, and only their sum has to be zero on average. Which pair brakes is a question of the gait,
+which no criterion of the search asks.
 
 Hips are an input of the model ([the animal](../horse.md#the-animal)), and `Horse-v0` keeps its own: with
 others its reference gaits, its agents and all their figures would be of another animal."""
@@ -120,19 +120,25 @@ def rows_of(figures: dict[str, list[dict[str, Any]]]) -> list[list[str]]:
 
 def summary(figures: dict[str, list[dict[str, Any]]]) -> str:
     """Return what the hips change, in a sentence for each gait."""
+    judges = read_judges()
     told = []
     for name, of_gait in figures.items():
         first, last = of_gait[0], of_gait[-1]
-        signs = {one["net_fore"] > 0 for one in of_gait}
-        roles = "fore legs propel" if signs == {True} else "fore legs brake"
+        low, high = judges[name.removeprefix("kinematic-")]["peak_fore"]["bar"]
+        inside = [
+            f"{distance:g}"
+            for distance, one in zip(FORWARD, of_gait, strict=True)
+            if low <= one["peak_fore"] <= high
+        ]
+        propelling = sum(one["net_fore"] > 0 for one in of_gait)
         told.append(
-            f"with hips {FORWARD[-1]:g} m forward the fore peak of `{name}` falls from "
+            f"With hips {FORWARD[-1]:g} m forward the fore peak of `{name}` falls from "
             f"{first['peak_fore']:.1f} to {last['peak_fore']:.1f} N/kg and the fore share of impulse from "
-            f"{first['impulse_fore']:.2f} to {last['impulse_fore']:.2f}; "
-            + (f"{roles} at every place" if len(signs) == 1 else "which pair brakes changes on the way")
+            f"{first['impulse_fore']:.2f} to {last['impulse_fore']:.2f}. The peak is inside of its bar "
+            + (f"at {', '.join(inside)} m" if inside else "at no place")
+            + f", and fore legs propel at {propelling} of {len(of_gait)} places."
         )
-    text = ". ".join(told) + "."
-    return text[0].upper() + text[1:]
+    return " ".join(told)
 
 
 HEAD = (
