@@ -72,8 +72,10 @@ CMA-ES of {generations} generations each. What it was given is printed as search
 {table}
 
 Landings are in strides after the left hind leg's, {starts} starts each; the lead is the right one. Peaks
-judge: they were not given. A canter counts by the rules of `agents.judge`: it falls in at most a tenth of its
-starts, is within 15 % of the speed, slips less than 0.10 m a stance and lands about once a turn.
+judge: they were not given, and count of a gait with all three landings in their ranges that keeps the rules
+of `agents.judge`: it falls in at most a tenth of its starts, is within 15 % of the speed, slips less than
+0.10 m a stance and lands about once a turn. Episodes start with left and right half a stride apart, and the
+actions bring the canter about in the first strides, in which some of the horses fall.
 
 ```bash
 {command}
@@ -213,7 +215,7 @@ def rows_of(found: list[dict[str, Any]]) -> list[list[str]]:
         for one in found:
             ours = one[f"peak_{leg}"] * GRAVITY
             verdict = "met" if low <= ours <= high else "missed"
-            cells.append(f"{ours:.1f}: " + (verdict if counts(one) else "does not count"))
+            cells.append(f"{ours:.1f}: " + (verdict if counts(one) and lands(one) else "does not count"))
         rows.append([f"{name.replace('_', ' ')} [N/kg]", f"{low:g} to {high:g}", *cells])
     for name, text in (("fell", "share that fell"), ("speed_ratio", "speed over the command")):
         rows.append([text, "", *(f"{one[name]:.2f}" for one in found)])
