@@ -198,6 +198,7 @@ class Rig:
         starts: int,
         seconds: float | None = None,
         settled: float | None = None,
+        actions: Floats | None = None,
     ) -> dict[str, Floats]:
         """Play the beginning of episodes at a commanded speed.
 
@@ -208,10 +209,12 @@ class Rig:
             starts: episodes of each gait.
             seconds: length that is played [s]; None for `SECONDS`.
             settled: time from which on figures count [s]; None for `SETTLED`.
+            actions: constant actions of each gait, shape (m, 16); None for zeros.
 
         Returns:
             Means of figures over upright episodes, shape (m,) each, named as in `gait_figures.play`; "dip"
-            of fore and hind is that of `dips`, and "return" is over all episodes.
+            of fore and hind is that of `dips`, "touch" of a leg is its landing after the left hind leg's, as
+            a share of the stride, "peak" of a leg is in weights, and "return" is over all episodes.
         """
         envs = self.envs
         m = len(gaits)
@@ -219,12 +222,16 @@ class Rig:
         rows = np.concatenate([rows, np.repeat(rows[-1:], envs.num_envs - len(rows), axis=0)])
         n = len(rows)
         envs.reset(seed=[seed + k % starts for k in range(n)], options={"gait": rows, "target_speed": speed})
-        idle = np.zeros((n, 16), np.float32)
+        acted = np.zeros((n, 16), np.float32)
+        if actions is not None:
+            of_rows = np.repeat(actions, starts, axis=0)
+            acted[: len(of_rows)] = of_rows
         sums = np.zeros((len(self.names), len(LEGS), n))
         upright = np.ones(n, bool)
         returns = np.zeros(n)
-        # Sums over landings of fore and of hind hooves
+        # Sums over landings of fore and of hind hooves, and of each
         landed = np.zeros((len(PAIRS), n), complex)
+        touched = np.zeros((len(LEGS), n), complex)
         place = np.zeros((1 + len(LEGS), n))
         forces = np.zeros((len(PAIRS), BINS, n))
         counts = np.full((len(PAIRS), BINS, n), 1e-9)
@@ -234,7 +241,7 @@ class Rig:
         counted = round((SETTLED if settled is None else settled) / envs.dt)
         steps = round((SECONDS if seconds is None else seconds) / envs.dt)
         for k in range(steps):
-            _, rewards, failed, _, infos = envs.step(idle)
+            _, rewards, failed, _, infos = envs.step(acted)
             upright &= ~failed
             returns += np.where(upright, rewards, 0.0)
             measured = np.asarray(infos["measured"]).T
@@ -257,6 +264,7 @@ class Rig:
                 # Two turns a stride: left and right are half a stride apart
                 phase = 2 * rows[:, 0] * (k + part) * envs.dt
                 landings = step["stances"] * np.exp(1j * phase)
+                touched += step["stances"] * np.exp(0.5j * phase)
                 landed += landings.reshape(len(PAIRS), 2, n).sum(1)
                 at = (place[1:] / (2 * np.pi) * BINS).astype(int) % BINS
                 for i in range(len(LEGS)):
@@ -272,7 +280,8 @@ class Rig:
         for k, pair in enumerate(PAIRS):
             figures[f"dip_{pair}"] = dips(forces[k] / counts[k])
         figures["speed_ratio"] = figures["reached"] / speed
-        return self._means(figures, landed[0] * landed[1].conj(), returns, upright, m, starts)
+        touches = dict(zip(LEGS, touched * touched[2].conj(), strict=True))
+        return self._means(figures, landed[0] * landed[1].conj(), touches, returns, upright, m, starts)
 
     def _figures(
         self, sums: dict[str, Floats], seconds: float, travelled: Floats, turns: Floats
@@ -288,13 +297,21 @@ class Rig:
             weight = self.envs.weight
             figures["transport"] = sums["positive_work"].sum(0) / (weight * np.abs(travelled))
             figures["peak"] = stances["peak"].mean(0) / weight
+            for leg, peak in zip(LEGS, stances["peak"], strict=True):
+                figures[f"peak_{leg}"] = peak / weight
             figures["loading"] = (sums["loading_rate_increase"] / sums["stances"]).mean(0) / weight
             figures["stride_over_hip"] = travelled / turns.mean(0) / self.envs.body.height
         return figures
 
     @staticmethod
     def _means(
-        figures: dict[str, Floats], lags: Any, returns: Floats, upright: Any, m: int, starts: int
+        figures: dict[str, Floats],
+        lags: Any,
+        touches: dict[str, Any],
+        returns: Floats,
+        upright: Any,
+        m: int,
+        starts: int,
     ) -> dict[str, Floats]:
         """Return means over the upright episodes of each gait."""
         size = m * starts
@@ -306,6 +323,9 @@ class Rig:
             means[name] = np.where(ok.any(1), each.sum(1) / count, np.nan)
         lag = np.where(ok, lags[:size].reshape(m, starts), 0.0).sum(1)
         means["lag"] = np.where(ok.any(1), np.angle(lag) / (4 * np.pi) % 0.5, np.nan)
+        for leg, values in touches.items():
+            touch = np.where(ok, values[:size].reshape(m, starts), 0.0).sum(1)
+            means[f"touch_{leg}"] = np.where(ok.any(1), np.angle(touch) / (2 * np.pi) % 1.0, np.nan)
         means["return"] = returns[:size].reshape(m, starts).mean(1)
         means["fell"] = 1 - ok.mean(1)
         return means
