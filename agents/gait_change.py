@@ -64,7 +64,7 @@ of the three over {scales}. The stride is given, since a horse's grows steadily 
 gait: 1.66 Fr^0.215 hip heights, fitted to a trot's (Bullimore and Burn 2006), within {stride_bar}. Duty
 factors, number of peaks and all else are free. A gait counts if it falls in at most a tenth of its starts, is
 within 15 % of the speed, slips less than 0.10 m a stance, lands about once a turn and keeps the stride.
-CMA-ES; seeds: {seeds}, of which not all have all speeds.
+CMA-ES; {seeds}.
 
 **Found.** {found}
 
@@ -118,6 +118,8 @@ class Args:
 
     seeds: int = 3
     """searches at each speed, each from its own draws"""
+    search: bool = True
+    """search for what is missing; without it the page is of what is in the file"""
     found: Path = EVIDENCE / NAME / "searches.json"
     """file of found gaits, which is gone on with"""
     out: Path = EVIDENCE
@@ -254,6 +256,16 @@ def speed_rows(rows: Sequence[Row]) -> list[list[str]]:
     return table
 
 
+def effort(rows: Sequence[Row]) -> str:
+    """Return which seeds were searched at which speeds, in words."""
+    parts = []
+    for seed in seeds_of(rows):
+        speeds = sorted({row["froude"] for row in rows if row["seed"] == seed})
+        parts.append(f"seed {seed} at {len(speeds)} Froude numbers from {speeds[0]:g} to {speeds[-1]:g}")
+    free = {(row["seed"], row["froude"]) for row in rows if row["kind"] == FREE}
+    return ", ".join(parts) + f"; searches with any lag at {len(free)} of these"
+
+
 def told(rows: Sequence[Row]) -> str:
     """Return what was found, in sentences."""
     counting = {kind: [f for f in FROUDES if best_of(rows, f, kind, "mixture")] for kind in (*KINDS, FREE)}
@@ -358,7 +370,6 @@ def write(found: Map, out: Path) -> None:
     rows = compared(found.rows)
     draw(rows, folder / "map.png")
     judges = read_judges()
-    seeds = {kind: len({row["seed"] for row in rows if row["kind"] == kind}) for kind in (*KINDS, FREE)}
     page = PAGE.format(
         command="python -m agents.gait_change",
         commit=runs.versions().get("commit", "unknown"),
@@ -368,7 +379,7 @@ def write(found: Map, out: Path) -> None:
         trot_lag=f"{judges['trot']['lag']['bar'][1]:g}",
         scales=", ".join(f"{scale:g}" for scale in SCALES.values()),
         stride_bar=f"{STRIDE_BAR:g} in the search and twice that to count",
-        seeds=", ".join(f"{kind} {number}" for kind, number in seeds.items()),
+        seeds=effort(rows),
         found=told(rows),
         changes=markdown_table(CHANGE_HEAD, change_rows(rows)),
         close=f"{CLOSE:.0%}",
@@ -383,7 +394,8 @@ def write(found: Map, out: Path) -> None:
 def main(argv: list[str] | None = None) -> None:
     """Search for what is missing and write the page."""
     args = parse(Args, argv, "python -m agents.gait_change", __doc__)
-    write(search_all(args.found, count("--seeds", args.seeds)), args.out)
+    seeds = count("--seeds", args.seeds)
+    write(search_all(args.found, seeds) if args.search else Map(args.found), args.out)
 
 
 if __name__ == "__main__":
