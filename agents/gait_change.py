@@ -21,6 +21,7 @@ from agents.gait_map import (
     FREE,
     FROUDES,
     KINDS,
+    MIXTURE,
     OBJECTIVES,
     SCALES,
     STRIDE_BAR,
@@ -50,7 +51,7 @@ Row = dict[str, Any]
 
 PAGE = """# What makes a horse change gait
 
-Written by `{command}` at commit `{commit}`; [all found gaits]({name}/searches.json) were searched at commit
+Written by `{command}` at commit `{commit}`; [the gaits]({name}/searches.json) were searched at commit
 `{searched}`.
 
 **Asked.** Horses walk at low speed, trot from a Froude number of 0.35 to 0.5 on and canter from 2 to 3 on.
@@ -61,9 +62,10 @@ peak force. Does a gait's best lag jump in the model, at which speed, and by whi
 lag, {walk_lag} strides, with a trot's, under {trot_lag}, and with any; by positive work of the drives over
 weight and distance, by the mean of the stances' peaks, by the mean of their steepest rises, and by the mean
 of the three over {scales}. The stride is given, since a horse's grows steadily through its changes of
-gait: 1.66 Fr^0.215 hip heights, fitted to a trot's (Bullimore and Burn 2006), within {stride_bar}. Duty
-factors, number of peaks and all else are free. A gait counts if it falls in at most a tenth of its starts, is
-within 15 % of the speed, slips less than 0.10 m a stance, lands about once a turn and keeps the stride.
+gait: 1.66 Fr^0.215 hip heights, fitted to a trot's (Bullimore and Burn 2006), within {stride_bar}.
+Duty factors, number of peaks and all else are free. A gait counts if it falls in at most a tenth of its
+starts, is within 15 % of the speed, slips less than 0.10 m a stance, lands about once a turn and keeps the
+stride.
 CMA-ES; {seeds}.
 
 **Found.** {found}
@@ -266,35 +268,52 @@ def effort(rows: Sequence[Row]) -> str:
     return ", ".join(parts) + f"; searches with any lag at {len(free)} of these"
 
 
+def agreed(rows: Sequence[Row], objective: str) -> dict[str, list[float]]:
+    """Return the Froude numbers at which each kind is better in every seed, of those that two seeds have."""
+    found: dict[str, list[float]] = {kind: [] for kind in KINDS}
+    for froude in FROUDES:
+        seeds = {row["seed"] for row in rows if row["froude"] == froude}
+        better = {better_of([row for row in rows if row["seed"] == s], froude, objective) for s in seeds}
+        for kind in KINDS:
+            if len(seeds) > 1 and better == {kind}:
+                found[kind].append(froude)
+    return found
+
+
 def told(rows: Sequence[Row]) -> str:
     """Return what was found, in sentences."""
-    counting = {kind: [f for f in FROUDES if best_of(rows, f, kind, "mixture")] for kind in (*KINDS, FREE)}
     text = []
     for kind in KINDS:
-        known = counting[kind]
+        known = [froude for froude in FROUDES if best_of(rows, froude, kind, MIXTURE)]
         missing = [f"{froude:g}" for froude in FROUDES if froude not in known]
         text.append(
             f"Gaits with a {kind}'s lag that count exist at {len(known)} of {len(FROUDES)} Froude numbers"
             + (f", and were not found at {', '.join(missing)}" if missing else "")
         )
-    for objective in OBJECTIVES:
-        changes = changes_of(rows, objective)
-        if changes:
-            said = "; ".join(
-                f"from {x} to {y} between Froude numbers {a:g} and {b:g}" for a, b, x, y in changes
-            )
-            text.append(f"By {TITLES[objective]} the better gait changes {said}")
-        else:
-            kinds = {better_of(rows, froude, objective) for froude in FROUDES} & set(KINDS)
-            text.append(
-                f"By {TITLES[objective]} the better gait does not change: {', '.join(kinds) or 'none'}"
-            )
-    alike = [TITLES[objective] for objective in OBJECTIVES if as_horses(rows, objective)]
     low, high = CHANGES["walk to trot"]
+    each = [[row for row in rows if row["seed"] == s] for s in seeds_of(rows)]
+    pooled = [one for one in OBJECTIVES if as_horses(rows, one)]
+    alone = [one for one in OBJECTIVES if all(as_horses(part, one) for part in each)]
     text.append(
-        f"A single change below Froude number 1, from walk to trot and between {low:g} and {high:g} as in "
-        f"horses, has the better gait by: {', '.join(alike) or 'none of them'}"
+        f"Below Froude number 1 the better gait changes once, from walk to trot and between {low:g} and "
+        f"{high:g} as in horses, by {', '.join(TITLES[one] for one in pooled) or 'nothing'} over all seeds, "
+        f"and by {', '.join(TITLES[one] for one in alone) or 'nothing'} in each seed alone"
     )
+    if not alone:
+        text.append(
+            "Seeds differ as much as gaits do, and the map does not say what makes a horse change gait: a "
+            "null result"
+        )
+    if len(each) > 1:
+        parts = []
+        for objective in OBJECTIVES:
+            same = [
+                f"{kind} at {', '.join(f'{froude:g}' for froude in froudes)}"
+                for kind, froudes in agreed(rows, objective).items()
+                if froudes
+            ]
+            parts.append(f"by {TITLES[objective]} {' and '.join(same) or 'none'}")
+        text.append(f"All seeds agree on the better gait, where there are two: {'; '.join(parts)}")
     return ". ".join(text) + "."
 
 

@@ -65,6 +65,21 @@ def test_the_better_gait_changes_where_the_other_spares_more():
     assert page.better_of(rows, 0.2, "work") == "trot"
 
 
+def test_seeds_that_disagree_are_a_null_result():
+    rows = []
+    for seed in (0, 1):
+        for froude, walk, trot in ((0.2, 0.5, 0.8), (0.35, 0.7, 0.9), (0.6, 1.5, 1.0)):
+            rows += [row(froude, "walk", 0.25, walk, seed), row(froude, "trot", 0.0, trot, seed)]
+    assert "by mixture, work over all seeds, and by mixture, work in each seed" in page.told(rows)
+    assert "null" not in page.told(rows)
+    assert page.agreed(rows, "work") == {"walk": [0.2, 0.35], "trot": [0.6]}
+    rows[0]["transport"] = 1.2
+    assert "by mixture, work over all seeds, and by nothing in each seed alone. Seeds differ" in page.told(
+        rows
+    )
+    assert page.agreed(rows, "work") == {"walk": [0.35], "trot": [0.6]}
+
+
 def test_only_seeds_with_both_gaits_are_compared():
     rows = [row(0.2, "walk", 0.25), row(0.2, "trot", 0.0), row(0.2, "walk", 0.25, seed=1)]
     rows.append(row(0.35, "trot", 0.0, seed=0))
