@@ -353,7 +353,7 @@ def draw(rows: Sequence[Row], path: Path) -> None:
         up.set_title(TITLES[objective], fontsize=LETTERS)
         down.set_xlabel("Froude number", fontsize=LETTERS)
         down.set_xticks([0.1, 0.3, 1, 3], ["0.1", "0.3", "1", "3"])
-    axes[0, 0].set_ylabel("spared, over its scale [-]", fontsize=LETTERS)
+    axes[0, 0].set_ylabel("figure over its scale, less is better [-]", fontsize=LETTERS)
     axes[1, 0].set_ylabel("lag of the best gait [strides]", fontsize=LETTERS)
     axes[0, 0].legend(fontsize=LETTERS, frameon=False)
     picture.savefig(path, metadata={"Software": None})
