@@ -13,6 +13,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 from tyro.conf import Positional
 
 from agents import runs
@@ -175,6 +176,16 @@ def fall_rows(families: Mapping[str, Sequence[Figures]], episodes: int) -> list[
     return rows
 
 
+def shown(value: float | None, digits: int) -> str:
+    """Return a number as text, "-" for a figure of a gait of which every start falls."""
+    return "-" if value is None or np.isnan(value) else f"{value:.{digits}f}"
+
+
+def without_nan(figures: Figures) -> Figures:
+    """Return figures with None in place of NaN, which JSON has not."""
+    return {name: None if isinstance(x, float) and np.isnan(x) else x for name, x in figures.items()}
+
+
 def search_rows(searches: Mapping[str, Figures]) -> list[list[str]]:
     """Return a row for each search that ended in a gait."""
     rows = []
@@ -184,6 +195,8 @@ def search_rows(searches: Mapping[str, Figures]) -> list[list[str]]:
         inside = 0
         for figure, of_figure in bars.items():
             ours = one[figure]
+            if ours is None:
+                continue
             if figure == "lag":
                 middle = sum(of_figure[0]) / 2
                 ours = middle + (ours - middle + 0.25) % 0.5 - 0.25
@@ -192,13 +205,13 @@ def search_rows(searches: Mapping[str, Figures]) -> list[list[str]]:
             [
                 name,
                 f"{inside} of {len(bars)}",
-                f"{one['fell']:.3f}",
-                f"{max(one['slip_fore'], one['slip_hind']):.3f}",
-                f"{one['peak']:.2f}",
-                f"{one['transport']:.2f}",
-                f"{one['loading']:.0f}",
-                f"{one['return']:.0f}",
-                f"{one['wall_s']:.0f}",
+                shown(one["fell"], 3),
+                shown(None if one["slip_fore"] is None else max(one["slip_fore"], one["slip_hind"]), 3),
+                shown(one["peak"], 2),
+                shown(one["transport"], 2),
+                shown(one["loading"], 0),
+                shown(one["return"], 0),
+                shown(one["wall_s"], 0),
             ]
         )
     return rows
@@ -235,7 +248,8 @@ def write(args: Args) -> None:
     episodes = count("--episodes", args.episodes)
     searches: dict[str, Figures] = {}
     for path in args.searches:
-        searches |= parse_json(path.read_text(encoding="utf-8"))["searches"]
+        of_file = parse_json(path.read_text(encoding="utf-8"))["searches"]
+        searches |= {name: without_nan(one) for name, one in of_file.items()}
     folder = args.out / NAME
     folder.mkdir(parents=True, exist_ok=True)
     command, versions = "python -m agents.kinematic_page", runs.versions()
