@@ -65,8 +65,8 @@ Cells have our figure and the verdict; `agents/judges.json` has the sources.
 
 {judges}
 
-Left and right legs are half a stride apart, so there is no canter to judge: of a canter's fore limbs McGuigan
-and Wilson (2003) print 9.74 and 11.96 N/kg for the leading and the other one.
+Left and right legs are half a stride apart, so there is no canter to judge among these; [with a free
+footfall](canter.md) there is.
 
 ![Normal and horizontal force over the stance in the kinematic gaits](horse_gaits/forces.png)
 
