@@ -65,8 +65,8 @@ Cells have our figure and the verdict; `agents/judges.json` has the sources.
 
 {judges}
 
-Left and right legs are half a stride apart, so there is no canter to judge: of a canter's fore limbs McGuigan
-and Wilson (2003) print 9.74 and 11.96 N/kg for the leading and the other one.
+Left and right legs are half a stride apart, so there is no canter to judge among these; [with a free
+footfall](canter.md) there is.
 
 ![Normal and horizontal force over the stance in the kinematic gaits](horse_gaits/forces.png)
 
@@ -113,6 +113,8 @@ class Args:
     """files of `agents.kinematic_gaits`, whose searches are kept with the page"""
     episodes: int = 1000
     """starts of each gait"""
+    play: bool = True
+    """play the gaits; without it the page has the figures that are kept with it, and other searches"""
     out: Path = EVIDENCE
     """folder of the page"""
 
@@ -124,9 +126,10 @@ def read_searches(path: Path) -> dict[str, Figures]:
         DataFileError: there is no such file, or it has another content.
     """
     try:
-        searches: dict[str, Figures] = parse_json(path.read_text(encoding="utf-8"))["searches"]
+        found = parse_json(path.read_text(encoding="utf-8"))["searches"]
+        searches: dict[str, Figures] = {name: without_nan(one) for name, one in found.items()}
         search_rows(searches)
-    except (OSError, ValueError, KeyError, TypeError) as error:
+    except (OSError, ValueError, KeyError, TypeError, AttributeError) as error:
         raise DataFileError(f"{path}: expected searches of agents.kinematic_gaits: {error!r}") from None
     return searches
 
@@ -201,6 +204,16 @@ def fall_rows(families: Mapping[str, Sequence[Figures]], episodes: int) -> list[
     return rows
 
 
+def shown(value: float | None, digits: int) -> str:
+    """Return a number as text, "-" for a figure of a gait of which every start falls."""
+    return "-" if value is None or np.isnan(value) else f"{value:.{digits}f}"
+
+
+def without_nan(figures: Figures) -> Figures:
+    """Return figures with None in place of NaN, which JSON has not."""
+    return {name: None if isinstance(x, float) and np.isnan(x) else x for name, x in figures.items()}
+
+
 def search_rows(searches: Mapping[str, Figures]) -> list[list[str]]:
     """Return a row for each search that ended in a gait."""
     rows = []
@@ -210,6 +223,8 @@ def search_rows(searches: Mapping[str, Figures]) -> list[list[str]]:
         inside = 0
         for figure, of_figure in bars.items():
             ours = one[figure]
+            if ours is None:
+                continue
             if figure == "lag":
                 middle = sum(of_figure[0]) / 2
                 ours = middle + (ours - middle + 0.25) % 0.5 - 0.25
@@ -218,13 +233,13 @@ def search_rows(searches: Mapping[str, Figures]) -> list[list[str]]:
             [
                 name,
                 f"{inside} of {len(bars)}",
-                f"{one['fell']:.3f}",
-                f"{max(one['slip_fore'], one['slip_hind']):.3f}",
-                f"{one['peak']:.2f}",
-                f"{one['transport']:.2f}",
-                f"{one['loading']:.0f}",
-                f"{one['return']:.0f}",
-                f"{one['wall_s']:.0f}",
+                shown(one["fell"], 3),
+                shown(None if one["slip_fore"] is None else max(one["slip_fore"], one["slip_hind"]), 3),
+                shown(one["peak"], 2),
+                shown(one["transport"], 2),
+                shown(one["loading"], 0),
+                shown(one["return"], 0),
+                shown(one["wall_s"], 0),
             ]
         )
     return rows
@@ -264,20 +279,26 @@ def write(args: Args) -> None:
     searches: dict[str, Figures] = {}
     for path in args.searches:
         searches |= read_searches(path)
-    envs = make_rows(ENV_ID, episodes)
-    families = played(envs)
-    loose = {"from any phase": from_any_phase(envs)}
-    rows = judged_rows(families)
     folder = args.out / NAME
     folder.mkdir(parents=True, exist_ok=True)
     command, versions = "python -m agents.kinematic_page", runs.versions()
+    if args.play:
+        envs = make_rows(ENV_ID, episodes)
+        families = played(envs)
+        loose = {"from any phase": from_any_phase(envs)}
+    else:
+        kept_figures = parse_json((folder / "figures.json").read_text(encoding="utf-8"))
+        families, versions = kept_figures["families"], kept_figures["versions"]
+        loose = {"from any phase": families.pop("from any phase")}
+    rows = judged_rows(families)
     about = {"command": command, "versions": versions}
     kept = json.dumps(about | {"searches": searches}, indent=1) + "\n"
     runs.write_text(folder / "searches.json", kept)
-    runs.write_text(
-        folder / "figures.json", json.dumps(about | {"families": families | loose}, indent=1) + "\n"
-    )
-    draw({"kinematic": families["kinematic"]}, folder)
+    if args.play:
+        runs.write_text(
+            folder / "figures.json", json.dumps(about | {"families": families | loose}, indent=1) + "\n"
+        )
+        draw({"kinematic": families["kinematic"]}, folder)
     head = ("search", "searched rows", "fell", "slip [m]", "peak [weights]", "transport", "loading [1/s]")
     page = PAGE.format(
         command=command,
@@ -324,7 +345,7 @@ later ones measure it by the times of landings. The named gait of the trot is th
 work, which began with the stored trot-like gait at the same strides and leads; its lag is 0.07 strides. The
 one search for a trot by force ended in a gait that falls more often, so the trot that ships is by work and
 the walk by force."""
-"""How what ships was found, and what the searches by other criteria end in."""
+"""Commands of the searches whose gaits ship, and the choice of their criteria."""
 
 NOT_A_HORSE = {
     "walk": "a hind leg lies nearly flat behind the animal in its swing, because the linkage folds backward. "

@@ -100,6 +100,7 @@ SETTINGS: tuple[tuple[str, dict[str, Any]], ...] = (
     ("bits/Own-v0", {"observation": ["watch", "feel", "crank"], "reward_weights": {"sway": 0.0}}),
     (HORSE, {"size": 0.5}),
     (HORSE, {"harmonics": 1, "filters": "slow"}),
+    (HORSE, {"footfall": "free"}),
     (HORSE, {"gait": "walk", "target_speed": [1.5, 1.5]}),
     (HORSE, {"drive": "motor", "terrain": {"kind": "hills", "seed": 1, "rise": 0.02}}),
     (HORSE, {"randomize": {"trunk_mass": [300, 400], "friction": [0.4, 0.8]}}),

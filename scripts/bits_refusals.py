@@ -82,6 +82,7 @@ BAD_SETTINGS: tuple[tuple[str, dict[str, Any]], ...] = (
     (HORSE, {"size": -1}),
     (HORSE, {"harmonics": 5}),
     (HORSE, {"filters": "none"}),
+    (HORSE, {"footfall": "none"}),
     (HORSE, {"crank_rate": 5.0}),
     (HORSE, {"gait": "tölt"}),
     (HORSE, {"trunk_share": 0.5}),

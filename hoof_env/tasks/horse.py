@@ -106,12 +106,17 @@ SPANS = (0.4, 0.04, 0.04, 0.04)
 coefficient [rad]. They are wide enough for the best known agents. With `COUPLING` the first updates of a
 learner cost little, see docs/evidence/actions.md."""
 
+PHASE_SPAN = 0.25
+"""Shift of a leg's phase under a constant action of 1 where the footfall is free [strides]: two legs can be
+half a stride away from where the gait has them, which is any footfall."""
+
 STEP_ERROR = 0.03
 """Error after a contact for which the engine chooses its step [-]. With 0.01 semi-implicit Euler would take
 three steps for a millisecond; speeds, peaks and duty factors of the reference gaits are the same to a
 hundredth."""
 
 FILTERS = {"quick": QUICK, "slow": FilterSettings()}  # command filters, by the setting `filters`
+FOOTFALLS = ("fixed", "free")  # values of the setting `footfall`
 
 LEG_ONLY_SETTINGS = "trunk", "hip_height", "hoof_length", "solver"
 """Settings of which a horse accepts only the default."""
@@ -148,7 +153,7 @@ class HorseEpisode(Episode):
 HORSE_KERNELS = BodyKernels(
     legs=COUNT,
     episode=HorseEpisode,
-    task_fields=tuple(reference_type()),
+    task_fields=(("is_free", "?"), *reference_type()),
     scratch_size=SCRATCH_SIZE,
     command=command_gait,
     on_switch=refer_to_target,
@@ -167,6 +172,7 @@ class Horse:
         gaits: stored gaits by name, converted to the size of the animal.
         policy_starts: see `body.Body`; of kinematic gaits.
         gait: gait to which actions add offsets at all commanded speeds; None for `reference_gaits`.
+        is_free: True if the first action of a leg shifts its phase, False if it scales its crank's speed.
         lowest, highest: heights of the trunk beyond which the animal has fallen [m].
 
     Raises:
@@ -175,9 +181,6 @@ class Horse:
 
     kernels = HORSE_KERNELS
     picture = "horse"
-    action_names: tuple[str, ...] = tuple(f"{leg}_{name}" for leg, name in product(LEGS, PARAMETERS))
-    # The spans are in the tag, so that policies, states and datasets with different spans are refused.
-    action_form = f"offsets of {SPANS[0]:g} and {SPANS[1]:g} rad"
     step_error = STEP_ERROR
     start_names: tuple[str, ...] = ("phase", "speed", "pitch", "x")
     gait_names: tuple[str, ...] = NAMES
@@ -204,6 +207,13 @@ class Horse:
         self.harmonics = 2 if s.harmonics is None else count("harmonics", s.harmonics, most=2)
         filters = "quick" if s.filters is None else check_choice("filters", s.filters, FILTERS)
         self.filters = FILTERS[filters].sped_up(1 / self.speed_scale)
+        footfall = "fixed" if s.footfall is None else check_choice("footfall", s.footfall, FOOTFALLS)
+        self.is_free = footfall == "free"
+        names = ("phase", *PARAMETERS[1:]) if self.is_free else PARAMETERS
+        self.action_names: tuple[str, ...] = tuple(f"{leg}_{name}" for leg, name in product(LEGS, names))
+        # The spans are in the tag, so that policies, states and datasets with different spans are refused.
+        first = f"{PHASE_SPAN:g} strides" if self.is_free else f"{SPANS[0]:g}"
+        self.action_form = f"offsets of {first} and {SPANS[1]:g} rad"
         if s.hip_height is not None:
             raise ParameterError(
                 f"hip_height: expected `size` in place of it for a horse, got {brief(s.hip_height)}"
@@ -287,6 +297,8 @@ class Horse:
         high[0] = rates(self.size)[1]
         half = np.zeros(gait)
         half[:ACTED] = SPANS
+        if self.is_free:
+            half[0] = PHASE_SPAN
         return {
             "half": half,
             "low": low,
@@ -295,6 +307,7 @@ class Horse:
             # The engine's own limits end episodes; see `Horse.limits`.
             "lowest": -np.inf,
             "highest": np.inf,
+            "is_free": self.is_free,
             **reference_constants(self.speed_scale, follows=self.gait is None),
         }
 

@@ -395,8 +395,18 @@ def command_gait(
     """Command the gait of the episode plus the offsets of the actions; `scratch` has room for
     `SCRATCH_SIZE` numbers. See `body.BodyKernels.command`.
 
-    The first action of a leg scales its crank's speed, the remaining three are added to the swing's first
-    coefficients. The first loop finds the phase of every leg, which the coupling in the second one needs."""
+    The first action of a leg scales its crank's speed or, where the footfall is free, shifts its phase; the
+    remaining three are added to the swing's first coefficients. The first loop finds the phase of every leg,
+    less the shift, which the coupling in the second one needs."""
+
+    def offset_of(at: int, k: int) -> Lanes:
+        """Follow the action at a place, the k-th of its leg; return the offset in its unit."""
+        action = clip(read(actions, n * (COUNT * ACTED) + at, COUNT * ACTED, first_leg.lanes), 1.0)
+        offset = episode.offset[at]
+        offset = offset + FOLLOWED * (action - offset)
+        episode.offset[at] = offset
+        return rounded(task.half[k] * offset)
+
     gait = episode.gait
     together = vector(full_like(episode, 0.0), 0.0)
     for p in range(len(PAIRS)):
@@ -414,6 +424,10 @@ def command_gait(
             crank = vector(cosine, sine)
             # Phase of the stride that this leg alone would be in: the same for all legs that are in step.
             phase = sign * (conjugate(begin) * phase_of(wave, half, fold, crank))
+            if task.is_free:
+                # A leg that is where its action wants it to be is in step
+                cosine, sine = cos_sin(2.0 * math.pi * offset_of(i * ACTED, 0))
+                phase = conjugate(vector(cosine, sine)) * phase
             scratch[3 * i] = speed * (1.0 + dot(wave, crank))
             scratch[3 * i + 1] = phase.real
             scratch[3 * i + 2] = phase.imag
@@ -426,13 +440,8 @@ def command_gait(
         speed = scratch[3 * i] * (1.0 + (COUPLING / COUNT) * behind)
         for k in range(parameters):
             offset = 0.0 * speed
-            if k < ACTED:
-                at = i * ACTED + k
-                action = clip(read(actions, n * (COUNT * ACTED) + at, COUNT * ACTED, first_leg.lanes), 1.0)
-                offset = episode.offset[at]
-                offset = offset + FOLLOWED * (action - offset)
-                episode.offset[at] = offset
-                offset = rounded(task.half[k] * offset)
+            if k < ACTED and not (task.is_free and k == 0):
+                offset = offset_of(i * ACTED + k, k)
             wanted = speed * (1.0 + offset)
             if k > 0:
                 wanted = pair.swing[k - 1] + offset

@@ -403,6 +403,17 @@ class Settings:
             needs=("trunk", ("free",)),
         ),
     ] = None
+    footfall: Annotated[
+        str | None,
+        About(
+            "",
+            (
+                'of a horse: "fixed" has the first action of each leg scale the speed of its crank, "free" '
+                "has it shift the leg's phase by up to a quarter of a stride; None for fixed"
+            ),
+            needs=("trunk", ("free",)),
+        ),
+    ] = None
     # Observation, reward, and variation
     observation: Annotated[Sequence[str], About("", "groups to observe, in this order")] = (
         "crank",

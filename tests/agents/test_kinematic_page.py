@@ -22,6 +22,12 @@ def test_searched_rows_are_counted_inside_of_their_bars():
     assert [row[1] for row in found] == ["5 of 5", "3 of 5"]
 
 
+def test_a_search_that_ends_in_a_fall_has_no_figures():
+    nothing = {name: float("nan") for name in SEARCH} | {"fell": 1.0, "return": 3.0, "wall_s": 60.0}
+    (row,) = page.search_rows({"walk at 0.2 by force, seed 0, best": page.without_nan(nothing)})
+    assert row[1:] == ["0 of 5", "1.000", "-", "-", "-", "-", "3", "60"]
+
+
 def test_what_is_searched_with_is_neither_met_nor_missed():
     rows = [
         ["walk: lag", "0.25", "0.2 to 0.3", "0.1: missed by -50%", "0.25: searched, inside"],

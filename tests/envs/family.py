@@ -41,7 +41,7 @@ OTHER = {name: LARGER[name] for name in (*PER_EPISODE, *NEEDED) if name in LARGE
     "trunk_drag": 60.0, "stiffness": 4e4, "restitution": 0.9, "approach_floor": 9.0, "friction": 0.1,
     "friction_slow": 0.04, "friction_fast": 0.2, "motor_gain": 30.0, "motor_torque": 100.0,
     "motor_inertia": 2.0, "target_seconds": (0.02, 0.1), "exponent": 1.25, "size": 1.2, "harmonics": 1,
-    "filters": "slow", "crank_rate": 5.0, "swing_rate": 0.3,
+    "filters": "slow", "footfall": "free", "crank_rate": 5.0, "swing_rate": 0.3,
 }  # fmt: skip
 """Values other than the defaults of settings that an episode may change or that need another setting."""
 

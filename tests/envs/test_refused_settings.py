@@ -178,6 +178,7 @@ SETTINGS = {
         ({"size": 3.0}, "size: expected"),
         ({"harmonics": 3}, "harmonics: expected"),
         ({"filters": "fast"}, "filters: expected .*quick, slow, got 'fast'"),
+        ({"footfall": "loose"}, "footfall: expected .*fixed, free, got 'loose'"),
         ({"gait": "canter"}, "gait: expected one of"),
         ({"hoof_stiffness": None, "hoof_damping": 100.0}, "hoof_damping: expected a hoof_stiffness"),
         ({"trunk_share": 0.5}, "trunk_share: expected none .*horse"),
