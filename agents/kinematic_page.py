@@ -150,11 +150,11 @@ def played(envs: Any) -> dict[str, list[Figures]]:
     found: dict[str, list[Figures]] = {
         "predicted": [play(envs, zero, speed_of(froude)) for froude in PREDICTED],
         "trot-like": [play(envs, zero, TROT_SPEED, horse_gaits()["trot-like"].to_array())],
+        BY_WORK: [earlier_walk(envs)],
         "kinematic": [
             play(envs, make_policy(name, envs), speed) | {"searched": True, "name": name}
             for name, speed in kinematic_speeds().items()
         ],
-        BY_WORK: [earlier_walk(envs)],
     }
     return found
 
