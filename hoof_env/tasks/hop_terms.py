@@ -6,8 +6,8 @@ this leg cannot avoid."""
 from __future__ import annotations
 
 from hoof_env.simd import Lanes, Number
-from hoof_env.tasks.observation import ENTRIES
-from hoof_env.tasks.reward import Outcome, Term, energy, failure, loading, progress, slip
+from hoof_env.tasks.observation import ENTRIES, Entry, tanh_of
+from hoof_env.tasks.reward import Outcome, Term, energy, failure, loading, overspeed, progress, slip
 
 
 def peak(step: Outcome, weight: Number) -> Lanes:
@@ -44,5 +44,19 @@ HOP_TERMS = (
 )
 """Terms of the reward of `HorseLegHop-v0`, in the order in which they are added."""
 
+BALANCE_SPEED_TERMS = (
+    HOP_TERMS[0],
+    Term("overspeed", 10.0, "1/m", "minus forward travel beyond the commanded speed", overspeed),
+    *HOP_TERMS[1:],
+)
+"""Terms of the reward of `HorseLegBalanceSpeed-v0`."""
+
 HOP_ENTRIES = tuple(entry for entry in ENTRIES if entry.name != "bearing allowance")
 """Entries that can be observed on `HorseLegHop-v0`."""
+
+BALANCE_ENTRIES = (
+    *HOP_ENTRIES,
+    Entry("pitch", "trunk", "rad", lambda s: s.trunk.state.moving.pitch, tanh_of(0.3)),
+    Entry("pitch rate", "trunk", "rad/s", lambda s: s.trunk.report.pitch_rate, tanh_of(2.0)),
+)
+"""Entries that can be observed of a leg under a trunk that pitches."""
