@@ -24,7 +24,7 @@ from gymnasium.vector import AutoresetMode, SyncVectorEnv
 from hoof_env.simd import threads
 
 LEG, FIXED, OWN = "hoof_env/HorseLeg-v0", "hoof_env/HorseLegFixed-v0", "own/Everything-v0"
-HOP = "hoof_env/HorseLegHop-v0"  # begins in the air
+HOPS = tuple(f"hoof_env/HorseLeg{name}-v0" for name in ("Hop", "Balance", "BalanceSpeed"))  # begin in the air
 
 
 @dataclass(frozen=True)
@@ -218,7 +218,7 @@ def alone(name: str, mode: AutoresetMode) -> tuple[Any, list[Found]]:
     run = Run(case, mode, Way(case.alone, 0))
     found = run.rest()
     assert sum(each.done.sum() for each in found) >= case.ends
-    if case.env_id == HOP or (case.env_id == FIXED and case.settings is not PAPER):
+    if case.env_id in HOPS or (case.env_id == FIXED and case.settings is not PAPER):
         return run.first, found  # whose episodes are too short to be sure of a contact
     told = [summary for each in found for summary in each.answers.get("episode_summary", ())]
     assert max(summary["duty_factor"] for summary in told) > 0
