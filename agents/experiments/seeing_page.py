@@ -209,8 +209,8 @@ def verdict(data: Mapping[str, Any], env_id: str) -> str:
     falls, blind_falls = over["failed"], interval_of(gaits[name], "failed")
     is_half = "are apart" if falls.high < 0.5 * blind_falls.low else "are not apart"
     return (
-        f"Sighted agents return {seen.text(0)} (interquartile mean of {len(seeds)} seeds and its interval), the"
-        f" best policy without feedback, {GAITS[name]}, {blind.text(0)}, the zero action {zero.text(0)}."
+        f"Sighted agents return {seen.text(0)} (interquartile mean of {len(seeds)} seeds and its interval),"
+        f" the best policy without feedback, {GAITS[name]}, {blind.text(0)}, the zero action {zero.text(0)}."
         f" Seeing gains {share:.2f} of what agents gain over the zero action, at least {least:.2f} where"
         f" intervals are taken at their worst: the bar of a quarter {is_met}. Agents fall in"
         f" {falls.text(1, 100)} % of their episodes, the policy without feedback in"
@@ -272,9 +272,9 @@ PAGE = """# Where seeing pays on one leg
 
 Policies on [`HorseLegBalance-v0`](../environments/HorseLegBalance.md) and
 [`HorseLegBalanceSpeed-v0`](../environments/HorseLegBalanceSpeed.md). Written by
-`python -m agents.experiments --plan seeing` from [seeing.json](seeing.json). Numbers are means over trainings, in
-brackets the lowest and the highest; a single number is of one policy. Trained by the code of {commits}. All play
-the same episodes, of which agents of several trainings play the first {starts}.
+`python -m agents.experiments --plan seeing` from [seeing.json](seeing.json). Numbers are means over
+trainings, in brackets the lowest and the highest; a single number is of one policy. Trained by the code of
+{commits}. All play the same episodes, of which agents of several trainings play the first {starts}.
 
 {sections}
 
@@ -283,8 +283,8 @@ the same episodes, of which agents of several trainings play the first {starts}.
 ![Return and falls under pushes]({picture})
 
 `HorseLegBalance-v0` under pushes forward and back every {shortest:g} to {longest:g} s, uniform up to the
-impulse of a column; 86 N s are 1.5 m/s times the mass, as on `HorseRough-v0`. No agent was trained with pushes. A
-cell has return; falls.
+impulse of a column; 86 N s are 1.5 m/s times the mass, as on `HorseRough-v0`. No agent was trained with
+pushes. A cell has return; falls.
 
 {pushes}
 
