@@ -51,7 +51,7 @@ SETTINGS = {
             {"preset": "no_such_leg"},
             "preset: expected .*, klann, got 'no_such_leg'",
         ),
-        ({"trunk": "floating"}, "trunk: expected .*fixed, rail, suspended, got 'floating'"),
+        ({"trunk": "hovering"}, "trunk: expected .*fixed, rail, suspended, got 'hovering'"),
         ({"trunk": "free"}, "trunk: expected .*fixed, rail, suspended, got 'free'"),
         ({"trunk": 3}, "trunk: expected .*fixed, rail, suspended, got 3"),
         ({"gait": "trot"}, "gait: expected .*carrying_walk, run, walk, got 'trot'"),
