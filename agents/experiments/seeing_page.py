@@ -78,21 +78,7 @@ def read_data(folder: Path) -> dict[str, Any]:
 
 def publish(plan: Sequence[Entry], folder: Path, out: Path) -> dict[str, Any]:
     """Add the trainings of `folder` that are done to the data in `out`, play gaits anew, and return all."""
-    data = read_data(out)
-    learners: dict[str, Any] = data.get("learners", {})
-    for one in (Run(entry, seed) for entry in plan for seed in range(entry.seeds)):
-        if not is_done(one, folder):
-            continue
-        outcome = read_outcome(one, folder)
-        seeds = learners.setdefault(key_of(one.entry), {})
-        known = seeds.get(str(one.seed), {})
-        seeds[str(one.seed)] = {
-            "steps": int(outcome.final["steps"]),
-            "cpu_s": round(outcome.final["cpu_s"], 1),
-            "commit": runs.read_record(outcome.folder)["versions"].get("commit", ""),
-            **rounded(figures_of(outcome.final["episodes"])),
-            "pushed": known.get("pushed") or pushed(str(outcome.folder), one.entry),
-        }
+    learners = learned(plan, folder, read_data(out).get("learners", {}))
     data = {
         "learners": learners,
         "gaits": {env_id: {name: played(name, env_id) for name in GAITS} for env_id in IDS},
@@ -103,6 +89,25 @@ def publish(plan: Sequence[Entry], folder: Path, out: Path) -> dict[str, Any]:
     out.mkdir(parents=True, exist_ok=True)
     runs.write_text(out / DATA, json.dumps(data, indent=1) + "\n")
     return data
+
+
+def learned(plan: Sequence[Entry], folder: Path, known: dict[str, Any]) -> dict[str, Any]:
+    """Return the figures of the trainings that are known and of those of `folder` that are done, by learner
+    and seed; pushes that are known are not played again."""
+    for one in (Run(entry, seed) for entry in plan for seed in range(entry.seeds)):
+        if not is_done(one, folder):
+            continue
+        outcome = read_outcome(one, folder)
+        seeds = known.setdefault(key_of(one.entry), {})
+        pushes = seeds.get(str(one.seed), {}).get("pushed")
+        seeds[str(one.seed)] = {
+            "steps": int(outcome.final["steps"]),
+            "cpu_s": round(outcome.final["cpu_s"], 1),
+            "commit": runs.read_record(outcome.folder)["versions"].get("commit", ""),
+            **rounded(figures_of(outcome.final["episodes"])),
+            "pushed": pushes if pushes else pushed(str(outcome.folder), one.entry),
+        }
+    return known
 
 
 def played(name: str, env_id: str) -> dict[str, Any]:
