@@ -95,6 +95,8 @@ _TASKS = {
     "HorseLegSafe": "safe",
     "HorseLegTerrain": "terrain",
     "HorseLegHop": "hop",
+    "HorseLegBalance": "balance",
+    "HorseLegBalanceSpeed": "balance_speed",
     "HorseLegFixed": "fixed",
     "Horse": "horse",
     "HorseRough": "rough",

@@ -19,7 +19,7 @@ LIVE = [page for page in PAGES if not {"evidence", "studies"} & {*page.parts}]
 """Frozen pages name the commands of their commits."""
 HAND_WRITTEN = (
     "agents", "contexts", "decisions", "elasticity", "engine", "help", "hop", "horse", "jax", "look_inside",
-    "own_task", "paper", "parameters", "project", "start", "task", "view",
+    "own_task", "paper", "parameters", "project", "seeing", "start", "task", "view",
 )  # fmt: skip
 BLOCK = re.compile(r"^```(\w*)\n(.*?)^```", re.MULTILINE | re.DOTALL)
 EXAMPLES = [
@@ -176,6 +176,7 @@ def test_every_frozen_page_says_of_which_commit_it_is():
             "costs.md",
             "hop.md",
             "jax.md",
+            "seeing.md",
             "horse_gaits.md",
             "horse_forces.md",
             "gait_change.md",

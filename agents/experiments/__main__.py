@@ -7,6 +7,7 @@
     python -m agents.experiments --plan trainers --workers 1  speed of PPO and PPO_FLAT, by turns
     python -m agents.experiments --plan costs                 learners with and without a constraint
     python -m agents.experiments --plan hop                   learners of a leg that carries itself
+    python -m agents.experiments --plan seeing                learners of a leg that balances its trunk
     python -m agents.experiments --plan stock --no-train      the page alone
 
 The plans are files of agents/plans. A training that is done is not repeated: after Ctrl-C, or kill -9, the
@@ -25,7 +26,7 @@ from pathlib import Path
 from typing import Any
 
 from agents.command import parse, run
-from agents.experiments import baselines_page, costs_page, curves, hop_page, runner, stock_page
+from agents.experiments import baselines_page, costs_page, curves, hop_page, runner, seeing_page, stock_page
 from agents.experiments.outcomes import is_done, read_outcome
 from agents.experiments.plans import FOLDERS, Entry, Plan, Run, load_plan, runs_of
 from hoof_env._output import check_folder
@@ -48,7 +49,7 @@ class Args:
     """trainings at a time, one thread each"""
     out: Path | None = None
     """folder of trainings and page; otherwise runs/baselines, or the plan's own; the pages of stock learners,
-    of costs and of the leg that carries itself are in docs/evidence"""
+    of costs and of the legs that carry themselves are in docs/evidence"""
     train: bool = True
     """train; otherwise write the page of the trainings that are done"""
     page: bool = True
@@ -62,7 +63,12 @@ class Args:
     @property
     def published(self) -> Path:
         """Folder of the page."""
-        places = {"stock": curves.PUBLISHED, "costs": costs_page.PUBLISHED, "hop": hop_page.PUBLISHED}
+        places = {
+            "stock": curves.PUBLISHED,
+            "costs": costs_page.PUBLISHED,
+            "hop": hop_page.PUBLISHED,
+            "seeing": seeing_page.PUBLISHED,
+        }
         return self.out or places.get(self.plan, self.folder)
 
 
@@ -127,6 +133,8 @@ def write_page(args: Args) -> Path:
         return costs_page.write(args.published, costs_page.publish(entries, args.folder, args.published))
     if args.plan == "hop":
         return hop_page.write(args.published, hop_page.publish(entries, args.folder, args.published))
+    if args.plan == "seeing":
+        return seeing_page.write(args.published, seeing_page.publish(entries, args.folder, args.published))
     return baselines_page.write(f"the {args.plan} plan", entries, args.folder)
 
 

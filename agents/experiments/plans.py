@@ -18,10 +18,10 @@ from hoof_env.errors import DataFileError
 PLANS = Path(__file__).parents[1] / "plans"
 """Folder of the plans."""
 
-Plan = Literal["full", "nightly", "trainers", "stock", "costs", "hop"]
+Plan = Literal["full", "nightly", "trainers", "stock", "costs", "hop", "seeing"]
 """Names of the plans: the table of baselines, a small part of it that takes minutes, trainers of PPO compared
-with each other, learners with the defaults of their library, learners under a constraint, and learners of a
-leg that carries itself."""
+with each other, learners with the defaults of their library, learners under a constraint, learners of a leg
+that carries itself, and learners where seeing pays."""
 
 FOLDERS: Mapping[Plan, Path] = {
     "full": Path("runs/baselines"),
@@ -30,6 +30,7 @@ FOLDERS: Mapping[Plan, Path] = {
     "stock": Path("runs/stock"),
     "costs": Path("runs/costs"),
     "hop": Path("runs/hop"),
+    "seeing": Path("runs/seeing"),
 }
 """Folders of the trainings, by plan."""
 

@@ -650,7 +650,7 @@ class TrunkEngine:
             run = push_kernel(EngineKind(self.features, None, static_of(self.mechanics.model[0])))
             run(run.parameters[0].hold({**named, "impulses": push, "which": which}))
         moving.momentum[:, where] += push
-        if self.trunk.kind == "free":
+        if self.trunk.pitches:
             off = place - moving.centre[:, where]
             moving.angular_momentum[where] += off[0] * push[1] - off[1] * push[0]
 

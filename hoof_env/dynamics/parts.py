@@ -23,7 +23,9 @@ from hoof_env.ground.terrain import Terrain
 from hoof_env.leg.geometry import Geometry
 from hoof_env.leg.profile import LegProfile
 
-FREEDOMS: Mapping[str, int] = MappingProxyType({"fixed": 0, "rail": 1, "suspended": 2, "boom": 2, "free": 3})
+FREEDOMS: Mapping[str, int] = MappingProxyType(
+    {"fixed": 0, "rail": 1, "suspended": 2, "boom": 2, "floating": 3, "free": 3}
+)
 """Number of the coordinates x, y and pitch, in this order, in which each kind of trunk moves; kernels take
 it."""
 
@@ -33,7 +35,7 @@ TRUNKS = tuple(FREEDOMS)
 """Kinds of trunk."""
 
 ONE_LEG = TRUNKS[:-1]
-"""Kinds of trunk of the environments of one leg, which could not balance a free trunk."""
+"""Kinds of trunk of the environments of one leg."""
 
 
 @dataclass(frozen=True)
@@ -43,8 +45,8 @@ class Trunk:
     "fixed": O stays in place. "rail": O slides along x at fixed height. "suspended": O moves along x and y;
     the leg must bear `share` of the weight of trunk and leg, the rest of the animal carries the remainder
     and adds a vertical spring and damper towards `height`. "boom": O moves along x and y, and the leg bears
-    the whole weight. These four do not pitch. "free": the trunk moves along x and y and pitches, under its
-    weight, its drag and its legs.
+    the whole weight. These four do not pitch. "floating" over one leg and "free" over a horse's: the trunk
+    moves along x and y and pitches, under its weight, its drag and its legs.
 
     Attributes:
         kind: one of `TRUNKS`.
@@ -53,7 +55,7 @@ class Trunk:
         stiffness, damping: vertical spring [N/m] and damper [N s/m]; "suspended" only.
         drag: resistance to forward motion [N s/m].
         height: height of O above the ground [m] where the spring is at rest, of the rail, or at a start.
-        pitch_inertia: moment of inertia of the trunk about its centre of mass [kg m^2]; "free" only.
+        pitch_inertia: moment of inertia about its centre of mass [kg m^2]; of a trunk that pitches only.
         length: length of the trunk [m]; no hip may be beyond its ends. None for an unlimited one.
 
     Raises:
@@ -69,6 +71,11 @@ class Trunk:
     height: float = 1.7
     pitch_inertia: float = 20.0
     length: float | None = None
+
+    @property
+    def pitches(self) -> bool:
+        """True if the trunk is free to pitch."""
+        return FREEDOMS[self.kind] == FREE
 
     def __post_init__(self) -> None:
         check_choice("trunk", self.kind, TRUNKS)

@@ -206,7 +206,7 @@ class StepLength:
         if axis in "xy"[: FREEDOMS[trunk.kind]]:
             mobility += 1 / trunk.mass
         for k, point in enumerate(("toe", "heel")):
-            if trunk.kind == "free":
+            if trunk.pitches:
                 lever = limb.hip["xy".index(across)] + value[f"{point}_{across}"]
                 mobility[k] += lever**2 / trunk.pitch_inertia
             if isinstance(limb.drive, Motor):

@@ -65,6 +65,7 @@ SLIDES = {
     "rail": ("x",),
     "suspended": ("x", "z"),
     "boom": ("x", "z"),
+    "floating": ("x", "z", "pitch"),
     "free": ("x", "z", "pitch"),
 }
 """Coordinates that each kind of trunk has."""
@@ -313,7 +314,7 @@ def _add_leg(
             kv=_text(size * SWING_DAMPING),
         )
         hip = 0j
-    turns = trunk.kind == "free" or options.swings
+    turns = "pitch" in SLIDES[trunk.kind] or options.swings
     armature = leg.armature
     if leg.motor is not None and not turns:
         armature += leg.motor.gear_ratio**2 * leg.motor.rotor_inertia
@@ -331,7 +332,7 @@ def _add_leg(
         below = one if tree.carrier[one][0] == two else two
         ET.SubElement(parts["equality"], "joint", joint1=f"{below}{leg.label}")
     if leg.motor is not None:
-        _add_motor(parts, leg, leg.motor, trunk.kind == "free", options.swings)
+        _add_motor(parts, leg, leg.motor, "pitch" in SLIDES[trunk.kind], options.swings)
 
 
 def _add_links(

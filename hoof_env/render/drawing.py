@@ -236,6 +236,8 @@ class Drawing:
             coil[2:-2] += 0.06 * self.size * np.resize([1, -1], len(COIL) - 4)
         elif self._setting.trunk == "boom":  # its end, which comes towards the viewer
             coil = middle + HOLD_M * self.size * np.exp(2j * np.pi * np.linspace(0.0, 1.0, len(COIL)))
+        elif self._setting.trunk == "floating":  # nothing holds it
+            coil = np.full(len(COIL), middle)
         else:  # a rail or a plate
             coil = top + 0.1j * self.size + np.linspace(-9.0, 9.0, len(COIL))
         return barrel, coil

@@ -80,8 +80,8 @@ class Picture(Protocol):
 class LegPicture:
     """Picture of a leg under the bar of a trunk, with gait and force of one hoof.
 
-    A suspended trunk hangs on a spring, one on a boom shows the boom's end, one on a rail has wheels, and a
-    fixed one is bolted.
+    A suspended trunk hangs on a spring, one on a boom shows the boom's end, one on a rail has wheels, a fixed
+    one is bolted, and nothing holds a floating one.
     """
 
     trunks: tuple[str, ...] = ONE_LEG
@@ -103,7 +103,7 @@ class LegPicture:
 
         if len(here.hips) > 1:
             raise ParameterError(f"picture: expected 'legs' for {len(here.hips)} legs, got 'leg'")
-        weight = here.weight_n if here.trunk in ("suspended", "boom") else 0.0
+        weight = here.weight_n if here.trunk in ("suspended", "boom", "floating") else 0.0
         return LegPanel(brush, box, weight, here.lift_off_n, limits_of(here.geometry))
 
     def drawing(self, here: Surroundings, numbers: int) -> Drawing:

@@ -37,13 +37,13 @@ class TrunkPainter:
         canvas.blit(image, at, special_flags=pygame.BLEND_PREMULTIPLIED)
 
     def draw_support(self, canvas: Any, hip: complex) -> None:
-        """Draw the support of the trunk around the crank centre at `hip`."""
+        """Draw the support of the trunk around the crank centre at `hip`; a floating one has none."""
         top = hip - 1j * self._above
         if self._kind == "suspended":
             self._draw_spring(canvas, top)
         elif self._kind == "boom":
             self._draw_boom(canvas, hip)
-        else:
+        elif self._kind != "floating":
             self._draw_rail_or_plate(canvas, top)
 
     def _draw_spring(self, canvas: Any, top: complex) -> None:

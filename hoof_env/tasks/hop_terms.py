@@ -8,8 +8,8 @@ from __future__ import annotations
 from dataclasses import replace
 
 from hoof_env.simd import Lanes, Number
-from hoof_env.tasks.observation import ENTRIES, TRUE_RATE, Scale, tanh_of
-from hoof_env.tasks.reward import Outcome, Term, energy, failure, loading, progress, slip
+from hoof_env.tasks.observation import ENTRIES, TRUE_RATE, Entry, Scale, tanh_of
+from hoof_env.tasks.reward import Outcome, Term, energy, failure, loading, overspeed, progress, slip
 
 
 def peak(step: Outcome, weight: Number) -> Lanes:
@@ -46,6 +46,16 @@ HOP_TERMS = (
 )
 """Terms of the reward of `HorseLegHop-v0`, in the order in which they are added."""
 
+BALANCE_SPEED_TERMS = (
+    HOP_TERMS[0],
+    Term("overspeed", 10.0, "1/m", "minus forward travel beyond the commanded speed", overspeed),
+    *HOP_TERMS[1:],
+)
+"""Terms of the reward of `HorseLegBalanceSpeed-v0`."""
+
+CARRYING_ENTRIES = tuple(entry for entry in ENTRIES if entry.name != "bearing allowance")
+"""Entries that can be observed of a leg that bears the whole weight."""
+
 SCALES = {
     # A motor's crank also turns back, and beyond the largest rate that a gait may ask for
     TRUE_RATE: tanh_of(10.0),
@@ -54,11 +64,16 @@ SCALES = {
         "tanh(x / (300 weights / s))", lambda x, scene: x / (300.0 * scene.episode.weight), True
     ),
 }
-"""Scales that differ from other ids', by entry."""
+"""Scales of `HorseLegHop-v0` that differ from other ids', by entry."""
 
 HOP_ENTRIES = tuple(
-    replace(entry, scale=SCALES.get(entry.name, entry.scale))
-    for entry in ENTRIES
-    if entry.name != "bearing allowance"
+    replace(entry, scale=SCALES.get(entry.name, entry.scale)) for entry in CARRYING_ENTRIES
 )
 """Entries that can be observed on `HorseLegHop-v0`."""
+
+BALANCE_ENTRIES = (
+    *CARRYING_ENTRIES,
+    Entry("pitch", "trunk", "rad", lambda s: s.trunk.state.moving.pitch, tanh_of(0.3)),
+    Entry("pitch rate", "trunk", "rad/s", lambda s: s.trunk.report.pitch_rate, tanh_of(2.0)),
+)
+"""Entries that can be observed of a leg under a trunk that pitches."""

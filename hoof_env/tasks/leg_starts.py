@@ -46,6 +46,9 @@ RANGES = ("crank_angle", "speed", "height", "x")
 FOREIGN_OPTIONS = ("minari_autoseed",)
 """Options of other libraries, which are ignored."""
 
+RISING = ("suspended", "boom", "floating")
+"""Kinds of trunk that move up and down."""
+
 FLAT = Terrain.flat()
 MARGIN = 50.0
 REACH = 1.0
@@ -155,7 +158,7 @@ def draw_starts(
         ground = highest(terrain, x, REACH)
     # Ground as high as this touches a hoof point's sole.
     ground = ground + hoof_length
-    if trunk.kind in ("suspended", "boom"):
+    if trunk.kind in RISING:
         if not isinstance(options.get("height"), float):
             height = np.maximum(height, ground - hoof_height(profile, chosen, theta))
     elif isinstance(turn, tuple):
@@ -270,7 +273,7 @@ def _check_trunk(options: Mapping[str, Any], trunk: Trunk) -> None:
         ParameterError: it cannot.
     """
     for height in np.atleast_1d(options.get("height", trunk.height)):
-        if trunk.kind not in ("suspended", "boom") and height != trunk.height:
+        if trunk.kind not in RISING and height != trunk.height:
             raise ParameterError(
                 f"options['height']: a {trunk.kind} trunk is at {trunk.height:g} m, got {height:g} m"
             )

@@ -325,6 +325,9 @@ def groups_of(entries: Iterable[Entry]) -> tuple[str, ...]:
     return tuple(dict.fromkeys(entry.group for entry in entries))
 
 
+PITCHING = ("pitch", "pitch rate")
+"""Names of the entries of a trunk that pitches."""
+
 ABSENT = {
     "fixed": (
         "forward speed",
@@ -332,9 +335,12 @@ ABSENT = {
         "height",
         "bearing allowance",
         "share of the weight to bear",
+        *PITCHING,
     ),
-    "rail": ("vertical speed", "height", "bearing allowance", "share of the weight to bear"),
-    "boom": ("share of the weight to bear",),
+    "rail": ("vertical speed", "height", "bearing allowance", "share of the weight to bear", *PITCHING),
+    "suspended": PITCHING,
+    "boom": ("share of the weight to bear", *PITCHING),
+    "floating": ("share of the weight to bear",),
 }
 """Names of entries that are constant on a kind of trunk, and are therefore not observed there."""
 

@@ -38,6 +38,12 @@ from hoof_env.tasks.settings import ResolvedSettings, Settings
 
 Floats = NDArray[np.float64]
 
+GYRATION = 0.5 / 1.4
+"""Radius of gyration of a trunk that pitches, about O, relative to the height of O [-]: a horse's, see
+`horse.GYRATION` and `horse.HIP_HEIGHT`."""
+
+PITCH = 0.5
+"""Pitch beyond which a trunk that pitches has fallen, forward and back [rad]: a horse's, `horse.PITCH`."""
 
 CARRIED = 5 / 6
 """Part of a change that continues under a zero action [-]. With 0 a rate would end with its action, and rates
@@ -220,6 +226,7 @@ class OneLeg:
             )
         self.gait = None if s.gait is None else self.gaits[check_choice("gait", s.gait, self.gaits)]
         self._spring = hoof_spring(s)
+        self.limits = Limits((-PITCH, PITCH)) if s.trunk == "floating" else None
         self.rates = check_rates(s, self.speed_scale)
         nominal = self.geometry.hip_height + (self._spring.length if self._spring else 0.0)
         height = nominal if s.hip_height is None else s.hip_height
@@ -239,6 +246,7 @@ class OneLeg:
             damping=s.trunk_damping,
             drag=s.trunk_drag,
             height=self.height,
+            pitch_inertia=s.trunk_mass * (GYRATION * self.geometry.hip_height) ** 2,
         )
         limb = Limb(self.geometry, drive=drive_of(s), spring=self._spring)
         return trunk, ground_of(s, s.trunk_mass), (limb,)

@@ -229,10 +229,13 @@ the hip height."""
 
 _KEEPS_HEIGHT = "which keeps its height in the world: the leg would climb into a wall or lose the ground"
 
+_HEIGHT_IN_THE_WORLD = "whose height is observed and limited in the world: the episode would end on the way"
+
 DRIFT_REASONS = {
     "suspended": _KEEPS_HEIGHT,
     "rail": _KEEPS_HEIGHT,
-    "boom": "whose height is observed and limited in the world: the episode would end on the way",
+    "boom": _HEIGHT_IN_THE_WORLD,
+    "floating": _HEIGHT_IN_THE_WORLD,
 }
 """Reasons why ground must not drift from y = 0, by kinds of trunk that travel."""
 

@@ -23,7 +23,7 @@ from hoof_env.gait import GaitParameters
 from hoof_env.simd.user_functions import check_function, function_name
 from hoof_env.tasks.body import Body
 from hoof_env.tasks.disturbances import rough_ground
-from hoof_env.tasks.hop_terms import HOP_ENTRIES, HOP_TERMS
+from hoof_env.tasks.hop_terms import BALANCE_ENTRIES, BALANCE_SPEED_TERMS, HOP_ENTRIES, HOP_TERMS
 from hoof_env.tasks.horse import HOOF_STIFFNESS, MASS, Horse
 from hoof_env.tasks.horse_gaits import checked_size
 from hoof_env.tasks.horse_terms import HORSE_ENTRIES, HORSE_TERMS
@@ -205,8 +205,53 @@ _HORSE: Mapping[str, Any] = MappingProxyType(
 )
 """Settings of a horse."""
 
+_HOPPING: Mapping[str, Any] = MappingProxyType(
+    {
+        "drive": "motor",
+        "stiffness": 2e6,
+        "exponent": 1.5,
+        "friction": 0.6,
+        "hoof_stiffness": 4200.0,
+        "hoof_damping": 104.0,
+        "hoof_length": 0.25,
+        # Enough authority to change the height and the speed of a hop within a stance
+        "crank_rate": 20.0,
+        "swing_rate": 3.0,
+    }
+)
+"""Settings of one leg that carries itself, except its trunk."""
+
 HOP = GaitParameters(crank_speed=9.66, swing_offset=1.02, swing_sin=0.158, swing_cos=-0.49)
 """Gait in which a hop begins: mean of 133 apexes of a gait that was searched."""
+
+BALANCE = GaitParameters(crank_speed=7.93, swing_offset=0.722, swing_sin=0.226, swing_cos=-0.447)
+"""Gait in which a hop begins under a trunk that pitches: of searched gaits one that lasts longest."""
+
+_BALANCED = (
+    "The trunk is free to pitch. It has the mass of the other ids' and the radius of gyration of a horse's"
+    " trunk at the height of this leg's hip, 0.7 m; the hip is at its centre of mass, and nothing resists its"
+    " motion. What turns the leg turns the trunk back: in a stance the swing holds the trunk, in the air the"
+    " trunk's spin goes on. An episode fails when the trunk has pitched by 0.5 rad, as a horse's does."
+    " Ground, spring, motor and reward are those of HorseLegHop, where a boom takes the torque of the hip,"
+    " but a fall costs twice as much. An episode begins near the apex of a hop, at 0.5 to 3 m/s, in a gait"
+    " with which the trunk falls over after 1 to 2.5 s. What is asked is balance: gaits without feedback fall"
+    " over, too."
+)
+
+_FLOATING: Mapping[str, Any] = MappingProxyType(
+    {
+        **_HOPPING,
+        "trunk": "floating",
+        "trunk_drag": 0.0,
+        # With 5, one of two learners went on diving forward until it fell, for the travel on the way
+        "reward_weights": {"failure": 10.0},
+    }
+)
+"""Settings of one leg under a trunk that pitches."""
+
+_BALANCE_START: Mapping[str, Any] = MappingProxyType(
+    {"gait": BALANCE, "crank_angle": (3.6, 4.2), "height": (2.05, 2.25), "speed": (0.5, 3.0)}
+)
 
 TASKS: Mapping[str, Task] = MappingProxyType(
     {
@@ -280,25 +325,39 @@ TASKS: Mapping[str, Task] = MappingProxyType(
             " between the leg's hoof points and the soles, which sink into the ground by 1 cm. An"
             " episode begins near the apex of a hop, at any speed up to 4 m/s. The boom also takes the"
             " torque of the hip, with which a horse would have to turn its trunk.",
-            {
-                "trunk": "boom",
-                # Its bearings and the air are left out: the leg brakes as much as it propels
-                "trunk_drag": 0.0,
-                "drive": "motor",
-                "stiffness": 2e6,
-                "exponent": 1.5,
-                "friction": 0.6,
-                "hoof_stiffness": 4200.0,
-                "hoof_damping": 104.0,
-                "hoof_length": 0.25,
-                # Enough authority to change the height and the speed of a hop within a stance
-                "crank_rate": 20.0,
-                "swing_rate": 3.0,
-            },
+            # Bearings of the boom and the air are left out: the leg brakes as much as it propels
+            {**_HOPPING, "trunk": "boom", "trunk_drag": 0.0},
             start={"gait": HOP, "crank_angle": (3.0, 3.7), "height": (1.95, 2.15), "speed": (0.0, 4.0)},
             reference="open-loop",
             terms=HOP_TERMS,
             entries=HOP_ENTRIES,
+        ),
+        "balance": Task(
+            "HorseLegBalance",
+            "A horse's leg that carries its trunk and keeps it from falling over: it hops and balances.",
+            _BALANCED,
+            _FLOATING,
+            start=_BALANCE_START,
+            reference="open-loop",
+            terms=HOP_TERMS,
+            entries=BALANCE_ENTRIES,
+        ),
+        "balance_speed": Task(
+            "HorseLegBalanceSpeed",
+            "A horse's leg that carries and balances its trunk at a commanded speed, which changes.",
+            _BALANCED
+            + " Every 3 to 5 s a new speed is commanded, 1 to 3.5 m/s as on HorseLegSpeed. Travel beyond it"
+            " is charged as strongly as travel up to it is paid.",
+            {
+                **_FLOATING,
+                "target_speed": (1.0, 3.5),
+                "target_seconds": (3.0, 5.0),
+                "observation": ("crank", "gait", "trunk", "hoof", "target"),
+            },
+            start=_BALANCE_START,
+            reference="open-loop",
+            terms=BALANCE_SPEED_TERMS,
+            entries=BALANCE_ENTRIES,
         ),
         "fixed": Task(
             "HorseLegFixed",

@@ -88,7 +88,11 @@ class Settings:
     ] = None
     trunk: Annotated[
         str,
-        About("", "$trunks; a fixed one stays where it is, and on a boom the leg bears the whole weight"),
+        About(
+            "",
+            "$trunks; a fixed one stays where it is; on a boom the leg bears the whole weight, and under a"
+            " floating trunk, which pitches, too",
+        ),
     ] = "suspended"
     hip_height: Annotated[
         float | None,
@@ -144,7 +148,7 @@ class Settings:
             "N s/m",
             "resistance to forward motion",
             per_episode=True,
-            needs=("trunk", ("suspended", "boom", "rail")),
+            needs=("trunk", ("suspended", "boom", "floating", "rail")),
         ),
     ] = 20.0
     # Ground and hoof
@@ -251,7 +255,7 @@ class Settings:
                 "rate of the crank's speed at an action of 1; above 0, to $crank_bound; for the published"
                 " leg, and by similarity in inverse proportion to the hip height"
             ),
-            needs=("trunk", ("suspended", "boom", "rail", "fixed")),
+            needs=("trunk", ("suspended", "boom", "floating", "rail", "fixed")),
         ),
     ] = 18.0
     swing_rate: Annotated[
@@ -262,7 +266,7 @@ class Settings:
                 "rate of the swing's coefficients at an action of 1; above 0, to $swing_bound; for the "
                 "published leg, and by similarity in inverse proportion to the root of the hip height"
             ),
-            needs=("trunk", ("suspended", "boom", "rail", "fixed")),
+            needs=("trunk", ("suspended", "boom", "floating", "rail", "fixed")),
         ),
     ] = 1.2
     drive: Annotated[
@@ -482,7 +486,7 @@ class Settings:
         About(
             "N s",
             "range of random pushes forward",
-            needs=("trunk", ("suspended", "boom", "rail", "free")),
+            needs=("trunk", ("suspended", "boom", "floating", "rail", "free")),
         ),
     ] = None
     push_seconds: Annotated[
@@ -494,7 +498,7 @@ class Settings:
         About(
             "s, N s",
             "given ones: time, forward, upward",
-            needs=("trunk", ("suspended", "boom", "rail", "free")),
+            needs=("trunk", ("suspended", "boom", "floating", "rail", "free")),
         ),
     ] = None
     strength: Annotated[

@@ -45,7 +45,7 @@ def test_the_full_plan_trains_ten_seeds_of_each_learner():
     assert {key: n for key, n in counted.items() if key[1] == LEG} == {
         (algo, LEG): 10 for algo in ("ppo", "sac", "td3", "tqc")
     }
-    # Rough ground has a page of falls and not of returns; ids with costs and the leg that carries itself have
+    # Rough ground has a page of falls and not of returns; ids with costs and legs that carry themselves have
     # plans of their own.
     others = {
         "hoof_env/HorseLegMO-v0",
@@ -53,6 +53,8 @@ def test_the_full_plan_trains_ten_seeds_of_each_learner():
         "hoof_env/HorseLegSafe-v0",
         "hoof_env/HorseSafe-v0",
         "hoof_env/HorseLegHop-v0",
+        "hoof_env/HorseLegBalance-v0",
+        "hoof_env/HorseLegBalanceSpeed-v0",
     }
     single = {name for name in gym.registry if name.startswith("hoof_env/") and name not in others}
     assert {env_id for algo, env_id in counted if algo == "ppo"} == single

@@ -24,7 +24,7 @@ from gymnasium.vector import AutoresetMode, SyncVectorEnv
 from hoof_env.simd import threads
 
 LEG, FIXED, OWN = "hoof_env/HorseLeg-v0", "hoof_env/HorseLegFixed-v0", "own/Everything-v0"
-HOP = "hoof_env/HorseLegHop-v0"
+HOPS = tuple(f"hoof_env/HorseLeg{name}-v0" for name in ("Hop", "Balance", "BalanceSpeed"))
 
 
 @dataclass(frozen=True)
@@ -89,7 +89,7 @@ CASES = {
     "commands": Case(LEG, short(**COMMANDS, observation=("crank", "hoof", "target"))),
     "motor": Case(LEG, short(drive="motor")),
     # An episode begins near the apex of a hop and lasts until there was a stance
-    HOP: Case(HOP, short(episode_seconds=0.9), steps=110, sizes=FEW),
+    **{env_id: Case(env_id, short(episode_seconds=0.9), steps=110, sizes=FEW) for env_id in HOPS},
     "fixed trunk": Case(LEG, short(trunk="fixed")),
     "air walk": Case(FIXED, short(gait="walk")),
     "time limit": Case(LEG, {"max_episode_steps": 6}, steps=30),

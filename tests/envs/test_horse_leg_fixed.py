@@ -19,7 +19,8 @@ from hoof_env.leg.presets import preset_names, read_preset
 from hoof_env.records import record_episode
 from hoof_env.tasks.settings import Settings
 
-FIXED, LEG, HOP = (f"hoof_env/{name}-v0" for name in ("HorseLegFixed", "HorseLeg", "HorseLegHop"))
+FIXED, LEG = "hoof_env/HorseLegFixed-v0", "hoof_env/HorseLeg-v0"
+HOPS = tuple(f"hoof_env/HorseLeg{name}-v0" for name in ("Hop", "Balance", "BalanceSpeed"))
 
 
 @pytest.fixture
@@ -45,7 +46,7 @@ def test_the_ground_is_the_presets_unless_it_is_given(soft, solver):
 def test_by_default_it_is_what_the_default_preset_says():
     assert ground(FIXED) == load_ground(reference_mass=Settings.trunk_mass)
     for env_id in LEGS:
-        if env_id == HOP:  # its ground is as hard as a horse's, for a hoof that stands on it
+        if env_id in HOPS:  # its ground is as hard as a horse's, for a hoof that stands on it
             continue
         found = ground(env_id)
         assert (found.stiffness, found.exponent) == (load_ground().stiffness, load_ground().exponent)

@@ -26,14 +26,15 @@ def test_every_id_of_one_leg_steps_with_every_preset(env_id, preset):
         action, _ = policy.predict(observation, episode_start=k == 0)
         observation, reward, terminated, truncated, _ = env.step(action)
         assert np.isfinite(reward).all()
-        falls = env.unwrapped.settings.trunk == "boom"
+        falls = env.unwrapped.settings.trunk in ("boom", "floating")
         assert falls or not terminated
         report = env.unwrapped.engine.report
         pressed = max(pressed, report["toe_normal"].item())
         assert report["heel_normal"].item() == 0.0
         if terminated or truncated:
             break
-    assert pressed > 50
+    # A trunk that pitches may fall over before the hoof lands
+    assert pressed > 50 or (terminated and env.unwrapped.settings.trunk == "floating")
 
 
 @pytest.mark.parametrize("preset", PRESETS)

@@ -23,6 +23,7 @@ from hoof_env.tasks.settings import NEEDED, PER_EPISODE, Settings, check_effect
 LEG, RAIL, FIXED, SPEED, TERRAIN = (
     f"hoof_env/HorseLeg{name}-v0" for name in ("", "Rail", "Fixed", "Speed", "Terrain")
 )
+BALANCE = "hoof_env/HorseLegBalance-v0", "hoof_env/HorseLegBalanceSpeed-v0"
 HORSE = "hoof_env/Horse-v0"
 
 
@@ -101,7 +102,7 @@ def test_a_friction_law_without_a_lower_threshold_does_not_compare_with_one():
 def test_reward_weights_that_are_not_named_keep_the_values_of_the_task(env_id):
     task = TASKS[gym.spec(env_id).kwargs["task"]]
     terms, plain = task.terms, check_weights(task.defaults.get("reward_weights"), task.terms)
-    has_own = env_id in (RAIL, FIXED, SPEED, TERRAIN, ROUGH) or "cost" in task.defaults
+    has_own = env_id in (RAIL, FIXED, SPEED, TERRAIN, ROUGH, *BALANCE) or "cost" in task.defaults
     assert (plain != check_weights(None, terms)) == has_own
     assert gym.make(env_id).unwrapped.weights == plain
     for given in ({"peak": 1.0}, {}, None, {terms[0].name: 3.0, terms[1].name: 1.0}):

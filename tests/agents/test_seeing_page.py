@@ -1,0 +1,50 @@
+"""The page of what seeing is worth is of its figures, and its verdicts follow from them."""
+
+import numpy as np
+import pytest
+
+from agents.experiments import seeing_page
+from agents.experiments.plans import load_plan
+
+DATA = seeing_page.read_data(seeing_page.PUBLISHED)
+ID = seeing_page.IDS[0]
+
+
+def test_the_published_page_is_of_the_published_figures(tmp_path):
+    page = seeing_page.write(tmp_path, DATA).read_text(encoding="utf-8")
+    assert page == (seeing_page.PUBLISHED / seeing_page.PAGE_FILE).read_text(encoding="utf-8")
+    assert {seeing_page.key_of(entry) for entry in load_plan("seeing")} >= set(DATA["learners"])
+    assert (tmp_path / seeing_page.PICTURE).stat().st_size > 5000
+
+
+def changed(returned, falls):
+    """Figures in which every agent has these, and the policy without feedback returns 0 and always falls."""
+    seeds = {str(k): {"return": returned, "failed": falls} for k in range(5)}
+    ends = {"return": [-1.0, 1.0], "failed": [1.0, 1.0]}
+    blind = {"return": 0.0, "failed": 1.0, "intervals": ends}
+    zero = {"return": -100.0, "failed": 1.0, "intervals": {"return": [-101.0, -99.0], "failed": [1.0, 1.0]}}
+    gaits = {ID: {"zero": zero, "constant": blind | {"return": -5.0}, "open-loop": blind}}
+    return {"learners": {ID: seeds}, "gaits": gaits}
+
+
+@pytest.mark.parametrize(
+    ("returned", "falls", "met", "apart"),
+    [(100.0, 0.0, "is met", "are apart"), (30.0, 0.6, "is not met", "are not apart")],
+)
+def test_a_verdict_follows_from_the_intervals(returned, falls, met, apart):
+    text = seeing_page.verdict(changed(returned, falls), ID)
+    assert f"quarter {met}" in text
+    assert text.endswith(f"theirs {apart}.")
+    assert seeing_page.GAITS["open-loop"] in text
+
+
+def test_pushes_are_those_of_rough_ground_and_shares_of_it():
+    found = np.array(seeing_page.IMPULSES) / seeing_page.IMPULSES[2]
+    assert found == pytest.approx([0.0, 0.5, 1.0, 1.5, 2.0])
+    assert seeing_page.pushed("zero", load_plan("seeing")[1]) == []
+
+
+def test_malformed_figures_are_named(tmp_path):
+    (tmp_path / seeing_page.DATA).write_text("{")
+    with pytest.raises(seeing_page.DataFileError, match=r"seeing\.json"):
+        seeing_page.read_data(tmp_path)
