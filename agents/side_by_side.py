@@ -7,7 +7,8 @@ products. Rollouts, advantages, losses, gradients' norms and Adam are those of `
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+import copy
+from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -75,11 +76,20 @@ class Learners:
         seeds: seed of each learner's networks.
         inputs, outputs: numbers of an observation and of an action.
         settings: of the updates.
+        seen: False where a learner sees 0 in place of an entry, shape (n, k); None for learners that see all.
     """
 
-    def __init__(self, seeds: list[int], inputs: int, outputs: int, settings: Defaults = DEFAULTS) -> None:
+    def __init__(
+        self,
+        seeds: list[int],
+        inputs: int,
+        outputs: int,
+        settings: Defaults = DEFAULTS,
+        seen: NDArray[np.bool_] | None = None,
+    ) -> None:
         self.settings = settings
-        self.inputs = inputs
+        all_seen = np.ones((len(seeds), inputs), bool)
+        self.seen = torch.from_numpy((all_seen if seen is None else seen).astype(np.float32))[:, None]
         sizes = [(inputs, WIDTH, 2**0.5), (WIDTH, WIDTH, 2**0.5)]
         heads = (outputs, 0.01), (1, 1.0)
         self.weights: list[Tensor] = []
@@ -97,11 +107,11 @@ class Learners:
 
     def means(self, observations: Tensor) -> Tensor:
         """Return the means of the actions, shape (n, b, m), for observations, shape (n, b, k)."""
-        return _perceptron(self.weights[:6], observations)
+        return _perceptron(self.weights[:6], observations * self.seen)
 
     def values(self, observations: Tensor) -> Tensor:
         """Return the values of observations, shape (n, b)."""
-        return _perceptron(self.weights[6:12], observations)[..., 0]
+        return _perceptron(self.weights[6:12], observations * self.seen)[..., 0]
 
     def act(self, observations: Floats) -> Floats:
         """Return the learners' actions without noise, within -1 and 1, shape (n, b, m), for observations of
@@ -109,6 +119,13 @@ class Learners:
         with torch.no_grad():
             actions: Floats = self.means(torch.from_numpy(observations)).clamp(-1.0, 1.0).numpy()
         return actions
+
+    def alone(self, at: int) -> Learners:
+        """Return the learner of a number, for playing."""
+        one = copy.copy(self)
+        one.weights = [weight.detach()[at : at + 1] for weight in self.weights]
+        one.seen = self.seen[at : at + 1]
+        return one
 
     def losses(self, batch: list[Tensor]) -> Tensor:
         """Return the losses of a batch, shape (n,): observations, actions, their log densities, advantages
@@ -266,9 +283,12 @@ def train(
     steps: int,
     settings: Defaults = DEFAULTS,
     tick: Callable[[int], None] = lambda steps: None,
+    blind: int = 0,
+    groups: Collection[str] = (),
     **env_kwargs: Any,
 ) -> Learners:
-    """Train a learner for each of the seeds 0, 1, ..., for at least `steps` steps of its environment.
+    """Train a learner for each of the seeds 0, 1, ..., for at least `steps` steps of its environment, then
+    `blind` learners of the same seeds that see only some groups of the observation.
 
     Args:
         env_id: id of this package.
@@ -276,6 +296,8 @@ def train(
         steps: of each.
         settings: of Stable-Baselines3's PPO.
         tick: called after each rollout with the steps so far.
+        blind: number of learners that see 0 in place of every entry that is not in `groups`.
+        groups: of the observation, that these see.
         **env_kwargs: arguments of the environment.
 
     Raises:
@@ -283,12 +305,14 @@ def train(
     """
     seeds = count("seeds", seeds)
     steps = count("steps", steps)
+    numbers = [*range(seeds), *range(count("blind", blind, low=0))]
     envs: Any = gym.make_vec(
-        env_id, seeds, "vector_entry_point", autoreset_mode="SAME_STEP", **env_kwargs
+        env_id, len(numbers), "vector_entry_point", autoreset_mode="SAME_STEP", **env_kwargs
     ).unwrapped
-    inputs = envs.single_observation_space.shape[0]
-    numbers = list(range(seeds))
-    learners = Learners(numbers, inputs, envs.single_action_space.shape[0], settings)
+    group_of = {entry.name: entry.group for entry in envs.task.entries}
+    is_left = np.array([group_of[name] in groups for name in envs.observation_names])
+    seen = np.array([is_left | (i < seeds) for i in range(len(numbers))])
+    learners = Learners(numbers, len(is_left), envs.single_action_space.shape[0], settings, seen)
     random = np.random.default_rng(0)
     player = Player(learners, envs, [TRAINING_SEED * (1 + seed) for seed in numbers], random)
     played = 0

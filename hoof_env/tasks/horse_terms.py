@@ -117,6 +117,14 @@ HORSE_ENTRIES = (
     Entry("pitch", "trunk", "rad", lambda s: s.trunk.state.moving.pitch, tanh_of(0.3)),
     Entry("pitch rate", "trunk", "rad/s", lambda s: s.trunk.report.pitch_rate, tanh_of(2.0)),
     Entry("commanded speed", "target", "m/s", lambda s: s.episode.target, tanh_of(5.0)),
+    # In the scales above a push of 0.3 m/s is a few hundredths, the difference of two large numbers.
+    Entry(
+        "speed above the commanded one",
+        "error",
+        "m/s",
+        lambda s: s.trunk.report.velocity.real - s.episode.target,
+        tanh_of(0.5),
+    ),
     *(
         Entry(f"{leg.replace('_', ' ')}: {name}", group, unit, _of_leg(i, measure), scale)
         for name, group, unit, measure, scale in _PER_LEG

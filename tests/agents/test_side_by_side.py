@@ -128,3 +128,19 @@ def test_they_learn_and_refuse_no_seed():
     for seeds in (0, 1.5, True):
         with pytest.raises(ParameterError, match="seeds"):
             train(RAIL, seeds, 500)
+
+
+def test_a_blind_learner_acts_on_the_groups_that_it_sees_alone():
+    settings = replace(DEFAULTS, n_steps=256)
+    learners = train(RAIL, 1, 256, settings, blind=1, groups=["crank", "gait"], episode_seconds=1.0)
+    envs = make_rows(RAIL, 1)
+    crank = [name for name in envs.observation_names if "crank" in name]
+    seen = np.random.default_rng(0).standard_normal((2, 6, envs.single_observation_space.shape[0]))
+    for name in envs.observation_names:
+        other = seen.copy()
+        other[..., envs.observation_names.index(name)] += 1.0
+        changed = (learners.act(other.astype(np.float32)) != learners.act(seen.astype(np.float32))).any(
+            (1, 2)
+        )
+        assert changed[0]
+        assert changed[1] == (name in crank or "swing" in name)
