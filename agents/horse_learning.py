@@ -8,6 +8,7 @@ among the figures is not measured again.
 
 from __future__ import annotations
 
+import json
 import time
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
@@ -17,8 +18,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from agents import side_by_side
+from agents import runs, side_by_side
+from agents.command import parse, run
+from hoof_env._output import check_folder
 from hoof_env.envs.policies import make_policy
+from hoof_env.errors import check_choice, parse_json
 from hoof_env.evaluation.episodes import make_rows, play_rows
 
 EVIDENCE = Path(__file__).parents[1] / "docs" / "evidence"
@@ -28,8 +32,13 @@ ENV_ID = "hoof_env/HorseRough-v0"
 FIRST_SEED = 3_000_000  # of the starts, which no training and no published score plays
 
 BLIND = ("target", "crank", "gait", "offset")
-WITH_ERROR = ("trunk", "target", "error", "crank", "gait", "hoof", "offset")
-"""Groups that blind twins see, and groups with the speed above the commanded one."""
+BALANCE = ("balance", "target", "crank", "hoof", "offset")
+"""Groups that blind twins see, if the environment has them; and groups with the trunk scaled by its
+deviations, without what follows from crank, command and offsets."""
+
+CURVE_STARTS = 200
+CURVE = 100_000
+"""Episodes of each learner at the points of the curve, and steps between two."""
 
 WEIGHTS = {
     "alive": 45.0, "tracking": 64.0, "peak": 0.25, "slip": 35.0, "landing": 0.25, "work": 0.4, "pitch": 3.0,
@@ -91,12 +100,12 @@ CASES = {
         3,
         {
             "reward_weights": changed(0.1, alive=0.0, tracking=32.0, slip=70.0, fall=40.0),
-            "observation": WITH_ERROR,
+            "observation": BALANCE,
         },
     ),
 }
 """Forms of the task under which stock PPO learns: the id's own; and with weights of the reward that a fall
-does not dominate, a tenth as large, and the error of the speed among the observations."""
+does not dominate, a tenth as large, and observations in which feedback is not small."""
 
 
 class CrankFeedback:
@@ -152,32 +161,55 @@ def summary(figures: Mapping[str, Floats], zero: Mapping[str, Floats]) -> Figure
     return found
 
 
+def every(
+    learners: side_by_side.Learners,
+    case: Case,
+    env_kwargs: Mapping[str, Any],
+    zero: Mapping[str, Floats],
+    starts: int,
+) -> list[Figures]:
+    """Return the summaries of all learners of a case, blind twins last."""
+    return [
+        summary(played(lambda envs, at=at: OneOf(learners, at), starts, env_kwargs), zero)
+        for at in range(case.seeds + case.blind)
+    ]
+
+
 def learn(case: Case, steps: int, starts: int) -> Figures:
     """Train the learners of a case; play them and the zero action in its environment."""
     began = time.process_time()
     kwargs = dict(case.env_kwargs)
 
-    def say(done: int) -> None:
-        if done // side_by_side.DEFAULTS.n_steps % 10 == 0:
-            print(f"{done:,} steps in {time.process_time() - began:.0f} s of the processor", flush=True)
+    curve = []
+
+    def look(done: int, learners: side_by_side.Learners) -> None:
+        if done // CURVE == (done - side_by_side.DEFAULTS.n_steps) // CURVE:
+            return
+        spent = time.process_time() - began
+        zero = played(lambda envs: make_policy("zero", envs), CURVE_STARTS, kwargs)
+        figures = every(learners, case, kwargs, zero, CURVE_STARTS)
+        curve.append({"steps": done, "seeds": figures[: case.seeds], "blind": figures[case.seeds :]})
+        for kind in ("seeds", "blind"):
+            told = ", ".join(
+                f"{one['return over zero'][0]:.1f} ({one['failed']:.3f})" for one in curve[-1][kind]
+            )
+            print(f"{done:,} steps, {spent:.0f} s, {kind}: return over zero (falls) {told}", flush=True)
 
     learners = side_by_side.train(
-        ENV_ID, case.seeds, steps, tick=say, blind=case.blind, groups=BLIND, **kwargs
+        ENV_ID, case.seeds, steps, tick=look, blind=case.blind, groups=BLIND, **kwargs
     )
     trained = time.process_time() - began
     zero = played(lambda envs: make_policy("zero", envs), starts, kwargs)
-    every = [
-        summary(played(lambda envs, at=at: OneOf(learners, at), starts, kwargs), zero)
-        for at in range(case.seeds + case.blind)
-    ]
+    figures = every(learners, case, kwargs, zero, starts)
     return {
         "steps": steps,
         "starts": starts,
         "env_kwargs": kwargs,
         "processor_s": round(trained),
         "zero": summary(zero, zero),
-        "seeds": every[: case.seeds],
-        "blind": every[case.seeds :],
+        "seeds": figures[: case.seeds],
+        "blind": figures[case.seeds :],
+        "curve": curve,
     }
 
 
@@ -201,3 +233,21 @@ class Args:
     """steps of each"""
     sighted: tuple[Path, ...] = ()
     """runs of ppo_flat on this id, to be compared with the best blind policies"""
+
+
+def main(argv: list[str] | None = None) -> None:
+    """Measure what the figures lack, and write the page."""
+    args = parse(Args, argv, "python -m agents.horse_learning", __doc__)
+    check_folder(args.out)
+    figures = args.out / NAME / "figures.json"
+    found: Figures = parse_json(figures.read_text(encoding="utf-8")) if figures.is_file() else {}
+    for name in args.only or CASES:
+        if name not in found.get("learners", {}):
+            case = CASES[check_choice("only", name, CASES)]
+            found.setdefault("learners", {})[name] = learn(case, args.steps, args.starts)
+            figures.parent.mkdir(exist_ok=True)
+            runs.write_text(figures, json.dumps(found, indent=1) + "\n")
+
+
+if __name__ == "__main__":
+    run(main)

@@ -282,7 +282,7 @@ def train(
     seeds: int,
     steps: int,
     settings: Defaults = DEFAULTS,
-    tick: Callable[[int], None] = lambda steps: None,
+    tick: Callable[[int, Learners], None] = lambda steps, learners: None,
     blind: int = 0,
     groups: Collection[str] = (),
     **env_kwargs: Any,
@@ -295,7 +295,7 @@ def train(
         seeds: number of learners.
         steps: of each.
         settings: of Stable-Baselines3's PPO.
-        tick: called after each rollout with the steps so far.
+        tick: called after each rollout with the steps so far and the learners.
         blind: number of learners that see 0 in place of every entry that is not in `groups`.
         groups: of the observation, that these see.
         **env_kwargs: arguments of the environment.
@@ -319,5 +319,5 @@ def train(
     while played < steps:
         learners.improve(player.roll(), random)
         played += settings.n_steps
-        tick(played)
+        tick(played, learners)
     return learners

@@ -122,7 +122,7 @@ def test_learners_do_not_know_each_other():
 def test_they_learn_and_refuse_no_seed():
     ticks = []
     settings = replace(DEFAULTS, n_steps=256)
-    learners = train(RAIL, 2, 500, settings, ticks.append, episode_seconds=1.0)
+    learners = train(RAIL, 2, 500, settings, lambda steps, _: ticks.append(steps), episode_seconds=1.0)
     assert ticks == [256, 512]
     assert all(torch.isfinite(weight).all() for weight in learners.weights)
     for seeds in (0, 1.5, True):
