@@ -82,12 +82,8 @@ def record(env_id: str, rows: int, steps: int, **env_kwargs: Any) -> Recording:
     return Recording(observations, noise, by_name, ended, failed)
 
 
-def signal_to_noise(recording: Recording, weights: Mapping[str, float]) -> float:
-    """Return the square of the gradient over the variance of its estimate from one rollout.
-
-    Args:
-        recording: of `record`.
-        weights: of the terms of the reward by name; 0 of the terms that are left out.
+def scaled_advantages(recording: Recording, weights: Mapping[str, float]) -> Floats:
+    """Return advantages with a mean of 0 and a deviation of 1, shape (T, n), under weights of the terms.
 
     Raises:
         ParameterError: a weight of an unknown term, or none that is not 0.
@@ -98,7 +94,21 @@ def signal_to_noise(recording: Recording, weights: Mapping[str, float]) -> float
         raise ParameterError("weights: expected one that is not 0, got none")
     rewards = sum(weight * recording.terms[name] for name, weight in weights.items())
     advantages = _advantages(recording, np.asarray(rewards))
-    scaled = (advantages - advantages.mean()) / advantages.std()
+    scaled: Floats = (advantages - advantages.mean()) / advantages.std()
+    return scaled
+
+
+def signal_to_noise(recording: Recording, weights: Mapping[str, float]) -> float:
+    """Return the square of the gradient over the variance of its estimate from one rollout.
+
+    Args:
+        recording: of `record`.
+        weights: of the terms of the reward by name; 0 of the terms that are left out.
+
+    Raises:
+        ParameterError: a weight of an unknown term, or none that is not 0.
+    """
+    scaled = scaled_advantages(recording, weights)
     steps, n, _ = recording.noise.shape
     seen = recording.observations[:-1]
     seen = np.concatenate([seen, np.ones((steps, n, 1), seen.dtype)], axis=2)
@@ -109,6 +119,53 @@ def signal_to_noise(recording: Recording, weights: Mapping[str, float]) -> float
     # The square of the mean of n samples is too large by their variance over n
     square = (gradients.mean(axis=0) ** 2).sum() - variance / n
     return float(square / (variance * steps / DEFAULTS.n_steps))
+
+
+@dataclass(frozen=True)
+class LinearPolicy:
+    """Policy whose actions are linear in the observation.
+
+    Attributes:
+        mean: of the observations, shape (k,).
+        gain: of each observation and of a constant, shape (k + 1, m).
+    """
+
+    mean: Floats
+    gain: Floats
+
+    def predict(
+        self, observation: Any, state: Any = None, episode_start: Any = None, deterministic: bool = True
+    ) -> tuple[Any, Any]:
+        """Return actions, shape (n, m), for observations, shape (n, k)."""
+        actions = (np.asarray(observation, float) - self.mean) @ self.gain[:-1] + self.gain[-1]
+        return np.clip(actions, -1.0, 1.0).astype(np.float32), state
+
+
+def first_step(
+    recording: Recording, weights: Mapping[str, float], size: float, whitened: bool
+) -> LinearPolicy:
+    """Return the policy one step from the untrained one, along the gradient of all recorded steps.
+
+    Args:
+        recording: of `record`.
+        weights: of the terms of the reward by name.
+        size: root mean square of the actions of the step.
+        whitened: True for the gradient with respect to observations that are uncorrelated and of one size,
+            the natural gradient; False for observations as they are.
+
+    Raises:
+        ParameterError: a weight of an unknown term, or none that is not 0.
+    """
+    scaled = scaled_advantages(recording, weights)
+    steps, n, m = recording.noise.shape
+    seen = recording.observations[:-1].reshape(steps * n, -1).astype(float)
+    mean = seen.mean(axis=0)
+    features = np.concatenate([seen - mean, np.ones((len(seen), 1))], axis=1)
+    gain = features.T @ (scaled.reshape(-1, 1) * recording.noise.reshape(-1, m)) / len(seen)
+    if whitened:
+        squares = features.T @ features / len(seen)
+        gain = np.linalg.solve(squares + RIDGE * np.eye(len(squares)), gain)
+    return LinearPolicy(mean, gain * size / np.sqrt(((features @ gain) ** 2).mean()))
 
 
 def _advantages(recording: Recording, rewards: Floats) -> Floats:

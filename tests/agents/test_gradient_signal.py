@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from agents.gradient_signal import Recording, record, signal_to_noise
+from agents.gradient_signal import Recording, first_step, record, signal_to_noise
 from hoof_env.errors import ParameterError
 
 STEPS, ROWS = 400, 64
@@ -66,3 +66,20 @@ def test_unknown_terms_and_no_weights_are_refused():
         signal_to_noise(recording, {"slop": 1.0})
     with pytest.raises(ParameterError, match="not 0"):
         signal_to_noise(recording, {"pay": 0.0})
+
+
+def test_a_step_goes_where_actions_pay_and_whitening_undoes_the_scale_of_an_observation():
+    """Feedback pays as much for a large observation as for one that a scale has made small."""
+    recording = made_up(
+        lambda seen, noise: 20 * (seen[..., 0] * noise[..., 0] + seen[..., 2] * noise[..., 1])
+    )
+    small = replace(recording, observations=recording.observations * np.float32([1.0, 1.0, 0.2]))
+    for whitened, ratio in ((False, 0.2**2), (True, 1.0)):
+        step = first_step(small, {"pay": 1.0}, 0.3, whitened)
+        # What the same deviation of the true quantities does to the actions
+        of_large, of_small = step.gain[0, 0], 0.2 * step.gain[2, 1]
+        assert of_small / of_large == pytest.approx(ratio, rel=0.25)
+        assert of_large > 5 * np.abs(step.gain[1]).max()
+        seen = small.observations[:-1].reshape(-1, 3)
+        actions, _ = step.predict(seen)
+        assert np.sqrt((actions**2).mean()) == pytest.approx(0.3, rel=0.05)
