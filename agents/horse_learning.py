@@ -10,20 +10,23 @@ from __future__ import annotations
 
 import json
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
+from itertools import product
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from agents import runs, side_by_side
+from agents import results, runs, side_by_side
 from agents.command import parse, run
-from hoof_env._output import check_folder
+from agents.gradient_signal import first_step, record, signal_to_noise
+from hoof_env._output import check_folder, markdown_table
 from hoof_env.envs.policies import make_policy
 from hoof_env.errors import check_choice, parse_json
 from hoof_env.evaluation.episodes import make_rows, play_rows
+from hoof_env.policies.find import find_policy
 
 EVIDENCE = Path(__file__).parents[1] / "docs" / "evidence"
 NAME = "horse_learning"
@@ -46,11 +49,24 @@ WEIGHTS = {
 }  # fmt: skip
 """Weights of the id."""
 
+QUIET = {"alive": 0.0, "tracking": 32.0, "slip": 70.0, "fall": 40.0}
+"""Weights that differ in a reward which falls do not dominate."""
+
 GAINS = (0.0, 0.2, 0.4, 0.8)
 """Offsets of all cranks for each m/s above the commanded speed, in units of the action [s/m]."""
 
 KEPT = ("return", "failed", "success", "speed_m_s", "slip_m", "stance_peak_n", "loading_rate_n_s")
 """Figures of an episode that are kept."""
+
+STEPPED = ("of the id", "quiet")
+SIZES = (0.2, 0.4)
+"""Weights under which a step is taken along the first gradient, and root mean squares of its actions."""
+
+OBSERVATIONS: Mapping[str, Mapping[str, Any]] = {
+    "of the id": {},
+    "`balance`": {"observation": BALANCE},
+}
+"""Observations under which it is taken."""
 
 Figures = dict[str, Any]
 Floats = NDArray[np.float64]
@@ -67,7 +83,7 @@ REWARDS = {
     "without `alive`, a fall costs 190": changed(alive=0.0, fall=190.0),
     "of level ground": changed(tracking=16.0, fall=15.0),
     "of level ground, without `alive`": changed(alive=0.0, tracking=16.0, fall=15.0),
-    "quiet": changed(alive=0.0, tracking=32.0, slip=70.0, fall=40.0),
+    "quiet": changed(**QUIET),
     "slip alone": dict.fromkeys(WEIGHTS, 0.0) | {"slip": 35.0},
 }
 """Weights under which the signal of the gradient is measured."""
@@ -99,7 +115,7 @@ CASES = {
         5,
         3,
         {
-            "reward_weights": changed(0.1, alive=0.0, tracking=32.0, slip=70.0, fall=40.0),
+            "reward_weights": changed(0.1, **QUIET),
             "observation": BALANCE,
         },
     ),
@@ -213,6 +229,61 @@ def learn(case: Case, steps: int, starts: int) -> Figures:
     }
 
 
+def measure_gains(starts: int) -> list[Figures]:
+    """Play one number of feedback: all cranks faster by a gain times the error of the speed."""
+    zero = played(lambda envs: make_policy("zero", envs), starts)
+    return [
+        {"gain": gain, **summary(played(lambda envs, gain=gain: CrankFeedback(envs, gain), starts), zero)}
+        for gain in GAINS
+    ]
+
+
+def measure_signal(rows: int, steps: int) -> dict[str, dict[str, float]]:
+    """Return signal over noise of the first gradient, by surroundings and weights of the reward."""
+    found = {}
+    for name, kwargs in SURROUNDINGS.items():
+        recording = record(ENV_ID, rows, steps, **kwargs)
+        found[name] = {of: signal_to_noise(recording, weights) for of, weights in REWARDS.items()}
+    return found
+
+
+def measure_steps(rows: int, steps: int, starts: int) -> list[Figures]:
+    """Play policies one step from the untrained one, along first gradients."""
+    zero = played(lambda envs: make_policy("zero", envs), starts)
+    found = []
+    for observation, kwargs in OBSERVATIONS.items():
+        recording = record(ENV_ID, rows, steps, **kwargs)
+        for weights, whitened, size in product(STEPPED, (False, True), SIZES):
+            policy = first_step(recording, REWARDS[weights], size, whitened)
+            about = {"observation": observation, "weights": weights, "whitened": whitened, "size": size}
+            figures = played(lambda envs, policy=policy: policy, starts, kwargs)
+            found.append(about | summary(figures, zero))
+    return found
+
+
+def measure_sighted(folders: Sequence[Path], starts: int) -> list[Figures]:
+    """Play runs of `ppo_flat`, the best policies without feedback and the zero action."""
+    zero = played(lambda envs: make_policy("zero", envs), starts)
+    found = [{"name": "zero action", **summary(zero, zero)}]
+    others: list[tuple[str, str, Mapping[str, Any]]] = [
+        ("best gait locked to the crank", "open-loop", {}),
+        (
+            "best blind agent",
+            str(results.RESULTS / "policies" / "HorseRough-v0-blind"),
+            {"observation": BLIND},
+        ),
+    ]
+    for folder in folders:
+        kept = runs.read_record(folder)
+        others.append(
+            (f"{kept['algo']}, {kept['finished']['steps']:,} steps", str(folder), kept["env_kwargs"])
+        )
+    for name, policy, kwargs in others:
+        figures = played(lambda envs, policy=policy: find_policy(policy, envs, ENV_ID), starts, kwargs)
+        found.append({"name": name, **summary(figures, zero)})
+    return found
+
+
 @dataclass(frozen=True)
 class Args:
     """Arguments of the command."""
@@ -227,12 +298,170 @@ class Args:
     """of each learner"""
     starts: int = 1000
     """episodes of each policy"""
-    rows: int = 256
+    rows: int = 128
     """environments whose gradients are samples"""
     recorded: int = 1500
     """steps of each"""
+    probed: int = 250
+    """episodes of each step along a gradient"""
     sighted: tuple[Path, ...] = ()
-    """runs of ppo_flat on this id, to be compared with the best blind policies"""
+    """runs of ppo_flat on this id, which are compared with the best blind policies"""
+
+
+PAGE = """# Why stock PPO gains little on rough ground
+
+Written by `python -m agents.horse_learning` at commit `{commit}`, with [its figures]({name}/figures.json).
+`hoof_env/HorseRough-v0`; episodes have seeds from 3,000,000 on, and differences from the zero action are
+paired.
+
+**Asked.** Why stock PPO does not beat doing nothing on rough ground, and what would let it.
+
+**Found.** {found}
+
+## One number of feedback
+
+All cranks turn faster by a gain, in units of the action, for each m/s above the commanded speed. {starts}
+starts.
+
+{gains}
+
+## How much of the first gradient is signal
+
+The square of the first policy gradient over the variance of its estimate from one rollout of 2048 steps, for
+feedback that is linear in the observation (`agents/gradient_signal.py`); {rows} environments of {recorded}
+steps. With 0.01 a hundred rollouts have as much signal as noise, and 300,000 steps are 147 rollouts. *Quiet*
+are `alive` 0, `tracking` 32, `slip` 70 and `fall` 40 in place of 45, 64, 35 and 100.
+
+{signal}
+
+## One step along the first gradient
+
+Policies without noise, linear in the observation, one step from the zero action; *size* is the root mean
+square of their actions. {probed} starts. The gradient is that of all {total:,} recorded steps. *Whitened* is
+the gradient with respect to observations that are uncorrelated and of one size, the natural gradient.
+`balance` has the trunk in scales of its deviations and leaves out what follows from crank, command and
+offsets: `observation={balance}`.
+
+{steps}
+
+## Stock PPO
+
+`PPO("MlpPolicy", env)` of Stable-Baselines3 with its defaults (`agents/side_by_side.py`), {learnt:,} steps,
+played without noise on the same starts. Blind twins see command, crank, gait and offsets. Returns are of each
+form of the task: compare them only within a row.
+
+{learners}
+
+## Sighted and blind
+
+`ppo_flat` with its settings on the id as it is, {starts} starts. The blind agent is the best of ten of
+20 million steps, the gait the best of three searches.
+
+{sighted}
+"""
+
+
+def interval(pair: Sequence[float], digits: int = 1) -> str:
+    """Format a difference with its 95 % interval."""
+    mean, error = pair
+    return f"{mean:+.{digits}f} [{mean - 1.96 * error:.{digits}f}, {mean + 1.96 * error:.{digits}f}]"
+
+
+def row_of(one: Figures, *names: str) -> list[str]:
+    """Return the cells of a policy: names, falls, success, slip, and the return over the zero action's."""
+    falls = f"{100 * one['failed']:.1f} %"
+    return [
+        *names,
+        falls,
+        f"{100 * one['success']:.1f} %",
+        f"{one['slip_m']:.3f}",
+        interval(one["return over zero"]),
+    ]
+
+
+HEAD = ("falls", "success", "slip a stance [m]", "return over the zero action's")
+
+
+def learner_rows(learners: Mapping[str, Figures]) -> list[list[str]]:
+    """Return two rows for each case: learners that see all, and blind twins."""
+    rows = []
+    for name, of_case in learners.items():
+        for kind, title in (("seeds", "sighted"), ("blind", "blind")):
+            ones = of_case[kind]
+            if not ones:
+                continue
+            falls = ", ".join(f"{100 * one['failed']:.1f}" for one in ones)
+            gains = ", ".join(f"{one['return over zero'][0]:+.1f}" for one in ones)
+            success = ", ".join(f"{100 * one['success']:.0f}" for one in ones)
+            zero = of_case["zero"]
+            rows.append([name, title, falls, f"{100 * zero['failed']:.1f}", success, gains])
+    return rows
+
+
+def page(found: Figures, args: Args) -> str:
+    """Return the text of the page."""
+    gains = [row_of(one, f"{one['gain']:g}") for one in found["gains"]]
+    names = list(found["signal"])
+    signal = [[of, *(f"{found['signal'][name][of]:.3f}" for name in names)] for of in REWARDS]
+    steps = [
+        row_of(
+            one,
+            one["observation"],
+            one["weights"],
+            "whitened" if one["whitened"] else "as it is",
+            f"{one['size']:g}",
+        )
+        for one in found["steps"]
+    ]
+    sighted = [row_of(one, one["name"]) for one in found.get("sighted", [])]
+    learners = found.get("learners", {})
+    return PAGE.format(
+        name=NAME,
+        commit=results.commit_of_code(),
+        found=found_text(found),
+        starts=f"{args.starts:,}",
+        rows=args.rows,
+        recorded=f"{args.recorded:,}",
+        total=args.rows * args.recorded,
+        probed=args.probed,
+        balance=list(BALANCE),
+        learnt=max((one["steps"] for one in learners.values()), default=args.steps),
+        gains=markdown_table(["gain", *HEAD], gains),
+        signal=markdown_table(["weights", *names], signal),
+        steps=markdown_table(["observation", "weights", "gradient", "size", *HEAD], steps),
+        learners=markdown_table(
+            ["form", "sees", "falls of each seed [%]", "zero action's", "success [%]", "returns over zero's"],
+            learner_rows(learners),
+        ),
+        sighted=markdown_table(["policy", *HEAD], sighted),
+    )
+
+
+def found_text(found: Figures) -> str:
+    """Say what was found, with its figures."""
+    none, *others = found["gains"]
+    best = min(others, key=lambda one: one["failed"])
+    signal = found["signal"][next(iter(SURROUNDINGS))]
+
+    def stepped(observation: str, weights: str, whitened: bool) -> Figures:
+        """Return the step with the fewest falls."""
+        asked = {"observation": observation, "weights": weights, "whitened": whitened}
+        return min(
+            (one for one in found["steps"] if all(one[key] == value for key, value in asked.items())),
+            key=lambda one: one["failed"],
+        )
+
+    plain, whitened = (stepped("of the id", "quiet", flag) for flag in (False, True))
+    of_id = stepped("of the id", "of the id", True)
+    return (
+        f"Feedback pays: with one number of it {100 * best['failed']:.1f} % of the episodes end in a fall in"
+        f" place of {100 * none['failed']:.1f} %. But PPO's first gradients hardly show it: the signal over"
+        f" noise of a rollout is {signal['of the id']:.3f}. Falls, which come by pushes, make most of the advantages;"
+        f" with quiet weights it is {signal['quiet']:.3f}. And the gradient follows large observations, and passes"
+        " over small ones, as the speed above the commanded one: one linear step along it falls in"
+        f" {100 * plain['failed']:.1f} % at best, along the whitened one in"
+        f" {100 * whitened['failed']:.1f} % (with the weights of the id {100 * of_id['failed']:.1f} %)."
+    )
 
 
 def main(argv: list[str] | None = None) -> None:
@@ -241,12 +470,28 @@ def main(argv: list[str] | None = None) -> None:
     check_folder(args.out)
     figures = args.out / NAME / "figures.json"
     found: Figures = parse_json(figures.read_text(encoding="utf-8")) if figures.is_file() else {}
-    for name in args.only or CASES:
+
+    def keep(name: str, measured: Any) -> None:
+        found[name] = measured
+        figures.parent.mkdir(exist_ok=True)
+        runs.write_text(figures, json.dumps(found, indent=1) + "\n")
+
+    for name in args.only or (CASES if args.train else ()):
         if name not in found.get("learners", {}):
             case = CASES[check_choice("only", name, CASES)]
-            found.setdefault("learners", {})[name] = learn(case, args.steps, args.starts)
-            figures.parent.mkdir(exist_ok=True)
-            runs.write_text(figures, json.dumps(found, indent=1) + "\n")
+            keep("learners", found.get("learners", {}) | {name: learn(case, args.steps, args.starts)})
+    if args.only:
+        return
+    if "gains" not in found:
+        keep("gains", measure_gains(args.starts))
+    if "signal" not in found:
+        keep("signal", measure_signal(args.rows, args.recorded))
+    if "steps" not in found:
+        keep("steps", measure_steps(args.rows, args.recorded, args.probed))
+    if args.sighted:
+        keep("sighted", measure_sighted(args.sighted, args.starts))
+    keep("versions", runs.versions())
+    runs.write_text(args.out / f"{NAME}.md", page(found, args))
 
 
 if __name__ == "__main__":
