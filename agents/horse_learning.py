@@ -456,10 +456,10 @@ def found_text(found: Figures) -> str:
     return (
         f"Feedback pays: with one number of it {100 * best['failed']:.1f} % of the episodes end in a fall in"
         f" place of {100 * none['failed']:.1f} %. But PPO's first gradients hardly show it: the signal over"
-        f" noise of a rollout is {signal['of the id']:.3f}. Falls, which come by pushes, make most of the advantages;"
-        f" with quiet weights it is {signal['quiet']:.3f}. And the gradient follows large observations, and passes"
-        " over small ones, as the speed above the commanded one: one linear step along it falls in"
-        f" {100 * plain['failed']:.1f} % at best, along the whitened one in"
+        f" noise of a rollout is {signal['of the id']:.3f}. Falls, which come by pushes, make most of the"
+        f" advantages; with quiet weights it is {signal['quiet']:.3f}. And the gradient follows large"
+        " observations, and passes over small ones, as the speed above the commanded one: one linear step"
+        f" along it falls in {100 * plain['failed']:.1f} % at best, along the whitened one in"
         f" {100 * whitened['failed']:.1f} % (with the weights of the id {100 * of_id['failed']:.1f} %)."
     )
 
