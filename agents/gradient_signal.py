@@ -46,12 +46,13 @@ class Recording:
     failed: NDArray[np.bool_]
 
 
-def record(env_id: str, rows: int, steps: int, **env_kwargs: Any) -> Recording:
+def record(env_id: str, rows: int, steps: int, sample: int = 0, **env_kwargs: Any) -> Recording:
     """Play noise in many environments.
 
     Args:
         env_id: id of this package.
         rows, steps: environments, and steps of each.
+        sample: number of the recording; others have other noise and starts.
         **env_kwargs: arguments of the environment.
 
     Raises:
@@ -62,8 +63,8 @@ def record(env_id: str, rows: int, steps: int, **env_kwargs: Any) -> Recording:
         env_id, n, "vector_entry_point", autoreset_mode="SAME_STEP", **env_kwargs
     ).unwrapped
     steps = count("steps", steps)
-    random = np.random.default_rng(0)
-    seen, _ = envs.reset(seed=list(range(SEED, SEED + n)))
+    random = np.random.default_rng(sample)
+    seen, _ = envs.reset(seed=list(range(SEED + sample * n, SEED + (sample + 1) * n)))
     observations = np.empty((steps + 1, *seen.shape), np.float32)
     noise = random.standard_normal((steps, n, envs.single_action_space.shape[0]), np.float32)
     ended, failed = np.empty((2, steps, n), bool)

@@ -59,8 +59,10 @@ KEPT = ("return", "failed", "success", "speed_m_s", "slip_m", "stance_peak_n", "
 """Figures of an episode that are kept."""
 
 STEPPED = ("of the id", "quiet")
-SIZES = (0.2, 0.4)
-"""Weights under which a step is taken along the first gradient, and root mean squares of its actions."""
+SIZE = 0.3
+SAMPLES = 3
+"""Weights under which a step is taken along the first gradient, root mean square of its actions, and recordings
+of which each has a gradient of its own."""
 
 OBSERVATIONS: Mapping[str, Mapping[str, Any]] = {
     "of the id": {},
@@ -251,11 +253,11 @@ def measure_steps(rows: int, steps: int, starts: int) -> list[Figures]:
     """Play policies one step from the untrained one, along first gradients."""
     zero = played(lambda envs: make_policy("zero", envs), starts)
     found = []
-    for observation, kwargs in OBSERVATIONS.items():
-        recording = record(ENV_ID, rows, steps, **kwargs)
-        for weights, whitened, size in product(STEPPED, (False, True), SIZES):
-            policy = first_step(recording, REWARDS[weights], size, whitened)
-            about = {"observation": observation, "weights": weights, "whitened": whitened, "size": size}
+    for (observation, kwargs), sample in product(OBSERVATIONS.items(), range(SAMPLES)):
+        recording = record(ENV_ID, rows, steps, sample, **kwargs)
+        for weights, whitened in product(STEPPED, (False, True)):
+            policy = first_step(recording, REWARDS[weights], SIZE, whitened)
+            about = {"observation": observation, "weights": weights, "whitened": whitened, "sample": sample}
             figures = played(lambda envs, policy=policy: policy, starts, kwargs)
             found.append(about | summary(figures, zero))
     return found
@@ -298,9 +300,9 @@ class Args:
     """of each learner"""
     starts: int = 1000
     """episodes of each policy"""
-    rows: int = 128
+    rows: int = 256
     """environments whose gradients are samples"""
-    recorded: int = 1500
+    recorded: int = 1200
     """steps of each"""
     probed: int = 250
     """episodes of each step along a gradient"""
@@ -336,8 +338,9 @@ are `alive` 0, `tracking` 32, `slip` 70 and `fall` 40 in place of 45, 64, 35 and
 
 ## One step along the first gradient
 
-Policies without noise, linear in the observation, one step from the zero action; *size* is the root mean
-square of their actions. {probed} starts. The gradient is that of all {total:,} recorded steps. *Whitened* is
+Policies without noise, linear in the observation, one step from the zero action: the root mean square of their
+actions is {size}. {probed} starts. The gradient is that of {total:,} recorded steps, as many as stock PPO
+plays, and each figure of a cell is of a recording of its own. *Whitened* is
 the gradient with respect to observations that are uncorrelated and of one size, the natural gradient.
 `balance` has the trunk in scales of its deviations and leaves out what follows from crank, command and
 offsets: `observation={balance}`.
@@ -398,20 +401,29 @@ def learner_rows(learners: Mapping[str, Figures]) -> list[list[str]]:
     return rows
 
 
+def of_kind(steps: Sequence[Figures], kind: tuple[Any, ...]) -> list[Figures]:
+    """Return the steps of an observation, of weights, whitened or not."""
+    return [one for one in steps if (one["observation"], one["weights"], one["whitened"]) == kind]
+
+
+def step_cells(ones: Sequence[Figures]) -> list[str]:
+    """Return the falls, successes and returns of the samples of a step."""
+    return [
+        ", ".join(f"{100 * one['failed']:.0f}" for one in ones),
+        ", ".join(f"{100 * one['success']:.0f}" for one in ones),
+        ", ".join(f"{one['return over zero'][0]:+.0f}" for one in ones),
+    ]
+
+
 def page(found: Figures, args: Args) -> str:
     """Return the text of the page."""
     gains = [row_of(one, f"{one['gain']:g}") for one in found["gains"]]
     names = list(found["signal"])
     signal = [[of, *(f"{found['signal'][name][of]:.3f}" for name in names)] for of in REWARDS]
+    kinds = dict.fromkeys((one["observation"], one["weights"], one["whitened"]) for one in found["steps"])
     steps = [
-        row_of(
-            one,
-            one["observation"],
-            one["weights"],
-            "whitened" if one["whitened"] else "as it is",
-            f"{one['size']:g}",
-        )
-        for one in found["steps"]
+        [kind[0], kind[1], "whitened" if kind[2] else "as it is", *step_cells(of_kind(found["steps"], kind))]
+        for kind in kinds
     ]
     sighted = [row_of(one, one["name"]) for one in found.get("sighted", [])]
     learners = found.get("learners", {})
@@ -423,12 +435,23 @@ def page(found: Figures, args: Args) -> str:
         rows=args.rows,
         recorded=f"{args.recorded:,}",
         total=args.rows * args.recorded,
+        size=SIZE,
         probed=args.probed,
         balance=list(BALANCE),
         learnt=max((one["steps"] for one in learners.values()), default=args.steps),
         gains=markdown_table(["gain", *HEAD], gains),
         signal=markdown_table(["weights", *names], signal),
-        steps=markdown_table(["observation", "weights", "gradient", "size", *HEAD], steps),
+        steps=markdown_table(
+            [
+                "observation",
+                "weights",
+                "gradient",
+                "falls [%]",
+                "success [%]",
+                "return over the zero action's",
+            ],
+            steps,
+        ),
         learners=markdown_table(
             ["form", "sees", "falls of each seed [%]", "zero action's", "success [%]", "returns over zero's"],
             learner_rows(learners),
@@ -443,24 +466,20 @@ def found_text(found: Figures) -> str:
     best = min(others, key=lambda one: one["failed"])
     signal = found["signal"][next(iter(SURROUNDINGS))]
 
-    def stepped(observation: str, weights: str, whitened: bool) -> Figures:
-        """Return the step with the fewest falls."""
-        asked = {"observation": observation, "weights": weights, "whitened": whitened}
-        return min(
-            (one for one in found["steps"] if all(one[key] == value for key, value in asked.items())),
-            key=lambda one: one["failed"],
-        )
+    def falls(*kind: Any) -> str:
+        """Say how often the samples of a step fall."""
+        ones = [100 * one["failed"] for one in of_kind(found["steps"], kind)]
+        return f"{min(ones):.0f} to {max(ones):.0f} %"
 
-    plain, whitened = (stepped("of the id", "quiet", flag) for flag in (False, True))
-    of_id = stepped("of the id", "of the id", True)
     return (
         f"Feedback pays: with one number of it {100 * best['failed']:.1f} % of the episodes end in a fall in"
         f" place of {100 * none['failed']:.1f} %. But PPO's first gradients hardly show it: the signal over"
         f" noise of a rollout is {signal['of the id']:.3f}. Falls, which come by pushes, make most of the"
         f" advantages; with quiet weights it is {signal['quiet']:.3f}. And the gradient follows large"
         " observations, and passes over small ones, as the speed above the commanded one: one linear step"
-        f" along it falls in {100 * plain['failed']:.1f} % at best, along the whitened one in"
-        f" {100 * whitened['failed']:.1f} % (with the weights of the id {100 * of_id['failed']:.1f} %)."
+        f" along it falls in {falls('of the id', 'quiet', False)}, along the whitened one in"
+        f" {falls('of the id', 'quiet', True)}, with the weights of the id in"
+        f" {falls('of the id', 'of the id', False)} and {falls('of the id', 'of the id', True)}."
     )
 
 

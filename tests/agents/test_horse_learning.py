@@ -29,8 +29,7 @@ def test_cranks_follow_the_error_of_the_speed():
     envs = make_rows(page.ENV_ID, 3)
     seen, _ = envs.reset(seed=0)
     raw = envs.raw_observation()
-    names = envs.observation_names
-    error = raw[:, names.index("forward speed")] - raw[:, names.index("commanded speed")]
+    error = np.asarray(raw["forward speed"]) - raw["commanded speed"]
     actions, _ = page.CrankFeedback(envs, 0.4).predict(seen)
     assert actions[:, ::4] == pytest.approx(np.repeat(0.4 * error[:, None], 4, 1), abs=1e-5)
     assert not np.delete(actions, np.s_[::4], axis=1).any()
@@ -54,7 +53,7 @@ def test_learners_and_blind_twins_are_trained_and_played(capsys):
 
 def test_the_page_is_written_with_what_was_measured(tmp_path, monkeypatch, capsys):
     monkeypatch.setattr(page, "GAINS", (0.0, 0.4))
-    monkeypatch.setattr(page, "SIZES", (0.2,))
+    monkeypatch.setattr(page, "SAMPLES", 1)
     few = ["--no-train", "--starts", "3", "--probed", "2", "--rows", "3", "--recorded", "40"]
     page.main([*few, "--out", str(tmp_path)])
     text = (tmp_path / "horse_learning.md").read_text()

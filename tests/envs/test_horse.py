@@ -391,7 +391,7 @@ def test_the_group_balance_is_the_trunk_in_scales_of_its_deviations():
         seen, *_ = envs.step(np.zeros((64, 16), np.float32))
         met.append(seen[:, :5])
     assert np.std(np.concatenate(met), axis=0) == pytest.approx(0.65, abs=0.15)
-    raw = dict(zip(envs.observation_names, envs.raw_observation().T, strict=True))
+    raw = {name: np.asarray(values) for name, values in envs.raw_observation().items()}
     error = raw["forward speed"] - raw["commanded speed"]
     assert raw["speed above the commanded one"] == pytest.approx(error, abs=1e-9)
     pairs = {
