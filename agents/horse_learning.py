@@ -61,8 +61,8 @@ KEPT = ("return", "failed", "success", "speed_m_s", "slip_m", "stance_peak_n", "
 STEPPED = ("of the id", "quiet")
 SIZE = 0.3
 SAMPLES = 3
-"""Weights under which a step is taken along the first gradient, root mean square of its actions, and recordings
-of which each has a gradient of its own."""
+"""Weights under which a step is taken along a first gradient, root mean square of its actions, and number of
+recordings, each with a gradient of its own."""
 
 OBSERVATIONS: Mapping[str, Mapping[str, Any]] = {
     "of the id": {},
@@ -338,12 +338,11 @@ are `alive` 0, `tracking` 32, `slip` 70 and `fall` 40 in place of 45, 64, 35 and
 
 ## One step along the first gradient
 
-Policies without noise, linear in the observation, one step from the zero action: the root mean square of their
-actions is {size}. {probed} starts. The gradient is that of {total:,} recorded steps, as many as stock PPO
-plays, and each figure of a cell is of a recording of its own. *Whitened* is
-the gradient with respect to observations that are uncorrelated and of one size, the natural gradient.
-`balance` has the trunk in scales of its deviations and leaves out what follows from crank, command and
-offsets: `observation={balance}`.
+Policies without noise, linear in the observation, one step from the zero action: the root mean square of
+their actions is {size}. {probed} starts. The gradient is that of {total:,} recorded steps, as many as stock
+PPO plays, and each figure of a cell is of a recording of its own. *Whitened* is the gradient with respect to
+observations that are uncorrelated and of one size, the natural gradient. `balance` has the trunk in scales of
+its deviations and leaves out what follows from crank, command and offsets: `observation={balance}`.
 
 {steps}
 
