@@ -12,6 +12,7 @@ import json
 import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import partial
 from itertools import product
 from pathlib import Path
 from typing import Any
@@ -35,9 +36,7 @@ ENV_ID = "hoof_env/HorseRough-v0"
 FIRST_SEED = 3_000_000  # of the starts, which no training and no published score plays
 
 BLIND = ("target", "crank", "gait", "offset")
-BALANCE = ("balance", "target", "crank", "hoof", "offset")
-"""Groups that blind twins see, if the environment has them; and groups with the trunk scaled by its
-deviations, without what follows from crank, command and offsets."""
+"""Groups that blind twins see."""
 
 CURVE_STARTS = 200
 CURVE = 100_000
@@ -63,12 +62,6 @@ SIZE = 0.3
 SAMPLES = 3
 """Weights under which a step is taken along a first gradient, root mean square of its actions, and number of
 recordings, each with a gradient of its own."""
-
-OBSERVATIONS: Mapping[str, Mapping[str, Any]] = {
-    "of the id": {},
-    "`balance`": {"observation": BALANCE},
-}
-"""Observations under which it is taken."""
 
 Figures = dict[str, Any]
 Floats = NDArray[np.float64]
@@ -111,19 +104,9 @@ class Case:
     env_kwargs: Mapping[str, Any] = field(default_factory=dict)
 
 
-CASES = {
-    "as it is": Case(5, 3),
-    "quiet": Case(
-        5,
-        3,
-        {
-            "reward_weights": changed(0.1, **QUIET),
-            "observation": BALANCE,
-        },
-    ),
-}
+CASES = {"as it is": Case(5, 3), "quiet": Case(5, 3, {"reward_weights": changed(0.1, **QUIET)})}
 """Forms of the task under which stock PPO learns: the id's own; and with weights of the reward that a fall
-does not dominate, a tenth as large, and observations in which feedback is not small."""
+does not dominate, a tenth as large."""
 
 
 class CrankFeedback:
@@ -158,6 +141,22 @@ class OneOf:
         return self.learner.act(np.ascontiguousarray(observation, np.float32)[None])[0], state
 
 
+def zero_action(envs: Any) -> Any:
+    """Make the policy that does nothing."""
+    return make_policy("zero", envs)
+
+
+def found_policy(name: str, env_kwargs: Mapping[str, Any]) -> Any:
+    """Return a policy for the id with arguments."""
+    with runs.make_env(ENV_ID, **env_kwargs) as env:
+        return find_policy(name, env, ENV_ID)
+
+
+def _always(policy: Any) -> Callable[[Any], Any]:
+    """Return a function that gives this policy for any environment."""
+    return lambda envs: policy
+
+
 def played(
     policy: Callable[[Any], Any], starts: int, env_kwargs: Mapping[str, Any] | None = None
 ) -> dict[str, Floats]:
@@ -188,7 +187,7 @@ def every(
 ) -> list[Figures]:
     """Return the summaries of all learners of a case, blind twins last."""
     return [
-        summary(played(lambda envs, at=at: OneOf(learners, at), starts, env_kwargs), zero)
+        summary(played(_always(OneOf(learners, at)), starts, env_kwargs), zero)
         for at in range(case.seeds + case.blind)
     ]
 
@@ -198,13 +197,13 @@ def learn(case: Case, steps: int, starts: int) -> Figures:
     began = time.process_time()
     kwargs = dict(case.env_kwargs)
 
-    curve = []
+    curve: list[Figures] = []
 
     def look(done: int, learners: side_by_side.Learners) -> None:
         if done // CURVE == (done - side_by_side.DEFAULTS.n_steps) // CURVE:
             return
         spent = time.process_time() - began
-        zero = played(lambda envs: make_policy("zero", envs), CURVE_STARTS, kwargs)
+        zero = played(zero_action, CURVE_STARTS, kwargs)
         figures = every(learners, case, kwargs, zero, CURVE_STARTS)
         curve.append({"steps": done, "seeds": figures[: case.seeds], "blind": figures[case.seeds :]})
         for kind in ("seeds", "blind"):
@@ -217,7 +216,7 @@ def learn(case: Case, steps: int, starts: int) -> Figures:
         ENV_ID, case.seeds, steps, tick=look, blind=case.blind, groups=BLIND, **kwargs
     )
     trained = time.process_time() - began
-    zero = played(lambda envs: make_policy("zero", envs), starts, kwargs)
+    zero = played(zero_action, starts, kwargs)
     figures = every(learners, case, kwargs, zero, starts)
     return {
         "steps": steps,
@@ -233,10 +232,9 @@ def learn(case: Case, steps: int, starts: int) -> Figures:
 
 def measure_gains(starts: int) -> list[Figures]:
     """Play one number of feedback: all cranks faster by a gain times the error of the speed."""
-    zero = played(lambda envs: make_policy("zero", envs), starts)
+    zero = played(zero_action, starts)
     return [
-        {"gain": gain, **summary(played(lambda envs, gain=gain: CrankFeedback(envs, gain), starts), zero)}
-        for gain in GAINS
+        {"gain": gain, **summary(played(partial(CrankFeedback, gain=gain), starts), zero)} for gain in GAINS
     ]
 
 
@@ -251,21 +249,20 @@ def measure_signal(rows: int, steps: int) -> dict[str, dict[str, float]]:
 
 def measure_steps(rows: int, steps: int, starts: int) -> list[Figures]:
     """Play policies one step from the untrained one, along first gradients."""
-    zero = played(lambda envs: make_policy("zero", envs), starts)
+    zero = played(zero_action, starts)
     found = []
-    for (observation, kwargs), sample in product(OBSERVATIONS.items(), range(SAMPLES)):
-        recording = record(ENV_ID, rows, steps, sample, **kwargs)
+    for sample in range(SAMPLES):
+        recording = record(ENV_ID, rows, steps, sample)
         for weights, whitened in product(STEPPED, (False, True)):
             policy = first_step(recording, REWARDS[weights], SIZE, whitened)
-            about = {"observation": observation, "weights": weights, "whitened": whitened, "sample": sample}
-            figures = played(lambda envs, policy=policy: policy, starts, kwargs)
-            found.append(about | summary(figures, zero))
+            about = {"weights": weights, "whitened": whitened, "sample": sample}
+            found.append(about | summary(played(_always(policy), starts), zero))
     return found
 
 
 def measure_sighted(folders: Sequence[Path], starts: int) -> list[Figures]:
     """Play runs of `ppo_flat`, the best policies without feedback and the zero action."""
-    zero = played(lambda envs: make_policy("zero", envs), starts)
+    zero = played(zero_action, starts)
     found = [{"name": "zero action", **summary(zero, zero)}]
     others: list[tuple[str, str, Mapping[str, Any]]] = [
         ("best gait locked to the crank", "open-loop", {}),
@@ -281,7 +278,7 @@ def measure_sighted(folders: Sequence[Path], starts: int) -> list[Figures]:
             (f"{kept['algo']}, {kept['finished']['steps']:,} steps", str(folder), kept["env_kwargs"])
         )
     for name, policy, kwargs in others:
-        figures = played(lambda envs, policy=policy: find_policy(policy, envs, ENV_ID), starts, kwargs)
+        figures = played(_always(found_policy(policy, kwargs)), starts, kwargs)
         found.append({"name": name, **summary(figures, zero)})
     return found
 
@@ -300,15 +297,25 @@ class Args:
     """of each learner"""
     starts: int = 1000
     """episodes of each policy"""
-    rows: int = 256
+    rows: int = 128
     """environments whose gradients are samples"""
-    recorded: int = 1200
+    recorded: int = 1500
     """steps of each"""
     probed: int = 250
     """episodes of each step along a gradient"""
     sighted: tuple[Path, ...] = ()
     """runs of ppo_flat on this id, which are compared with the best blind policies"""
 
+
+LEARNERS = """## Stock PPO
+
+`PPO("MlpPolicy", env)` of Stable-Baselines3 with its defaults (`agents/side_by_side.py`), {learnt:,} steps,
+played without noise on the same starts. Blind twins see command, crank, gait and offsets. Returns are of each
+form of the task: compare them only within a row.
+
+{table}
+
+"""
 
 PAGE = """# Why stock PPO gains little on rough ground
 
@@ -339,22 +346,13 @@ are `alive` 0, `tracking` 32, `slip` 70 and `fall` 40 in place of 45, 64, 35 and
 ## One step along the first gradient
 
 Policies without noise, linear in the observation, one step from the zero action: the root mean square of
-their actions is {size}. {probed} starts. The gradient is that of {total:,} recorded steps, as many as stock
-PPO plays, and each figure of a cell is of a recording of its own. *Whitened* is the gradient with respect to
-observations that are uncorrelated and of one size, the natural gradient. `balance` has the trunk in scales of
-its deviations and leaves out what follows from crank, command and offsets: `observation={balance}`.
+their actions is {size}. {probed} starts. The gradient is that of {total:,} recorded steps,
+and each figure of a cell is of a recording of its own. *Whitened* is the gradient with respect to
+observations that are uncorrelated and of one size, the natural gradient.
 
 {steps}
 
-## Stock PPO
-
-`PPO("MlpPolicy", env)` of Stable-Baselines3 with its defaults (`agents/side_by_side.py`), {learnt:,} steps,
-played without noise on the same starts. Blind twins see command, crank, gait and offsets. Returns are of each
-form of the task: compare them only within a row.
-
-{learners}
-
-## Sighted and blind
+{learners}## Sighted and blind
 
 `ppo_flat` with its settings on the id as it is, {starts} starts. The blind agent is the best of ten of
 20 million steps, the gait the best of three searches.
@@ -400,9 +398,9 @@ def learner_rows(learners: Mapping[str, Figures]) -> list[list[str]]:
     return rows
 
 
-def of_kind(steps: Sequence[Figures], kind: tuple[Any, ...]) -> list[Figures]:
-    """Return the steps of an observation, of weights, whitened or not."""
-    return [one for one in steps if (one["observation"], one["weights"], one["whitened"]) == kind]
+def of_kind(steps: Sequence[Figures], weights: str, whitened: bool) -> list[Figures]:
+    """Return the samples of a step."""
+    return [one for one in steps if one["weights"] == weights and one["whitened"] == whitened]
 
 
 def step_cells(ones: Sequence[Figures]) -> list[str]:
@@ -414,18 +412,32 @@ def step_cells(ones: Sequence[Figures]) -> list[str]:
     ]
 
 
+def learners_text(learners: Mapping[str, Figures], args: Args) -> str:
+    """Return the section of stock PPO, nothing if none was trained."""
+    if not learners:
+        return ""
+    head = ["form", "sees", "falls of each seed [%]", "zero action's", "success [%]", "returns over zero's"]
+    return LEARNERS.format(
+        learnt=max(one["steps"] for one in learners.values()),
+        starts=f"{args.starts:,}",
+        table=markdown_table(head, learner_rows(learners)),
+    )
+
+
 def page(found: Figures, args: Args) -> str:
     """Return the text of the page."""
     gains = [row_of(one, f"{one['gain']:g}") for one in found["gains"]]
     names = list(found["signal"])
     signal = [[of, *(f"{found['signal'][name][of]:.3f}" for name in names)] for of in REWARDS]
-    kinds = dict.fromkeys((one["observation"], one["weights"], one["whitened"]) for one in found["steps"])
     steps = [
-        [kind[0], kind[1], "whitened" if kind[2] else "as it is", *step_cells(of_kind(found["steps"], kind))]
-        for kind in kinds
+        [
+            weights,
+            "whitened" if whitened else "as it is",
+            *step_cells(of_kind(found["steps"], weights, whitened)),
+        ]
+        for weights, whitened in product(STEPPED, (False, True))
     ]
     sighted = [row_of(one, one["name"]) for one in found.get("sighted", [])]
-    learners = found.get("learners", {})
     return PAGE.format(
         name=NAME,
         commit=results.commit_of_code(),
@@ -436,13 +448,10 @@ def page(found: Figures, args: Args) -> str:
         total=args.rows * args.recorded,
         size=SIZE,
         probed=args.probed,
-        balance=list(BALANCE),
-        learnt=max((one["steps"] for one in learners.values()), default=args.steps),
         gains=markdown_table(["gain", *HEAD], gains),
         signal=markdown_table(["weights", *names], signal),
         steps=markdown_table(
             [
-                "observation",
                 "weights",
                 "gradient",
                 "falls [%]",
@@ -451,10 +460,7 @@ def page(found: Figures, args: Args) -> str:
             ],
             steps,
         ),
-        learners=markdown_table(
-            ["form", "sees", "falls of each seed [%]", "zero action's", "success [%]", "returns over zero's"],
-            learner_rows(learners),
-        ),
+        learners=learners_text(found.get("learners", {}), args),
         sighted=markdown_table(["policy", *HEAD], sighted),
     )
 
@@ -465,9 +471,9 @@ def found_text(found: Figures) -> str:
     best = min(others, key=lambda one: one["failed"])
     signal = found["signal"][next(iter(SURROUNDINGS))]
 
-    def falls(*kind: Any) -> str:
+    def falls(weights: str, whitened: bool) -> str:
         """Say how often the samples of a step fall."""
-        ones = [100 * one["failed"] for one in of_kind(found["steps"], kind)]
+        ones = [100 * one["failed"] for one in of_kind(found["steps"], weights, whitened)]
         return f"{min(ones):.0f} to {max(ones):.0f} %"
 
     return (
@@ -476,9 +482,9 @@ def found_text(found: Figures) -> str:
         f" noise of a rollout is {signal['of the id']:.3f}. Falls, which come by pushes, make most of the"
         f" advantages; with quiet weights it is {signal['quiet']:.3f}. And the gradient follows large"
         " observations, and passes over small ones, as the speed above the commanded one: one linear step"
-        f" along it falls in {falls('of the id', 'quiet', False)}, along the whitened one in"
-        f" {falls('of the id', 'quiet', True)}, with the weights of the id in"
-        f" {falls('of the id', 'of the id', False)} and {falls('of the id', 'of the id', True)}."
+        f" along it falls in {falls('quiet', False)}, along the whitened one in"
+        f" {falls('quiet', True)}, with the weights of the id in"
+        f" {falls('of the id', False)} and {falls('of the id', True)}."
     )
 
 

@@ -20,7 +20,7 @@ from torch import Tensor, nn
 
 from hoof_env.errors import count
 
-Floats = NDArray[np.float32]
+Floats = NDArray[Any]
 
 WIDTH = 64  # units of each hidden layer
 

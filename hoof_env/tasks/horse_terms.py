@@ -32,9 +32,6 @@ from hoof_env.tasks.reward import Outcome, Term
 
 # The observation
 
-USUAL_HEIGHT = 0.835
-"""Mean height of the trunk in the reference gaits, relative to the hips [-]."""
-
 IN_WEIGHTS = Scale("tanh(x / weight)", lambda x, scene: x / scene.episode.weight, True)
 """Scale of forces, in units of the horse's weight."""
 
@@ -49,11 +46,6 @@ def _from_hips(x: Lanes, scene: ObservationInputs) -> Lanes:
     """Scale a height, relative to the height of the hips."""
     # Relative to the hip height, so that horses of all sizes are seen alike.
     return (x - scene.task.height) / (0.2 * scene.task.height)
-
-
-def _from_usual(x: Lanes, scene: ObservationInputs) -> Lanes:
-    """Scale a height, relative to the mean height of a trunk on its legs."""
-    return (x - USUAL_HEIGHT * scene.task.height) / (0.03 * scene.task.height)
 
 
 def _in_bounds(k: int) -> Scale:
@@ -112,26 +104,6 @@ _PER_LEG: tuple[tuple[str, str, str, Callable[[Any, Any], Any], Scale], ...] = (
     ("running peak force", "hoof", "N", lambda leg, scene: leg.strides.running_peak, IN_WEIGHTS),
 )
 
-# Name, unit, function and scale: what feedback needs, scaled by how far it deviates on rough ground. In the
-# scales of the group `trunk` these deviations are a tenth, and a learner's first gradients pass over them.
-_BALANCE: tuple[tuple[str, str, Callable[[Any], Any], Scale], ...] = (
-    (
-        "speed above the commanded one",
-        "m/s",
-        lambda s: s.trunk.report.velocity.real - s.episode.target,
-        tanh_of(0.3),
-    ),
-    ("rise of the trunk", "m/s", lambda s: s.trunk.report.velocity.imag, tanh_of(0.3)),
-    (
-        "height above usual",
-        "m",
-        _height,
-        Scale("tanh((x - 0.835 hip height) / (0.03 hip height))", _from_usual, True),
-    ),
-    ("pitch of the trunk", "rad", lambda s: s.trunk.state.moving.pitch, tanh_of(0.08)),
-    ("turning of the trunk", "rad/s", lambda s: s.trunk.report.pitch_rate, tanh_of(0.5)),
-)
-
 HORSE_ENTRIES = (
     Entry("forward speed", "trunk", "m/s", lambda s: s.trunk.report.velocity.real, tanh_of(5.0)),
     Entry("vertical speed", "trunk", "m/s", lambda s: s.trunk.report.velocity.imag, tanh_of(1.0)),
@@ -145,7 +117,6 @@ HORSE_ENTRIES = (
     Entry("pitch", "trunk", "rad", lambda s: s.trunk.state.moving.pitch, tanh_of(0.3)),
     Entry("pitch rate", "trunk", "rad/s", lambda s: s.trunk.report.pitch_rate, tanh_of(2.0)),
     Entry("commanded speed", "target", "m/s", lambda s: s.episode.target, tanh_of(5.0)),
-    *(Entry(name, "balance", unit, measure, scale) for name, unit, measure, scale in _BALANCE),
     *(
         Entry(f"{leg.replace('_', ' ')}: {name}", group, unit, _of_leg(i, measure), scale)
         for name, group, unit, measure, scale in _PER_LEG

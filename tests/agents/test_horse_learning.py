@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 
 from agents import horse_learning as page
-from hoof_env.envs.policies import make_policy
 from hoof_env.evaluation.episodes import make_rows
 
 ZERO = {"return": [10.0, 20.0, 30.0], "failed": [1.0, 0.0, 1.0]}
@@ -41,7 +40,7 @@ def test_the_weights_of_the_study_are_those_of_the_id():
 
 
 def test_learners_and_blind_twins_are_trained_and_played(capsys):
-    case = page.Case(1, 1, {"observation": page.BALANCE, "episode_seconds": 0.4})
+    case = page.Case(1, 1, {"episode_seconds": 0.4})
     found = page.learn(case, 100, 3)
     assert found["steps"] == 100
     for kind in ("seeds", "blind"):
@@ -57,7 +56,7 @@ def test_the_page_is_written_with_what_was_measured(tmp_path, monkeypatch, capsy
     few = ["--no-train", "--starts", "3", "--probed", "2", "--rows", "3", "--recorded", "40"]
     page.main([*few, "--out", str(tmp_path)])
     text = (tmp_path / "horse_learning.md").read_text()
-    for name in (*page.REWARDS, *page.OBSERVATIONS):
+    for name in page.REWARDS:
         assert f"| {name} |" in text
     assert "nan" not in text
     kept = json.loads((tmp_path / "horse_learning" / "figures.json").read_text())
@@ -70,8 +69,7 @@ def test_the_page_is_written_with_what_was_measured(tmp_path, monkeypatch, capsy
 
 def test_zero_gain_is_the_zero_action():
     one, other = (
-        page.played(make, 3)
-        for make in (lambda envs: make_policy("zero", envs), lambda envs: page.CrankFeedback(envs, 0.0))
+        page.played(make, 3) for make in (page.zero_action, lambda envs: page.CrankFeedback(envs, 0.0))
     )
     for name, values in one.items():
         assert np.array_equal(values, other[name])

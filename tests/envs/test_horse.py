@@ -15,7 +15,6 @@ from hoof_env.dynamics.layout import Features
 from hoof_env.episodes.scene import TaskKind
 from hoof_env.episodes.step import step_kernels
 from hoof_env.errors import DataFileError, ParameterError
-from hoof_env.evaluation.episodes import make_rows
 from hoof_env.gait import PARAMETERS, WIDEST
 from hoof_env.leg.limb_masses import segment_masses, trunk_mass
 from hoof_env.policies.record import describe, refuse_misfit
@@ -380,27 +379,3 @@ def test_stable_baselines_takes_it():
     for taken in actions(0, 60, 8, env_id=HORSE):
         _observations, rewards, _dones, _infos = envs.step(taken)
     assert np.isfinite(rewards).all()
-
-
-def test_the_group_balance_is_the_trunk_in_scales_of_its_deviations():
-    """On rough ground, where it is to be seen, each entry deviates by 0.5 to 0.8 of its range."""
-    envs = make_rows("hoof_env/HorseRough-v0", 64, observation=["balance", "trunk", "target"])
-    seen, _ = envs.reset(seed=0)
-    met = []
-    for _ in range(100):
-        seen, *_ = envs.step(np.zeros((64, 16), np.float32))
-        met.append(seen[:, :5])
-    assert np.std(np.concatenate(met), axis=0) == pytest.approx(0.65, abs=0.15)
-    raw = {name: np.asarray(values) for name, values in envs.raw_observation().items()}
-    error = raw["forward speed"] - raw["commanded speed"]
-    assert raw["speed above the commanded one"] == pytest.approx(error, abs=1e-9)
-    pairs = {
-        "rise of the trunk": "vertical speed",
-        "height above usual": "height above the ground",
-        "pitch of the trunk": "pitch",
-        "turning of the trunk": "pitch rate",
-    }
-    for own, trunk in pairs.items():
-        assert np.array_equal(raw[own], raw[trunk])
-    height = (raw["height above the ground"] - 0.835 * 1.4) / (0.03 * 1.4)
-    assert seen[:, 2] == pytest.approx(np.tanh(height), abs=1e-6)
