@@ -271,6 +271,7 @@ def measure_sighted(folders: Sequence[Path], starts: int) -> list[Figures]:
             str(results.RESULTS / "policies" / "HorseRough-v0-blind"),
             {"observation": BLIND},
         ),
+        ("the shipped agent, 20 million steps", "shipped", {}),
     ]
     for folder in folders:
         kept = runs.read_record(folder)
@@ -346,9 +347,9 @@ are `alive` 0, `tracking` 32, `slip` 70 and `fall` 40 in place of 45, 64, 35 and
 ## One step along the first gradient
 
 Policies without noise, linear in the observation, one step from the zero action: the root mean square of
-their actions is {size}. {probed} starts. The gradient is that of {total:,} recorded steps,
-and each figure of a cell is of a recording of its own. *Whitened* is the gradient with respect to
-observations that are uncorrelated and of one size, the natural gradient.
+their actions is {size}. {probed} starts. The gradient is that of {total:,} recorded steps, and each figure of a
+cell is of a recording of its own. *Whitened* is the gradient with respect to observations that are
+uncorrelated and of one size, the natural gradient.
 
 {steps}
 
