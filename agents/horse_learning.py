@@ -347,8 +347,8 @@ are `alive` 0, `tracking` 32, `slip` 70 and `fall` 40 in place of 45, 64, 35 and
 ## One step along the first gradient
 
 Policies without noise, linear in the observation, one step from the zero action: the root mean square of
-their actions is {size}. {probed} starts. The gradient is that of {total:,} recorded steps, and each figure of a
-cell is of a recording of its own. *Whitened* is the gradient with respect to observations that are
+their actions is {size}. {probed} starts. The gradient is that of {total:,} recorded steps, and each figure of
+a cell is of a recording of its own. *Whitened* is the gradient with respect to observations that are
 uncorrelated and of one size, the natural gradient.
 
 {steps}
