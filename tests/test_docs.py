@@ -182,6 +182,7 @@ def test_every_frozen_page_says_of_which_commit_it_is():
             "gait_change.md",
             "hips.md",
             "canter.md",
+            "horse_learning.md",
         ):  # commands write these
             stamp = page.read_text(encoding="utf-8").split("\n")[2]
             commit = re.match(

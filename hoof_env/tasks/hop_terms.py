@@ -66,9 +66,7 @@ SCALES = {
 }
 """Scales of `HorseLegHop-v0` that differ from other ids', by entry."""
 
-HOP_ENTRIES = tuple(
-    replace(entry, scale=SCALES.get(entry.name, entry.scale)) for entry in CARRYING_ENTRIES
-)
+HOP_ENTRIES = tuple(replace(entry, scale=SCALES.get(entry.name, entry.scale)) for entry in CARRYING_ENTRIES)
 """Entries that can be observed on `HorseLegHop-v0`."""
 
 BALANCE_ENTRIES = (

@@ -1,0 +1,523 @@
+"""Why stock PPO gains little on rough ground: `python -m agents.horse_learning`.
+
+It measures how much of PPO's first gradient is signal under several weights of the reward. Then it trains
+stock PPO of several seeds and blind twins under each of `CASES`, plays all of them and policies that need no
+learning on the same 1,000 starts, and writes `docs/evidence/horse_learning.md` with its figures. What is
+among the figures is not measured again.
+"""
+
+from __future__ import annotations
+
+import json
+import time
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import partial
+from itertools import product
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from agents import results, runs, side_by_side
+from agents.command import parse, run
+from agents.gradient_signal import first_step, record, signal_to_noise
+from hoof_env._output import check_folder, markdown_table
+from hoof_env.envs.policies import make_policy
+from hoof_env.errors import check_choice, parse_json
+from hoof_env.evaluation.episodes import make_rows, play_rows
+from hoof_env.policies.find import find_policy
+
+EVIDENCE = Path(__file__).parents[1] / "docs" / "evidence"
+NAME = "horse_learning"
+ENV_ID = "hoof_env/HorseRough-v0"
+
+FIRST_SEED = 3_000_000  # of the starts, which no training and no published score plays
+
+BLIND = ("target", "crank", "gait", "offset")
+"""Groups that blind twins see."""
+
+CURVE_STARTS = 200
+CURVE = 100_000
+"""Episodes of each learner at the points of the curve, and steps between two."""
+
+WEIGHTS = {
+    "alive": 45.0, "tracking": 64.0, "peak": 0.25, "slip": 35.0, "landing": 0.25, "work": 0.4, "pitch": 3.0,
+    "fall": 100.0,
+}  # fmt: skip
+"""Weights of the id."""
+
+QUIET = {"alive": 0.0, "tracking": 32.0, "slip": 70.0, "fall": 40.0}
+"""Weights that differ in a reward which falls do not dominate."""
+
+GAINS = (0.0, 0.2, 0.4, 0.8)
+"""Offsets of all cranks for each m/s above the commanded speed, in units of the action [s/m]."""
+
+KEPT = ("return", "failed", "success", "speed_m_s", "slip_m", "stance_peak_n", "loading_rate_n_s")
+"""Figures of an episode that are kept."""
+
+STEPPED = ("of the id", "quiet")
+SIZE = 0.3
+SAMPLES = 3
+"""Weights under which a step is taken along a first gradient, root mean square of its actions, and number of
+recordings, each with a gradient of its own."""
+
+Figures = dict[str, Any]
+Floats = NDArray[np.float64]
+
+
+def changed(scale: float = 1.0, **changes: float) -> dict[str, float]:
+    """Return the weights of the id with changes, all times a factor."""
+    return {name: scale * weight for name, weight in (WEIGHTS | changes).items()}
+
+
+REWARDS = {
+    "of the id": changed(),
+    "a fall and survival alone": changed() | dict.fromkeys(set(WEIGHTS) - {"alive", "fall"}, 0.0),
+    "without `alive`, a fall costs 190": changed(alive=0.0, fall=190.0),
+    "of level ground": changed(tracking=16.0, fall=15.0),
+    "of level ground, without `alive`": changed(alive=0.0, tracking=16.0, fall=15.0),
+    "quiet": changed(**QUIET),
+    "slip alone": dict.fromkeys(WEIGHTS, 0.0) | {"slip": 35.0},
+}
+"""Weights under which the signal of the gradient is measured."""
+
+SURROUNDINGS: Mapping[str, Mapping[str, Any]] = {
+    "as it is": {},
+    "pushes twice as strong": {"strength": 2.0},
+}
+"""Arguments under which it is measured."""
+
+
+@dataclass(frozen=True)
+class Case:
+    """Stock PPO on one form of the task.
+
+    Attributes:
+        seeds, blind: learners that see all, and blind twins.
+        env_kwargs: arguments of the environment.
+    """
+
+    seeds: int
+    blind: int
+    env_kwargs: Mapping[str, Any] = field(default_factory=dict)
+
+
+CASES = {"as it is": Case(5, 3), "quiet": Case(5, 3, {"reward_weights": changed(0.1, **QUIET)})}
+"""Forms of the task under which stock PPO learns: the id's own; and with weights of the reward that a fall
+does not dominate, a tenth as large."""
+
+
+class CrankFeedback:
+    """All cranks turn faster by `gain` of the action's span for each m/s above the commanded speed."""
+
+    def __init__(self, env: Any, gain: float) -> None:
+        self.gain = gain
+        names = env.observation_names
+        self.speed = names.index("forward speed")
+        self.commanded = names.index("commanded speed")
+
+    def predict(
+        self, observation: Any, state: Any = None, episode_start: Any = None, deterministic: bool = True
+    ) -> tuple[Any, Any]:
+        """Return actions, shape (n, 16), for observations, shape (n, k)."""
+        at_speed, commanded = (5.0 * np.arctanh(observation[:, k]) for k in (self.speed, self.commanded))
+        actions = np.zeros((len(observation), 16), np.float32)
+        actions[:, ::4] = (self.gain * (at_speed - commanded))[:, None]
+        return np.clip(actions, -1.0, 1.0), state
+
+
+class OneOf:
+    """One of several learners as a policy."""
+
+    def __init__(self, learners: side_by_side.Learners, at: int) -> None:
+        self.learner = learners.alone(at)
+
+    def predict(
+        self, observation: Any, state: Any = None, episode_start: Any = None, deterministic: bool = True
+    ) -> tuple[Any, Any]:
+        """Return actions, shape (n, 16), for observations, shape (n, k)."""
+        return self.learner.act(np.ascontiguousarray(observation, np.float32)[None])[0], state
+
+
+def zero_action(envs: Any) -> Any:
+    """Make the policy that does nothing."""
+    return make_policy("zero", envs)
+
+
+def found_policy(name: str, env_kwargs: Mapping[str, Any]) -> Any:
+    """Return a policy for the id with arguments."""
+    with runs.make_env(ENV_ID, **env_kwargs) as env:
+        return find_policy(name, env, ENV_ID)
+
+
+def _always(policy: Any) -> Callable[[Any], Any]:
+    """Return a function that gives this policy for any environment."""
+    return lambda envs: policy
+
+
+def played(
+    policy: Callable[[Any], Any], starts: int, env_kwargs: Mapping[str, Any] | None = None
+) -> dict[str, Floats]:
+    """Return figures of the episodes of a policy, which is made for an environment, from the first `starts`
+    seeds: an array for each of `KEPT`."""
+    envs = make_rows(ENV_ID, starts, **(env_kwargs or {}))
+    assert envs is not None
+    episodes = play_rows(envs, policy(envs), range(FIRST_SEED, FIRST_SEED + starts))
+    return {name: np.array([episode[name] for episode in episodes]) for name in KEPT}
+
+
+def summary(figures: Mapping[str, Floats], zero: Mapping[str, Floats]) -> Figures:
+    """Return means, and differences of returns and falls from the zero action's in the same episodes, with
+    their standard errors."""
+    found: Figures = {name: float(figures[name].mean()) for name in KEPT}
+    for name in ("return", "failed"):
+        off = figures[name] - zero[name]
+        found[f"{name} over zero"] = [float(off.mean()), float(off.std(ddof=1) / np.sqrt(len(off)))]
+    return found
+
+
+def every(
+    learners: side_by_side.Learners,
+    case: Case,
+    env_kwargs: Mapping[str, Any],
+    zero: Mapping[str, Floats],
+    starts: int,
+) -> list[Figures]:
+    """Return the summaries of all learners of a case, blind twins last."""
+    return [
+        summary(played(_always(OneOf(learners, at)), starts, env_kwargs), zero)
+        for at in range(case.seeds + case.blind)
+    ]
+
+
+def learn(case: Case, steps: int, starts: int) -> Figures:
+    """Train the learners of a case; play them and the zero action in its environment."""
+    began = time.process_time()
+    kwargs = dict(case.env_kwargs)
+
+    curve: list[Figures] = []
+
+    def look(done: int, learners: side_by_side.Learners) -> None:
+        if done // CURVE == (done - side_by_side.DEFAULTS.n_steps) // CURVE:
+            return
+        spent = time.process_time() - began
+        zero = played(zero_action, CURVE_STARTS, kwargs)
+        figures = every(learners, case, kwargs, zero, CURVE_STARTS)
+        curve.append({"steps": done, "seeds": figures[: case.seeds], "blind": figures[case.seeds :]})
+        for kind in ("seeds", "blind"):
+            told = ", ".join(
+                f"{one['return over zero'][0]:.1f} ({one['failed']:.3f})" for one in curve[-1][kind]
+            )
+            print(f"{done:,} steps, {spent:.0f} s, {kind}: return over zero (falls) {told}", flush=True)
+
+    learners = side_by_side.train(
+        ENV_ID, case.seeds, steps, tick=look, blind=case.blind, groups=BLIND, **kwargs
+    )
+    trained = time.process_time() - began
+    zero = played(zero_action, starts, kwargs)
+    figures = every(learners, case, kwargs, zero, starts)
+    return {
+        "steps": steps,
+        "starts": starts,
+        "env_kwargs": kwargs,
+        "processor_s": round(trained),
+        "zero": summary(zero, zero),
+        "seeds": figures[: case.seeds],
+        "blind": figures[case.seeds :],
+        "curve": curve,
+    }
+
+
+def measure_gains(starts: int) -> list[Figures]:
+    """Play one number of feedback: all cranks faster by a gain times the error of the speed."""
+    zero = played(zero_action, starts)
+    return [
+        {"gain": gain, **summary(played(partial(CrankFeedback, gain=gain), starts), zero)} for gain in GAINS
+    ]
+
+
+def measure_signal(rows: int, steps: int) -> dict[str, dict[str, float]]:
+    """Return signal over noise of the first gradient, by surroundings and weights of the reward."""
+    found = {}
+    for name, kwargs in SURROUNDINGS.items():
+        recording = record(ENV_ID, rows, steps, **kwargs)
+        found[name] = {of: signal_to_noise(recording, weights) for of, weights in REWARDS.items()}
+    return found
+
+
+def measure_steps(rows: int, steps: int, starts: int) -> list[Figures]:
+    """Play policies one step from the untrained one, along first gradients."""
+    zero = played(zero_action, starts)
+    found = []
+    for sample in range(SAMPLES):
+        recording = record(ENV_ID, rows, steps, sample)
+        for weights, whitened in product(STEPPED, (False, True)):
+            policy = first_step(recording, REWARDS[weights], SIZE, whitened)
+            about = {"weights": weights, "whitened": whitened, "sample": sample}
+            found.append(about | summary(played(_always(policy), starts), zero))
+    return found
+
+
+def measure_sighted(folders: Sequence[Path], starts: int) -> list[Figures]:
+    """Play runs of `ppo_flat`, the best policies without feedback and the zero action."""
+    zero = played(zero_action, starts)
+    found = [{"name": "zero action", **summary(zero, zero)}]
+    others: list[tuple[str, str, Mapping[str, Any]]] = [
+        ("best gait locked to the crank", "open-loop", {}),
+        (
+            "best blind agent",
+            str(results.RESULTS / "policies" / "HorseRough-v0-blind"),
+            {"observation": BLIND},
+        ),
+        ("the shipped agent, 20 million steps", "shipped", {}),
+    ]
+    for folder in folders:
+        kept = runs.read_record(folder)
+        others.append(
+            (f"{kept['algo']}, {kept['finished']['steps']:,} steps", str(folder), kept["env_kwargs"])
+        )
+    for name, policy, kwargs in others:
+        figures = played(_always(found_policy(policy, kwargs)), starts, kwargs)
+        found.append({"name": name, **summary(figures, zero)})
+    return found
+
+
+@dataclass(frozen=True)
+class Args:
+    """Arguments of the command."""
+
+    out: Path = EVIDENCE
+    """folder of the page"""
+    only: tuple[str, ...] = ()
+    """cases to train; otherwise all that the figures lack"""
+    train: bool = True
+    """train; otherwise measure and write the rest"""
+    steps: int = 300_000
+    """of each learner"""
+    starts: int = 1000
+    """episodes of each policy"""
+    rows: int = 128
+    """environments whose gradients are samples"""
+    recorded: int = 1500
+    """steps of each"""
+    probed: int = 250
+    """episodes of each step along a gradient"""
+    sighted: tuple[Path, ...] = ()
+    """runs of ppo_flat on this id, which are compared with the best blind policies"""
+
+
+LEARNERS = """## Stock PPO
+
+`PPO("MlpPolicy", env)` of Stable-Baselines3 with its defaults (`agents/side_by_side.py`), {learnt:,} steps,
+played without noise on the same starts. Blind twins see command, crank, gait and offsets. Returns are of each
+form of the task: compare them only within a row.
+
+{table}
+
+"""
+
+PAGE = """# Why stock PPO gains little on rough ground
+
+Written by `python -m agents.horse_learning` at commit `{commit}`, with [its figures]({name}/figures.json).
+`hoof_env/HorseRough-v0`; episodes have seeds from 3,000,000 on, and differences from the zero action are
+paired.
+
+**Asked.** Why stock PPO does not beat doing nothing on rough ground, and what would let it.
+
+**Found.** {found}
+
+## One number of feedback
+
+All cranks turn faster by a gain, in units of the action, for each m/s above the commanded speed. {starts}
+starts.
+
+{gains}
+
+## How much of the first gradient is signal
+
+The square of the first policy gradient over the variance of its estimate from one rollout of 2048 steps, for
+feedback that is linear in the observation (`agents/gradient_signal.py`); {rows} environments of {recorded}
+steps. With 0.01 a hundred rollouts have as much signal as noise, and 300,000 steps are 147 rollouts. *Quiet*
+are `alive` 0, `tracking` 32, `slip` 70 and `fall` 40 in place of 45, 64, 35 and 100.
+
+{signal}
+
+## One step along the first gradient
+
+Policies without noise, linear in the observation, one step from the zero action: the root mean square of
+their actions is {size}. {probed} starts. The gradient is that of {total:,} recorded steps, and each figure of
+a cell is of a recording of its own. *Whitened* is the gradient with respect to observations that are
+uncorrelated and of one size, the natural gradient.
+
+{steps}
+
+{learners}## Sighted and blind
+
+`ppo_flat` with its settings on the id as it is, {starts} starts. The blind agent is the best of ten of
+20 million steps, the gait the best of three searches.
+
+{sighted}
+"""
+
+
+def interval(pair: Sequence[float], digits: int = 1) -> str:
+    """Format a difference with its 95 % interval."""
+    mean, error = pair
+    return f"{mean:+.{digits}f} [{mean - 1.96 * error:.{digits}f}, {mean + 1.96 * error:.{digits}f}]"
+
+
+def row_of(one: Figures, *names: str) -> list[str]:
+    """Return the cells of a policy: names, falls, success, slip, and the return over the zero action's."""
+    falls = f"{100 * one['failed']:.1f} %"
+    return [
+        *names,
+        falls,
+        f"{100 * one['success']:.1f} %",
+        f"{one['slip_m']:.3f}",
+        interval(one["return over zero"]),
+    ]
+
+
+HEAD = ("falls", "success", "slip a stance [m]", "return over the zero action's")
+
+
+def learner_rows(learners: Mapping[str, Figures]) -> list[list[str]]:
+    """Return two rows for each case: learners that see all, and blind twins."""
+    rows = []
+    for name, of_case in learners.items():
+        for kind, title in (("seeds", "sighted"), ("blind", "blind")):
+            ones = of_case[kind]
+            if not ones:
+                continue
+            falls = ", ".join(f"{100 * one['failed']:.1f}" for one in ones)
+            gains = ", ".join(f"{one['return over zero'][0]:+.1f}" for one in ones)
+            success = ", ".join(f"{100 * one['success']:.0f}" for one in ones)
+            zero = of_case["zero"]
+            rows.append([name, title, falls, f"{100 * zero['failed']:.1f}", success, gains])
+    return rows
+
+
+def of_kind(steps: Sequence[Figures], weights: str, whitened: bool) -> list[Figures]:
+    """Return the samples of a step."""
+    return [one for one in steps if one["weights"] == weights and one["whitened"] == whitened]
+
+
+def step_cells(ones: Sequence[Figures]) -> list[str]:
+    """Return the falls, successes and returns of the samples of a step."""
+    return [
+        ", ".join(f"{100 * one['failed']:.0f}" for one in ones),
+        ", ".join(f"{100 * one['success']:.0f}" for one in ones),
+        ", ".join(f"{one['return over zero'][0]:+.0f}" for one in ones),
+    ]
+
+
+def learners_text(learners: Mapping[str, Figures], args: Args) -> str:
+    """Return the section of stock PPO, nothing if none was trained."""
+    if not learners:
+        return ""
+    head = ["form", "sees", "falls of each seed [%]", "zero action's", "success [%]", "returns over zero's"]
+    return LEARNERS.format(
+        learnt=max(one["steps"] for one in learners.values()),
+        starts=f"{args.starts:,}",
+        table=markdown_table(head, learner_rows(learners)),
+    )
+
+
+def page(found: Figures, args: Args) -> str:
+    """Return the text of the page."""
+    gains = [row_of(one, f"{one['gain']:g}") for one in found["gains"]]
+    names = list(found["signal"])
+    signal = [[of, *(f"{found['signal'][name][of]:.3f}" for name in names)] for of in REWARDS]
+    steps = [
+        [
+            weights,
+            "whitened" if whitened else "as it is",
+            *step_cells(of_kind(found["steps"], weights, whitened)),
+        ]
+        for weights, whitened in product(STEPPED, (False, True))
+    ]
+    sighted = [row_of(one, one["name"]) for one in found.get("sighted", [])]
+    return PAGE.format(
+        name=NAME,
+        commit=results.commit_of_code(),
+        found=found_text(found),
+        starts=f"{args.starts:,}",
+        rows=args.rows,
+        recorded=f"{args.recorded:,}",
+        total=args.rows * args.recorded,
+        size=SIZE,
+        probed=args.probed,
+        gains=markdown_table(["gain", *HEAD], gains),
+        signal=markdown_table(["weights", *names], signal),
+        steps=markdown_table(
+            [
+                "weights",
+                "gradient",
+                "falls [%]",
+                "success [%]",
+                "return over the zero action's",
+            ],
+            steps,
+        ),
+        learners=learners_text(found.get("learners", {}), args),
+        sighted=markdown_table(["policy", *HEAD], sighted),
+    )
+
+
+def found_text(found: Figures) -> str:
+    """Say what was found, with its figures."""
+    none, *others = found["gains"]
+    best = min(others, key=lambda one: one["failed"])
+    signal = found["signal"][next(iter(SURROUNDINGS))]
+
+    def falls(weights: str, whitened: bool) -> str:
+        """Say how often the samples of a step fall."""
+        ones = [100 * one["failed"] for one in of_kind(found["steps"], weights, whitened)]
+        return f"{min(ones):.0f} to {max(ones):.0f} %"
+
+    return (
+        f"Feedback pays: with one number of it {100 * best['failed']:.1f} % of the episodes end in a fall in"
+        f" place of {100 * none['failed']:.1f} %. But PPO's first gradients hardly show it: the signal over"
+        f" noise of a rollout is {signal['of the id']:.3f}. Falls, which come by pushes, make most of the"
+        f" advantages; with quiet weights it is {signal['quiet']:.3f}. And the gradient follows large"
+        " observations, and passes over small ones, as the speed above the commanded one: one linear step"
+        f" along it falls in {falls('quiet', False)}, along the whitened one in"
+        f" {falls('quiet', True)}, with the weights of the id in"
+        f" {falls('of the id', False)} and {falls('of the id', True)}."
+    )
+
+
+def main(argv: list[str] | None = None) -> None:
+    """Measure what the figures lack, and write the page."""
+    args = parse(Args, argv, "python -m agents.horse_learning", __doc__)
+    check_folder(args.out)
+    figures = args.out / NAME / "figures.json"
+    found: Figures = parse_json(figures.read_text(encoding="utf-8")) if figures.is_file() else {}
+
+    def keep(name: str, measured: Any) -> None:
+        found[name] = measured
+        figures.parent.mkdir(exist_ok=True)
+        runs.write_text(figures, json.dumps(found, indent=1) + "\n")
+
+    for name in args.only or (CASES if args.train else ()):
+        if name not in found.get("learners", {}):
+            case = CASES[check_choice("only", name, CASES)]
+            keep("learners", found.get("learners", {}) | {name: learn(case, args.steps, args.starts)})
+    if args.only:
+        return
+    if "gains" not in found:
+        keep("gains", measure_gains(args.starts))
+    if "signal" not in found:
+        keep("signal", measure_signal(args.rows, args.recorded))
+    if "steps" not in found:
+        keep("steps", measure_steps(args.rows, args.recorded, args.probed))
+    if args.sighted:
+        keep("sighted", measure_sighted(args.sighted, args.starts))
+    keep("versions", runs.versions())
+    runs.write_text(args.out / f"{NAME}.md", page(found, args))
+
+
+if __name__ == "__main__":
+    run(main)
