@@ -12,9 +12,10 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from agents import runs
-from agents.experiments.hop_page import figures_of, rounded, spread
+from agents.experiments.hop_page import figures_of, rounded
 from agents.experiments.outcomes import is_done, read_outcome
 from agents.experiments.plans import Entry, Run
+from agents.statistics import spread
 from hoof_env._output import markdown_table
 from hoof_env._plotting import BLUE, GREEN, GREY, ORANGE, STYLE
 from hoof_env.envs.open_loop import gait_file, open_loop_record
