@@ -80,16 +80,26 @@ AGAIN = tuple(MODES[:2])
 
 COPIED: dict[str, Any] = {"halves": AGAIN, "steps": 26, "ends": 9}
 
+UNTIL_STANCE = short(episode_seconds=0.9)
+"""Episodes of a leg that starts near the apex of a hop."""
+
 CASES = {
     **{env_id: Case(env_id, short(), sizes=ALL if env_id == LEG else FEW) for env_id in IDS},
-    **{f"{env_id} drawn": Case(env_id, drawn(80.0), sizes=((1, 1),), **COPIED) for env_id in LEGS[1:]},
+    **{
+        f"{env_id} drawn": Case(env_id, drawn(80.0), sizes=((1, 1),), **COPIED)
+        for env_id in LEGS[1:]
+        if env_id not in HOPS
+    },
+    **{
+        f"{env_id} drawn": Case(env_id, drawn(80.0) | UNTIL_STANCE, sizes=((1, 1),), **COPIED | {"steps": 80})
+        for env_id in HOPS
+    },
     f"{LEG} drawn": Case(LEG, drawn(80.0), sizes=((40, 1),), **COPIED),
     f"{HORSE} drawn": Case(HORSE, drawn(400.0), sizes=((1, 1),), **COPIED),
     "falls": Case(LEG, FALLS, steps=80, ends=4),
     "commands": Case(LEG, short(**COMMANDS, observation=("crank", "hoof", "target"))),
     "motor": Case(LEG, short(drive="motor")),
-    # An episode begins near the apex of a hop and lasts until there was a stance
-    **{env_id: Case(env_id, short(episode_seconds=0.9), steps=110, sizes=FEW) for env_id in HOPS},
+    **{env_id: Case(env_id, UNTIL_STANCE, steps=110, sizes=FEW) for env_id in HOPS},
     "fixed trunk": Case(LEG, short(trunk="fixed")),
     "air walk": Case(FIXED, short(gait="walk")),
     "time limit": Case(LEG, {"max_episode_steps": 6}, steps=30),
