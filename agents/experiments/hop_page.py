@@ -137,6 +137,7 @@ def publish(plan: Sequence[Entry], folder: Path, out: Path) -> dict[str, Any]:
     data = {
         "weight_n": weight,
         "learners": learners,
+        "planned": {key_of(entry): entry.seeds for entry in plan},
         "gaits": {name: rounded(figures_of(score_vector(name, ID, FINAL_SEEDS))) for name in GAITS},
         "deflections": {name: rounded(greatest_deflections(name)) for name in GAITS},
         "order": {name: orders(sliding) for name, sliding in CONDITIONS.items()},
@@ -254,6 +255,17 @@ def passed(data: Mapping[str, Any], key: str) -> str:
     )
 
 
+def unfinished(data: Mapping[str, Any]) -> str:
+    """Write which trainings of the plan are not done yet; empty if all are."""
+    counts = {key: len(data["learners"].get(key, ())) for key in data["planned"]}
+    missing = [
+        f"{counts[key]} of {planned} of {NAMES[key]}"
+        for key, planned in data["planned"].items()
+        if counts[key] < planned
+    ]
+    return f"Trainings of the plan that are done: {', '.join(missing)}." if missing else ""
+
+
 def deflection_text(data: Mapping[str, Any]) -> str:
     """Write how far springs give."""
     each = data["deflections"].items()
@@ -319,14 +331,14 @@ def write(out: Path, data: Mapping[str, Any]) -> Path:
         {f"`{seed['commit']}`" for seeds in data["learners"].values() for seed in seeds.values()}
     )
     record = open_loop_record(gait_file(ID, "phase"))["parameters"]
-    reading = "\n".join(passed(data, key) for key in ("ppo", "sac") if key in data["learners"])
+    reading = [passed(data, key) for key in ("ppo", "sac") if key in data["learners"]]
     text = PAGE.format(
         starts=len(FINAL_SEEDS),
         commits=", ".join(commits),
         table=table(data),
         numbers=np.size(record["coefficients"]) + 1,
         searches=searches(data),
-        reading=reading,
+        reading="\n".join([*reading, unfinished(data)]),
         gaits=GAITS_OF_A_DRAW,
         slowest=order.SLOWEST,
         sliding=order.SLIDING,
