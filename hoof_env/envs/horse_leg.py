@@ -77,6 +77,7 @@ class HorseLegEnv(LegBase, gym.Env[NDArray[np.float32], NDArray[np.float32]]):
             rows.actions[0].data,
             batch.direct_step(),
             batch.calls.held,
+            bool(batch.drawn_names),
             paid,
             rows.named.terms[:, 0],
             rows.rewards.data,
@@ -138,8 +139,8 @@ class HorseLegEnv(LegBase, gym.Env[NDArray[np.float32], NDArray[np.float32]]):
             raise
         if self.render_mode == "human":
             self.render()
-        info = copy.deepcopy(self._begun()) | {"measured": self._views[7]()}
-        info["unweighted"] = self._views[9]()
+        info = copy.deepcopy(self._begun[0]()) | {"measured": self._views[8]()}
+        info["unweighted"] = self._views[10]()
         if parameters:
             info["parameters"] = name_columns([values[0] for values in parameters.values()], [*parameters])
         return self._checked(), info
@@ -162,7 +163,7 @@ class HorseLegEnv(LegBase, gym.Env[NDArray[np.float32], NDArray[np.float32]]):
         if self._phase != "running":
             self._check_started("step")
             self._warn_ended()
-        buffer, kernel, held, paid, terms, rewards, observe, measure, costs, unweigh = self._views
+        buffer, kernel, held, draws, paid, terms, rewards, observe, measure, costs, unweigh = self._views
         # A copy from buffer to buffer is the fastest way; it takes float32 arrays of the right shape only.
         try:
             buffer[:] = action
@@ -175,8 +176,11 @@ class HorseLegEnv(LegBase, gym.Env[NDArray[np.float32], NDArray[np.float32]]):
             if costs:
                 self.batch.plan.costs.add(self.batch.rows, self.batch.engine)
             ended = happened != 0 and self._follow(happened)
-            info = self._begun()  # has all keys already, in the order of the reset's info
+            info = self._begun[0]()  # has all keys already, in the order of the reset's info
+            info["gait"] = self._begun[1]()
             info["measured"] = measured
+            if draws:
+                info["parameters"] = info["parameters"].copy()  # callers may change their info
             for key, k in paid:
                 info[key] = terms[k]
             info["unweighted"] = unweigh()
@@ -215,8 +219,7 @@ class HorseLegEnv(LegBase, gym.Env[NDArray[np.float32], NDArray[np.float32]]):
         body = self.body
         first = len(self.batch.plan.start_names)
         info = dict[str, Any](zip(body.start_names, row, strict=False))
-        row.setflags(write=False)  # what holds throughout the episode is shared by the infos of its steps
-        info["gait"] = name_columns(row[len(body.start_names) : first], body.gait_names)
+        info["gait"] = gait = name_columns(row[len(body.start_names) : first], body.gait_names)
         if self.batch.drawn_names:
             info["parameters"] = name_columns(row[first:], self.batch.drawn_names)
         if self.batch.plan.commands.speeds:
@@ -226,7 +229,7 @@ class HorseLegEnv(LegBase, gym.Env[NDArray[np.float32], NDArray[np.float32]]):
         if keys := self.batch.plan.costs.keys:
             info |= dict.fromkeys(("cost", *keys), np.float64(0.0))
         self._began_with = self._start_and_target()
-        self._begun = info.copy
+        self._begun = (info.copy, gait.copy)
 
     def _cost_info(self) -> dict[str, Any]:
         """Return the costs of the last step by their keys in infos."""

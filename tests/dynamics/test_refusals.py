@@ -303,7 +303,7 @@ PARTS = [
     *(
         (of(Trunk, settings), words)
         for settings, words in (
-            ({"kind": "loose"}, "trunk: expected .*fixed, free, rail, suspended, got 'loose'"),
+            ({"kind": "loose"}, "trunk: expected .*fixed, floating, free, rail, suspended, got 'loose'"),
             ({"mass": 0.0}, "trunk_mass: expected"),
             ({"share": 1.1}, r"trunk_share: expected .*\[0, 1\], got 1.1"),
             ({"stiffness": -1.0}, "trunk_stiffness: expected"),

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import contextlib
 import copy
 import json
 import pickle
@@ -147,11 +146,8 @@ def test_infos_are_nobody_elses():
     infos = [env.reset(seed=0)[1], *(env.step(taken)[4] for taken in actions(0, 5))]
     kept = copy.deepcopy(infos)
     for k in (0, 2):
-        for key in ("measured", "unweighted"):
+        for key in ("gait", "measured", "unweighted", "parameters"):
             infos[k][key][:] = -1.0
-        for key in ("gait", "parameters"):  # the same in all infos of the episode's steps
-            with pytest.raises(ValueError, match="read-only") if k else contextlib.nullcontext():
-                infos[k][key][:] = -1.0
         env.step(actions(0))
         same(env.step(actions(0))[4]["gait"], kept[1]["gait"])
     same(infos[1:2] + infos[3:], kept[1:2] + kept[3:])
