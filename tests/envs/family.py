@@ -178,7 +178,7 @@ def scaled(scaling, x, leg):
         return (2 * x - low - high) / (high - low)
     if part := re.fullmatch(r"/ ([\d.]+)", scaling):
         return np.clip(x / float(part[1]), -1, 1)
-    formula = scaling.replace("30 weights / s", "30 * weight").replace("3 weights", "(3 * weight)")
+    formula = re.sub(r"(\d+) weights( / s)?", r"(\1 * weight)", scaling)
     formula = formula.replace("0.2 hip height", "0.2 * hip height")
     formula = formula.replace("hip height", f"{leg.body.height}")
     return eval(formula, {"tanh": np.tanh, "x": x, "weight": leg.weight})
