@@ -16,7 +16,6 @@ from hoof_env.envs.manual import tables_of
 from hoof_env.errors import ParameterError
 from hoof_env.policies.record import describe_actions
 from hoof_env.tasks import registry as tasks
-from hoof_env.tasks.horse import Horse
 
 ID = "my_lab/Steps-v0"
 EXAMPLE = Path(__file__).parents[2] / "examples" / "own_actions.py"
@@ -180,7 +179,7 @@ LIMIT = Constant("free", 1.0, "-", "a test's", low=0.0, high=2.0)
         (r"action_map: form: expected a name of its own, got 'rates'",
          lambda: ActionMap("rates", {"a": "-"}, lambda action, scene: (0.0,) * 4)),
         (r"action_map: form: expected a name of its own, got 'offsets of",
-         lambda: ActionMap(Horse.action_form, {"a": "-"}, lambda action, scene: (0.0,) * 4)),
+         lambda: ActionMap("offsets of 0.4 and 0.04 rad", {"a": "-"}, lambda action, scene: (0.0,) * 4)),
         (r"actions: expected a mapping of names to meanings, got \{\}",
          lambda: ActionMap("mine", {}, lambda action, scene: (0.0,) * 4)),
         (r"actions: expected a mapping of names to meanings, got \('abc',\)",
