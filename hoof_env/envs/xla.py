@@ -241,11 +241,13 @@ class XlaSteps:
         results = [jax.ShapeDtypeStruct(array.shape, array.dtype) for array in self._outputs]
         names = tuple(self._infos)
         shape, rewards = self._shape, self._rewards.shape
+        # By which the handler tells a handle of other environments, whose arrays have other sizes
+        own = np.array([self._words.ctypes.data]).view(np.uint8)
 
         def call(has_results: bool, *given: Any) -> Any:
             of_rewards = jax.ShapeDtypeStruct(rewards, jnp.result_type(float))
             kinds = [handle, of_rewards, *results] if has_results else [handle]
-            found = jax.ffi.ffi_call(TARGET, kinds, has_side_effect=True)(*given)
+            found = jax.ffi.ffi_call(TARGET, kinds, has_side_effect=True)(given[0], own, *given[1:])
             if not has_results:
                 return found[0]
             following, of_step, observations, terminated, truncated, *infos = found

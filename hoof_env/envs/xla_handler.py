@@ -4,7 +4,8 @@ XLA gives the address of a call frame, whose words are named below; the structs 
 `xla/ffi/api/c_api.h`, version 0.x of the interface. The handler copies the actions into the arrays of the
 environments, calls the kernel of a step, and copies the outcome out; it calls Python for Python's part
 alone. The first operand is a handle: the address of `Word`s, how often these were used, and the address
-subtracted from `SUM`, without which the address is not followed.
+subtracted from `SUM`. The second is the address of the `Word`s whose functions are called: no other address
+is followed. Actions are the third.
 """
 
 from __future__ import annotations
@@ -70,8 +71,8 @@ SUM = 0x686F_6F66_2D65_6E76
 """Sum of the first and the last word of a handle."""
 
 NO_HANDLE = (
-    "handle: expected the one that envs.xla() or the last call returned, got other numbers, such as zeros in"
-    " its place"
+    "handle: expected the one that envs.xla() or the last call of these environments returned, got another"
+    " environment's, or other numbers in its place, such as zeros"
 )
 
 BUSY, GONE = -1, -2
@@ -167,9 +168,9 @@ def answer(call: Pointer) -> Index:
     """Take a step if there are actions, and return results if there are outputs for them; return the address
     of an error's message, 0 without."""
     inputs, outputs = words_at(call[FRAME_INPUTS]), words_at(call[FRAME_OUTPUTS])
-    given = words_at(words_at(inputs[0])[DATA])
+    given, own = words_at(words_at(inputs[0])[DATA]), words_at(words_at(inputs[1])[DATA])
     message = Cell(0)
-    is_handle = given[HANDLE - 1] == SUM - given[0]
+    is_handle = (given[0] == own[0]) & (given[HANDLE - 1] == SUM - given[0])
 
     @when(is_handle)
     def _() -> None:
@@ -197,9 +198,9 @@ def use(call: Pointer, given: Pointer, outputs: Pointer) -> Index:
         def _() -> None:
             failed.value = call_at(words[Word.PYTHON], BEFORE)
 
-        @when((failed.value == 0) & (call[FRAME_COUNT] == 2))
+        @when((failed.value == 0) & (call[FRAME_COUNT] == 3))
         def _() -> None:
-            copy_bytes(words[Word.ACTIONS], words_at(inputs[1])[DATA], words[Word.ACTION_BYTES])
+            copy_bytes(words[Word.ACTIONS], words_at(inputs[2])[DATA], words[Word.ACTION_BYTES])
             failed.value = take_step(words)
 
         @when((failed.value == 0) & (call[FRAME_RESULTS] > 1))

@@ -241,10 +241,10 @@ def test_what_is_no_handle_is_refused_and_not_followed():
     envs = make()
     envs.reset(seed=0)
     handle, recv, send, step = envs.xla()
-    words = r"expected the one that envs\.xla\(\) or the last call returned"
+    words = r"expected the one that envs\.xla\(\) or the last call of these environments returned"
     actions = zeros(envs)
     for function in (recv, lambda x: send(x, actions), lambda x: step(x, actions)):
-        fails(words + ".* zeros in its place", jax.jit(function), jnp.zeros_like(handle))
+        fails(words + ".*such as zeros", jax.jit(function), jnp.zeros_like(handle))
         for wrong in (handle[:8], handle.astype(np.float32), None, 7):
             with pytest.raises(ParameterError, match=words):
                 function(wrong)
@@ -264,7 +264,7 @@ def test_a_handle_may_outlive_its_environments():
     handle, _ = step(handle, actions)
     del step
     gc.collect()
-    fails("whose environments are gone", of_twin, handle, actions)
+    fails("got another environment's", of_twin, handle, actions)
 
 
 def test_actions_must_be_finite_and_nothing_is_advanced():
@@ -376,3 +376,20 @@ def test_copies_and_pickles_have_steps_of_their_own():
         assert states.observations.shape == (3, 22)
     _, others = step(handle, zeros(envs))
     np.testing.assert_array_equal(states.observations, others.observations)
+
+
+@pytest.mark.parametrize("other", ["hoof_env/HorseLegRail-v0", "hoof_env/Horse-v0"])
+def test_a_handle_of_other_environments_is_refused(other):
+    """Its arrays have other sizes: followed, it would be read and written beyond their ends."""
+    envs, others = make(), gym.make_vec(other, num_envs=3).unwrapped
+    for each in (envs, others):
+        each.reset(seed=0)
+    handle, recv, _, step = envs.xla()
+    foreign = others.xla()[0]
+    actions = np.zeros((3, envs.single_action_space.shape[0]), np.float32)
+    with pytest.raises(Exception, match=r"expected the one .*of these environments"):
+        jax.block_until_ready(jax.jit(step)(foreign, actions))
+    with pytest.raises(Exception, match=r"expected the one .*of these environments"):
+        jax.block_until_ready(recv(foreign))
+    _, states = step(handle, actions)  # nothing has happened to them
+    assert np.isfinite(states.observations).all()
