@@ -16,7 +16,7 @@ from typing import Any
 from agents import runs
 from agents.command import parse, run
 from agents.gait_figures import play
-from agents.judge import ENV_ID
+from agents.judge import ENV_ID, rejection_reason
 from agents.judges import read_judges
 from hoof_env._output import markdown_table
 from hoof_env.envs.policies import make_policy
@@ -24,7 +24,7 @@ from hoof_env.errors import count
 from hoof_env.evaluation.episodes import make_rows
 from hoof_env.simd.threads import limit_threads
 from hoof_env.tasks import horse
-from hoof_env.tasks.horse_gaits import kinematic_speeds
+from hoof_env.tasks.horse_gaits import PAIRS, kinematic_speeds
 
 EVIDENCE = Path(__file__).parents[1] / "docs" / "evidence"
 NAME = "hips"
@@ -125,17 +125,17 @@ def summary(figures: dict[str, list[dict[str, Any]]]) -> str:
     for name, of_gait in figures.items():
         first, last = of_gait[0], of_gait[-1]
         low, high = judges[name.removeprefix("kinematic-")]["peak_fore"]["bar"]
-        inside = [
-            f"{distance:g}"
-            for distance, one in zip(FORWARD, of_gait, strict=True)
-            if low <= one["peak_fore"] <= high
-        ]
+        inside = []
+        for distance, one in zip(FORWARD, of_gait, strict=True):
+            if low <= one["peak_fore"] <= high:
+                why = rejection_reason(one, PAIRS)
+                inside.append(f"{distance:g} m" + (f" (does not count: {why})" if why else ""))
         propelling = sum(one["net_fore"] > 0 for one in of_gait)
         told.append(
             f"With hips {FORWARD[-1]:g} m forward the fore peak of `{name}` falls from "
             f"{first['peak_fore']:.1f} to {last['peak_fore']:.1f} N/kg and the fore share of impulse from "
             f"{first['impulse_fore']:.2f} to {last['impulse_fore']:.2f}. The peak is inside of its bar "
-            + (f"at {', '.join(inside)} m" if inside else "at no place")
+            + (f"at {', '.join(inside)}" if inside else "at no place")
             + f", and fore legs propel at {propelling} of {len(of_gait)} places."
         )
     return " ".join(told)

@@ -93,9 +93,10 @@ class Learners:
         sizes = [(inputs, WIDTH, 2**0.5), (WIDTH, WIDTH, 2**0.5)]
         heads = (outputs, 0.01), (1, 1.0)
         self.weights: list[Tensor] = []
-        for head, gain in heads:
+        for k, (head, gain) in enumerate(heads):
             for fan_in, fan_out, scale in (*sizes, (WIDTH, head, gain)):
-                self.weights.append(_orthogonal(seeds, fan_in, fan_out, scale))
+                # Policy and value begin with layers of their own
+                self.weights.append(_orthogonal([2 * seed + k for seed in seeds], fan_in, fan_out, scale))
                 self.weights.append(torch.zeros(len(seeds), 1, fan_out))
         # The last one: the logarithm of the actions' standard deviation
         self.weights.append(torch.zeros(len(seeds), 1, outputs))

@@ -17,6 +17,7 @@ from agents.experiments.plans import Entry, Run
 from agents.runs import SavedModel, TrainedPolicy
 from agents.statistics import spread
 from hoof_env._output import markdown_table
+from hoof_env.envs import open_loop
 from hoof_env.errors import DataFileError, ParameterError
 from hoof_env.evaluation.episodes import FINAL_SEEDS, score_vector
 from hoof_env.policies.catalogue import SHIPPED as CATALOGUE
@@ -52,6 +53,13 @@ COLUMNS = ("env_id", "agent", "seed", "steps", *FIGURES, "commit")
 
 GAITS = ("zero", "walk", "run", "carrying_walk")
 """Policies without learning that are shown beside the agents."""
+
+BLIND = {
+    "HorseLeg-v0, constant gait": "HorseLeg-v0-constant.json",
+    "HorseLeg-v0, gait locked to the crank": "HorseLeg-v0-phase.json",
+    "Horse-v0, gait locked to the crank": "Horse-v0-phase.json",
+}
+"""Best gaits without feedback of the ids without limits, by name, in the folder of the package's gaits."""
 
 SHIPPED = {"hoof_env/HorseLegSafe-v0": "HorseLeg-v0", "hoof_env/HorseSafe-v0": "Horse-v0"}
 """Ids whose shipped agent, which pays for forces and was trained for long, is shown on an id with costs."""
@@ -156,6 +164,10 @@ def publish(plan: Sequence[Entry], folder: Path, out: Path) -> list[dict[str, st
                 except ParameterError:  # a horse has no such gait
                     continue
         other = SHIPPED[env_id]
+        for name, file in BLIND.items():
+            if name.startswith(f"{other},") and (env_id, name, "") not in rows:
+                figures = figures_of(str(open_loop.GAITS / file), env_id)
+                rows[env_id, name, ""] = row_of((env_id, name, ""), figures)
         if (env_id, f"shipped {other}", "") not in rows:
             key = env_id, f"shipped {other}", ""
             agent = agent_in(CATALOGUE / other, f"hoof_env/{other}")
@@ -180,7 +192,7 @@ def of(rows: Sequence[dict[str, str]], name: str) -> Any:
 
 def table(rows: Sequence[dict[str, str]]) -> str:
     """Return the table of an id."""
-    order = [*NAMES.values(), *(f"shipped {name}" for name in SHIPPED.values()), *GAITS]
+    order = [*NAMES.values(), *(f"shipped {name}" for name in SHIPPED.values()), *BLIND, *GAITS]
     lines = []
     for agent in order:
         own = [row for row in rows if row["agent"] == agent]
@@ -263,6 +275,7 @@ steps in violation; an agent keeps the limit if its mean is {budget:.0f} or less
   the limits come.
 * **PPO, penalised** pays for forces as on `HorseLeg-v0` and `Horse-v0`, by the weights of their terms.
 * **PPO-Lagrangian** ([agents/ppo_lagrangian.py](../../agents/ppo_lagrangian.py)) has a multiplier for costs.
+* **Gaits** see nothing: scripted ones, and the best that searches found for the ids without limits.
 * **shipped** is the agent of the package for the id without limits, which pays for forces and was trained for
   millions of steps.
 

@@ -41,6 +41,7 @@ from hoof_env.simd.compile import Kernel
 from hoof_env.simd.memory import Held
 from hoof_env.simd.threads import run_together
 from hoof_env.simd.user_functions import UserFunctionError, user_error
+from hoof_env.tasks.leg_starts import UsualRange
 from hoof_env.tasks.registry import Task
 from hoof_env.tasks.reward import BEARING, MAX_STRIDE
 from hoof_env.tasks.settings import ResolvedSettings, Settings
@@ -327,7 +328,10 @@ class EpisodeBatch:
             for name in held.get(settings.trunk, ()):
                 start.pop(name, None)
         try:
-            return self._check_options(start)
+            checked = self._check_options(start)
+            if isinstance(checked.get("height"), tuple):
+                checked["height"] = UsualRange(checked["height"])
+            return checked
         except ParameterError as error:
             raise ParameterError(f"{self.task.id}: start: {error}") from None
 

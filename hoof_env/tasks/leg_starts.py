@@ -49,6 +49,11 @@ FOREIGN_OPTIONS = ("minari_autoseed",)
 RISING = ("suspended", "boom", "floating")
 """Kinds of trunk that move up and down."""
 
+
+class UsualRange(tuple[float, float]):
+    """Range of a task's own starts, from which a height that puts a hoof into the ground is raised."""
+
+
 FLAT = Terrain.flat()
 MARGIN = 50.0
 REACH = 1.0
@@ -121,7 +126,7 @@ def draw_starts(
     `check_options`).
 
     No episode starts with a hoof inside the ground: a trunk that moves up and down starts higher instead, and
-    under any other trunk the crank angle is drawn again. A height that is a number is taken as it is.
+    under any other trunk the crank angle is drawn again. Heights of reset options are taken as they are.
 
     Args:
         options: checked reset options.
@@ -159,7 +164,7 @@ def draw_starts(
     # Ground as high as this touches a hoof point's sole.
     ground = ground + hoof_length
     if trunk.kind in RISING:
-        if not isinstance(options.get("height"), float):
+        if "height" not in options or isinstance(options["height"], UsualRange):
             height = np.maximum(height, ground - hoof_height(profile, chosen, theta))
     elif isinstance(turn, tuple):
         # Only rows with a hoof inside the ground draw again, so that neighbours do not change a row's bits.
