@@ -296,7 +296,8 @@ def told(rows: Sequence[Row]) -> str:
     alone = [one for one in OBJECTIVES if all(as_horses(part, one) for part in each)]
     text.append(
         f"Below Froude number 1 the better gait changes once, from walk to trot and between searched speeds "
-        f"that touch {low:g} to {high:g}, where horses change, by {', '.join(TITLES[one] for one in pooled) or 'nothing'} over all seeds, "
+        f"that touch {low:g} to {high:g}, where horses change, by "
+        f"{', '.join(TITLES[one] for one in pooled) or 'nothing'} over all seeds, "
         f"and by {', '.join(TITLES[one] for one in alone) or 'nothing'} in each seed alone"
     )
     if not alone:

@@ -324,7 +324,8 @@ Written by `python -m agents.horse_learning` at commit `{commit}`, with [its fig
 `hoof_env/HorseRough-v0`; episodes have seeds from 3,000,000 on, and differences from the zero action are
 paired.
 
-**Asked.** How much of stock PPO's first gradient is signal on rough ground, and what makes a step along it gain.
+**Asked.** How much of stock PPO's first gradient is signal on rough ground, and what makes a step along it
+gain.
 
 **Found.** {found}
 
@@ -480,8 +481,8 @@ def found_text(found: Figures) -> str:
     return (
         f"Feedback pays: with one number of it {100 * best['failed']:.1f} % of the episodes end in a fall in"
         f" place of {100 * none['failed']:.1f} %. Of PPO's first gradient, the signal over noise of a rollout"
-        f" is {signal['of the id']:.3f} in the one recording of the table, and {signal['quiet']:.3f} with quiet"
-        " weights. Recordings differ by more: ten of them, samples 0 to 9 of `gradient_signal.record`, have"
+        f" is {signal['of the id']:.3f} in the one recording of the table, and {signal['quiet']:.3f} with"
+        " quiet weights. Recordings differ by more: ten, samples 0 to 9 of `gradient_signal.record`, have"
         " 0.011 to 0.059 and 0.010 to 0.068, and quiet weights are the better ones in seven, so that no"
         " order of weights is shown. What a step gains depends on the scale of observations: one linear step"
         f" along the gradient falls in {falls('quiet', False)}, along the whitened one in"

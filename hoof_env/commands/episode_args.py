@@ -16,7 +16,7 @@ class Episode:
     """a gait of the preset, or four gait parameters as 6.28,0.7,-0.2,-0.3, in which the episode starts; idle,
     random, bang-bang, drag or airborne; the .json of an open-loop gait, to which the policy goes, or
     open-loop for the best one of the package; or a trained model (only one that you trust: a model is code).
-    The default is run, or the reference gait of a horse."""
+    The default is run, the reference gait of a horse, or zero actions where a task has a start gait."""
     env_id: str = "hoof_env/HorseLeg-v0"
     """id of the environment."""
     env_kwargs: tuple[str, ...] = ()

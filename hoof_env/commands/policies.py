@@ -89,7 +89,7 @@ def list_ids(env_id: str | None = None) -> None:
         say(f"{name}: {known[name]}")
         say(f"    {sizes}; mean returns: {good_returns(name.removeprefix('hoof_env/'))}")
         if name in costly:
-            say(f"    a return is nothing without its cost: hoof-env evaluate shipped zero --env-id {name}")
+            say(f"    a return says nothing without its cost: hoof-env evaluate shipped zero --env-id {name}")
     if env_id is None:
         installed = [extra for extra, module in EXTRAS.items() if find_spec(module)]
         missing = [extra for extra in EXTRAS if extra not in installed]

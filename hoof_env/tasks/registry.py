@@ -234,8 +234,8 @@ _BALANCED = (
     " trunk's spin goes on. An episode fails when the trunk has pitched by 0.5 rad, as a horse's does."
     " Ground, spring, motor and reward are those of HorseLegHop, where a boom takes the torque of the hip,"
     " but a fall costs twice as much. An episode begins near the apex of a hop, at 0.5 to 3 m/s, in a gait"
-    " with which the trunk falls over after 1 to 2.5 s. What is asked is balance: gaits without feedback fall"
-    " over, too."
+    " with which the trunk falls over after 0.6 to 4.5 s. What is asked is balance: gaits without feedback"
+    " fall over, too."
 )
 
 _FLOATING: Mapping[str, Any] = MappingProxyType(
