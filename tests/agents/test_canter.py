@@ -9,9 +9,10 @@ from agents import canter
 
 FOUND = {
     "seed": 0, "starts": canter.CHECKED, "gait": [], "shifts": [-0.08, -0.09], "fell": 0.0,
-    "speed_ratio": 1.0, "slip_fore": 0.05, "slip_hind": 0.05, "stances_per_turn_fore": 1.0, "stances_per_turn_hind": 1.0, "stride_over_hip": 1.9,
-    "duty_fore": 0.4, "duty_hind": 0.35, "transport": 1.0, "touch_right_hind": 0.27, "touch_left_fore": 0.28,
-    "touch_right_fore": 0.55, "peak_left_fore": 1.2, "peak_right_fore": 1.0,
+    "speed_ratio": 1.0, "slip_fore": 0.05, "slip_hind": 0.05, "stances_per_turn_fore": 1.0,
+    "stances_per_turn_hind": 1.0, "stride_over_hip": 1.9, "duty_fore": 0.4, "duty_hind": 0.35,
+    "transport": 1.0, "touch_right_hind": 0.27, "touch_left_fore": 0.28, "touch_right_fore": 0.55,
+    "peak_left_fore": 1.2, "peak_right_fore": 1.0,
 }  # fmt: skip
 
 
