@@ -12,13 +12,12 @@ from typing import Any
 import numpy as np
 
 from agents import order, runs
-from agents.experiments.outcomes import is_done, read_outcome
+from agents.experiments.outcomes import is_done, read_figures, read_outcome
 from agents.experiments.plans import Entry, Run
 from agents.statistics import spread
 from hoof_env._output import markdown_table
 from hoof_env.constants import GRAVITY
 from hoof_env.envs.open_loop import gait_file, open_loop_record
-from hoof_env.errors import DataFileError, parse_json
 from hoof_env.evaluation.episodes import FINAL_SEEDS, make_rows, score_vector
 from hoof_env.policies.actor import Actor
 from hoof_env.policies.find import find_policy
@@ -101,26 +100,10 @@ def key_of(entry: Entry) -> str:
     return " ".join(filter(None, (entry.algo, entry.variant)))
 
 
-def read_data(folder: Path) -> dict[str, Any]:
-    """Return the content of the data file; empty if there is no such file.
-
-    Raises:
-        DataFileError: the file is malformed.
-    """
-    path = folder / DATA
-    if not path.is_file():
-        return {}
-    try:
-        content: dict[str, Any] = parse_json(path.read_text(encoding="utf-8"))
-        return content
-    except (OSError, ValueError) as error:
-        raise DataFileError(f"{path}: expected the figures that agents.experiments writes: {error}") from None
-
-
 def publish(plan: Sequence[Entry], folder: Path, out: Path) -> dict[str, Any]:
     """Add the trainings of `folder` that are done to the data in `out`, measure gaits and order anew, and
     return all."""
-    data = read_data(out)
+    data = read_figures(out / DATA)
     learners: dict[str, Any] = data.get("learners", {})
     for one in (Run(entry, seed) for entry in plan for seed in range(entry.seeds)):
         if not is_done(one, folder):

@@ -13,7 +13,7 @@ from agents import runs
 from agents.experiments.plans import Entry, Run
 from agents.experiments.training import CURVE, FINAL, read_curve
 from agents.settings import load_settings
-from hoof_env.errors import DataFileError, parse_json
+from hoof_env.errors import DataFileError, brief, parse_json
 from hoof_env.evaluation.statistics import Scored, mean_figures, over_seeds
 
 
@@ -122,3 +122,21 @@ def versions_of(rows: Sequence[Row]) -> dict[str, str]:
             for name, value in runs.read_record(outcome.folder)["versions"].items():
                 versions.setdefault(name, set()).add(value)
     return {name: ", ".join(sorted(values)) for name, values in versions.items()}
+
+
+def read_figures(path: Path) -> dict[str, Any]:
+    """Return the figures of a page in their file; empty if there is no such file.
+
+    Raises:
+        DataFileError: the file is malformed.
+    """
+    if not path.is_file():
+        return {}
+    try:
+        content: Any = parse_json(path.read_text(encoding="utf-8"))
+        if not isinstance(content, dict):
+            raise ValueError(f"got {brief(content)}")
+    except (OSError, ValueError) as error:
+        raise DataFileError(f"{path}: expected the figures that agents.experiments writes: {error}") from None
+    figures: dict[str, Any] = content
+    return figures

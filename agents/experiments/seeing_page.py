@@ -13,13 +13,12 @@ from matplotlib.figure import Figure
 
 from agents import runs
 from agents.experiments.hop_page import figures_of, rounded
-from agents.experiments.outcomes import is_done, read_outcome
+from agents.experiments.outcomes import is_done, read_figures, read_outcome
 from agents.experiments.plans import Entry, Run
 from agents.statistics import spread
 from hoof_env._output import markdown_table
 from hoof_env._plotting import BLUE, GREEN, GREY, ORANGE, STYLE
 from hoof_env.envs.open_loop import gait_file, open_loop_record
-from hoof_env.errors import DataFileError, parse_json
 from hoof_env.evaluation.episodes import FINAL_SEEDS, score_vector
 from hoof_env.evaluation.statistics import Interval, estimate, over_seeds
 
@@ -41,14 +40,14 @@ GAITS = {
 """Policies that are played as they are stored."""
 
 MANY = range(FINAL_SEEDS.start, FINAL_SEEDS.start + 1000)
-"""Seeds of their episodes, the first of which are those of the final scores."""
+"""Seeds of their episodes, beginning with the seeds of the final scores."""
 
 VARIANTS = {"crank": "crank and gait", "trunk": "+ trunk", "": "+ hoof: all"}
 """What learners observe, by variant, in the order of what it adds to."""
 
 IMPULSES = (0.0, 43.2, 86.4, 129.6, 172.8)
 """Largest impulses of pushes, forward and back [N s]: the third is 1.5 m/s times the mass, as on
-`HorseRough-v0`; the others are 0, 0.5, 1.5 and 2 times as much."""
+`HorseRough-v0`; the rest are 0, 0.5, 1.5 and 2 times as much."""
 
 PUSH_SECONDS = (2.0, 4.0)
 """Shortest and longest time between pushes [s], as on `HorseRough-v0`."""
@@ -61,25 +60,9 @@ def key_of(entry: Entry) -> str:
     return f"{entry.env_id} {entry.variant}".strip()
 
 
-def read_data(folder: Path) -> dict[str, Any]:
-    """Return the content of the data file; empty if there is no such file.
-
-    Raises:
-        DataFileError: the file is malformed.
-    """
-    path = folder / DATA
-    if not path.is_file():
-        return {}
-    try:
-        content: dict[str, Any] = parse_json(path.read_text(encoding="utf-8"))
-        return content
-    except (OSError, ValueError) as error:
-        raise DataFileError(f"{path}: expected the figures that agents.experiments writes: {error}") from None
-
-
 def publish(plan: Sequence[Entry], folder: Path, out: Path) -> dict[str, Any]:
     """Add the trainings of `folder` that are done to the data in `out`, play gaits anew, and return all."""
-    learners = learned(plan, folder, read_data(out).get("learners", {}))
+    learners = learned(plan, folder, read_figures(out / DATA).get("learners", {}))
     data = {
         "learners": learners,
         "gaits": {env_id: {name: played(name, env_id) for name in GAITS} for env_id in IDS},

@@ -5,10 +5,11 @@ import pytest
 
 from agents import order
 from agents.experiments import hop_page
+from agents.experiments.outcomes import read_figures
 from agents.experiments.plans import load_plan
-from hoof_env.errors import ParameterError
+from hoof_env.errors import DataFileError, ParameterError
 
-DATA = hop_page.read_data(hop_page.PUBLISHED)
+DATA = read_figures(hop_page.PUBLISHED / hop_page.DATA)
 
 
 def test_the_published_tables_are_of_the_published_figures():
@@ -66,7 +67,9 @@ def test_an_id_on_which_no_gait_travels_is_named(monkeypatch):
         order.travelling_gaits(hop_page.ID, 4, 0)
 
 
-def test_malformed_figures_are_named(tmp_path):
-    (tmp_path / hop_page.DATA).write_text("{")
-    with pytest.raises(hop_page.DataFileError, match=r"hop\.json"):
-        hop_page.read_data(tmp_path)
+@pytest.mark.parametrize("text", ["{", "[]"])
+def test_malformed_figures_are_named(tmp_path, text):
+    (tmp_path / "figures.json").write_text(text)
+    with pytest.raises(DataFileError, match=r"figures\.json: expected the figures"):
+        read_figures(tmp_path / "figures.json")
+    assert read_figures(tmp_path / "none.json") == {}

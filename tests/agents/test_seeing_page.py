@@ -4,9 +4,10 @@ import numpy as np
 import pytest
 
 from agents.experiments import seeing_page
+from agents.experiments.outcomes import read_figures
 from agents.experiments.plans import load_plan
 
-DATA = seeing_page.read_data(seeing_page.PUBLISHED)
+DATA = read_figures(seeing_page.PUBLISHED / seeing_page.DATA)
 ID = seeing_page.IDS[0]
 
 
@@ -42,9 +43,3 @@ def test_pushes_are_those_of_rough_ground_and_shares_of_it():
     found = np.array(seeing_page.IMPULSES) / seeing_page.IMPULSES[2]
     assert found == pytest.approx([0.0, 0.5, 1.0, 1.5, 2.0])
     assert seeing_page.pushed("zero", load_plan("seeing")[1]) == []
-
-
-def test_malformed_figures_are_named(tmp_path):
-    (tmp_path / seeing_page.DATA).write_text("{")
-    with pytest.raises(seeing_page.DataFileError, match=r"seeing\.json"):
-        seeing_page.read_data(tmp_path)

@@ -4,7 +4,7 @@ import gymnasium as gym
 import numpy as np
 from family import HORSE
 
-from hoof_env.tasks.horse_gaits import FASTEST, LIMITS, reference_gaits
+from hoof_env.tasks.horse_gaits import FASTEST, LIMITS, Stride, reference_gaits
 
 SPEEDS = (1.853, 2.62)  # Froude numbers 0.25 and 0.5
 SEEDS = 40
@@ -39,3 +39,16 @@ def die(seen, time):
     action = np.zeros((4, 4))
     action[:2] = (1.0, -1.0, -1.0, 1.0)
     return action.ravel()
+
+
+def stride_phases(env):
+    """Phases of the legs in the stride of the gait that the kernels follow, without the footfall, as complex
+    numbers of size 1."""
+    theta, gait = env.engine.state["crank_angle"][:, 0], env.batch.rows.named.gait[:, 0]
+    found = []
+    for i in range(4):
+        first = 2 + 7 * (i // 2)
+        stride, lead = Stride(*gait[first : first + 2]), gait[1] * (i < 2)
+        phase, begin = (complex(*stride.phase(np.cos(x), np.sin(x))) for x in (theta[i], 0.0))
+        found.append(phase / begin * np.exp(-2j * np.pi * lead) * (-1) ** i)
+    return np.array(found)

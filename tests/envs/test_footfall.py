@@ -4,24 +4,16 @@ import gymnasium as gym
 import numpy as np
 import pytest
 from family import HORSE, make
+from horses import stride_phases
 
 from hoof_env.errors import DataFileError
 from hoof_env.policies.record import describe, refuse_misfit
 from hoof_env.tasks.horse import PHASE_SPAN
-from hoof_env.tasks.horse_gaits import Stride
 
 
 def phases(env):
-    """Places of the legs in the stride of the gait that the kernels follow, the footfall taken off
-    [strides]."""
-    theta, gait = env.engine.state["crank_angle"][:, 0], env.batch.rows.named.gait[:, 0]
-    found = []
-    for i in range(4):
-        first = 2 + 7 * (i // 2)
-        stride, lead = Stride(*gait[first : first + 2]), gait[1] * (i < 2)
-        phase, begin = (complex(*stride.phase(np.cos(x), np.sin(x))) for x in (theta[i], 0.0))
-        found.append(phase / begin * np.exp(-2j * np.pi * lead) * (-1) ** i)
-    return np.angle(found) / (2 * np.pi)
+    """Places of the legs in the stride, the footfall taken off [strides]."""
+    return np.angle(stride_phases(env)) / (2 * np.pi)
 
 
 def apart(ahead, of):

@@ -7,7 +7,7 @@ import gymnasium as gym
 import numpy as np
 import pytest
 from family import HORSE, actions, make, same
-from horses import SPEEDS, played, random_gaits
+from horses import SPEEDS, played, random_gaits, stride_phases
 
 from hoof_env import Sb3VecEnv
 from hoof_env.dynamics.advance import EngineKind
@@ -27,7 +27,6 @@ from hoof_env.tasks.horse_gaits import (
     LEGS,
     NAMES,
     HorseGait,
-    Stride,
     commands_of,
     crank_angles,
     horse_gaits,
@@ -155,13 +154,7 @@ def test_cranks_that_are_out_of_step_come_back():
 
     def ahead():
         """Of the other legs' mean phase [rad], by the gait that the kernels follow."""
-        theta, gait = env.engine.state["crank_angle"][:, 0], env.batch.rows.named.gait[:, 0]
-        found = []
-        for i in range(4):
-            first = 2 + 7 * (i // 2)
-            stride, lead = Stride(*gait[first : first + 2]), gait[1] * (i < 2)
-            phase, begin = (complex(*stride.phase(np.cos(x), np.sin(x))) for x in (theta[i], 0.0))
-            found.append(phase / begin * np.exp(-2j * np.pi * lead) * (-1) ** i)
+        found = stride_phases(env)
         return np.angle(found[0] / np.sum(found[1:]))
 
     state = env.get_state()
