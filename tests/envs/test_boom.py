@@ -140,3 +140,10 @@ def test_a_start_other_than_a_mapping_is_refused_at_once():
     with pytest.raises(ParameterError, match="test/List-v0: start: expected a mapping of reset options, got"):
         hoof_env.register("test/List-v0", base="leg", start=[1.0], **BOOM)
     assert "test/List-v0" not in gym.registry
+
+
+def test_a_range_of_heights_that_is_asked_for_is_kept():
+    """Also where a hoof starts inside the ground; only a task's own range is raised."""
+    env = gym.make("hoof_env/HorseLeg-v0")
+    heights = [env.reset(seed=seed, options={"height": (1.2, 1.3)})[1]["height"] for seed in range(6)]
+    assert 1.2 <= min(heights) < max(heights) <= 1.3
