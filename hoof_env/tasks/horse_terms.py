@@ -3,7 +3,9 @@ entries and terms of one leg."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
+from dataclasses import replace
+from types import MappingProxyType
 from typing import Any
 
 from hoof_env.dynamics.layout import LegMemory
@@ -14,6 +16,7 @@ from hoof_env.simd.math import cos_sin
 from hoof_env.tasks.horse_gaits import LEGS
 from hoof_env.tasks.observation import (
     CONTEXT_ENTRIES,
+    LOAD,
     PLAIN,
     PRESSURE,
     TRUE_RATE,
@@ -34,6 +37,9 @@ from hoof_env.tasks.reward import Outcome, Term
 
 IN_WEIGHTS = Scale("tanh(x / weight)", lambda x, scene: x / scene.episode.weight, True)
 """Scale of forces, in units of the horse's weight."""
+
+
+IN_LOADS = Scale("tanh(2 x / weight)", lambda x, scene: 2.0 * x / scene.episode.weight, True)
 
 
 def _height(scene: ObservationInputs) -> Lanes:
@@ -84,6 +90,11 @@ def _offset(k: int) -> Callable[[Any], Any]:
     return lambda scene: scene.episode.offset[k]
 
 
+def _load(leg: LegMemory, scene: ObservationInputs) -> Lanes:
+    """Measure the normal force on a hoof [N], as sensors read it."""
+    return toe_load(leg, scene) + heel_load(leg, scene)
+
+
 # Name, group, unit, function of a leg's memory and the scene, scale. A table, one entry a line.
 _PER_LEG: tuple[tuple[str, str, str, Callable[[Any, Any], Any], Scale], ...] = (
     ("sin(crank angle)", "crank", "-", _sine, PLAIN),
@@ -104,6 +115,11 @@ _PER_LEG: tuple[tuple[str, str, str, Callable[[Any, Any], Any], Scale], ...] = (
     ("running peak force", "hoof", "N", lambda leg, scene: leg.strides.running_peak, IN_WEIGHTS),
 )
 
+OFFSETS = tuple(
+    f"offset: {leg.replace('_', ' ')}, {name.replace('_', ' ')}" for leg in LEGS for name in PARAMETERS
+)
+"""Names of the offsets, in the order of the actions."""
+
 HORSE_ENTRIES = (
     Entry("forward speed", "trunk", "m/s", lambda s: s.trunk.report.velocity.real, tanh_of(5.0)),
     Entry("vertical speed", "trunk", "m/s", lambda s: s.trunk.report.velocity.imag, tanh_of(1.0)),
@@ -122,17 +138,7 @@ HORSE_ENTRIES = (
         for name, group, unit, measure, scale in _PER_LEG
         for i, leg in enumerate(LEGS)
     ),
-    *(
-        Entry(
-            f"offset: {leg.replace('_', ' ')}, {name.replace('_', ' ')}",
-            "offset",
-            "-",
-            _offset(len(PARAMETERS) * i + k),
-            PLAIN,
-        )
-        for i, leg in enumerate(LEGS)
-        for k, name in enumerate(PARAMETERS)
-    ),
+    *(Entry(name, "offset", "-", _offset(k), PLAIN) for k, name in enumerate(OFFSETS)),
     *(
         Entry(
             f"{leg.replace('_', ' ')}: centre of pressure",
@@ -144,8 +150,41 @@ HORSE_ENTRIES = (
         for i, leg in enumerate(LEGS)
     ),
     *CONTEXT_ENTRIES,
+    *(
+        Entry(f"{leg.replace('_', ' ')}: load", LOAD, "N", _of_leg(i, _load), IN_LOADS)
+        for i, leg in enumerate(LEGS)
+    ),
 )
 """Entries that can be observed of a horse; for each quantity, legs in the order of `LEGS`."""
+
+FINE: Mapping[str, Scale] = MappingProxyType(
+    {
+        "vertical speed": tanh_of(0.5),
+        "height above the ground": Scale(
+            "tanh((x - 0.83 hip height) / (0.05 hip height))",
+            lambda x, scene: (x - 0.83 * scene.task.height) / (0.05 * scene.task.height),
+            True,
+        ),
+        "pitch": tanh_of(0.1),
+        "pitch rate": tanh_of(0.7),
+        **dict.fromkeys(OFFSETS, Scale("tanh(3 x)", lambda x, scene: 3.0 * x, True)),
+        "commanded speed": Scale("tanh((x - 2.4) / 0.7)", lambda x, scene: (x - 2.4) * (1 / 0.7), True),
+    }
+)
+"""Scales of `HorseRough-v0`, by entry: a disturbed horse differs by so much from an undisturbed one. With the
+scales of `Horse-v0` what disturbs it is a twentieth of the crank's sine, and stock learners do not see it."""
+
+ROUGH_ENTRIES = (
+    *(replace(entry, scale=FINE.get(entry.name, entry.scale)) for entry in HORSE_ENTRIES),
+    Entry(
+        "speed error",
+        "trunk",
+        "m/s",
+        lambda s: s.trunk.report.velocity.real - s.episode.target,
+        tanh_of(0.5),
+    ),
+)
+"""Entries that can be observed on `HorseRough-v0`."""
 
 # The reward
 

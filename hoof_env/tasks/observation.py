@@ -243,7 +243,10 @@ PRESSURE = "pressure"
 CONTEXT = "context"
 """Group of the physical parameters that contexts vary."""
 
-LATE = (PRESSURE, CONTEXT)
+LOAD = "load"
+"""Group of the force on a whole hoof."""
+
+LATE = (PRESSURE, CONTEXT, LOAD)
 """Groups whose entries have the last slots, behind the slots of users' own entries: the noise of an entry
 follows from its slot, and these groups were added later."""
 

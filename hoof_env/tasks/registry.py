@@ -26,7 +26,7 @@ from hoof_env.tasks.disturbances import rough_ground
 from hoof_env.tasks.hop_terms import BALANCE_ENTRIES, BALANCE_SPEED_TERMS, HOP_ENTRIES, HOP_TERMS
 from hoof_env.tasks.horse import HOOF_STIFFNESS, MASS, Horse
 from hoof_env.tasks.horse_gaits import checked_size
-from hoof_env.tasks.horse_terms import HORSE_ENTRIES, HORSE_TERMS
+from hoof_env.tasks.horse_terms import HORSE_ENTRIES, HORSE_TERMS, ROUGH_ENTRIES
 from hoof_env.tasks.observation import ENTRIES, Entry, check_groups, groups_of
 from hoof_env.tasks.one_leg import OneLeg
 from hoof_env.tasks.reward import TERMS, Term, check_weights
@@ -401,14 +401,23 @@ TASKS: Mapping[str, Task] = MappingProxyType(
             _FOUR_LEGS
             + "\n\nThe ground has slopes of up to 10 % and bumps of up to 5 cm. Every 2 to 4 s the trunk is"
             " pushed forward or back, by up to 1.5 m/s times the horse's mass. Neither the ground ahead nor"
-            " the pushes are observed. A fall costs 100 instead of 15, and `tracking` weighs 64 instead of"
-            " 16: compare no returns with Horse-v0's. The reference gait falls in every fifth episode."
-            " `terrain`, `strength` and `push_impulse` change these disturbances; `size` does not.",
+            " the pushes are observed. A policy acts 25 times a second, half as often as on Horse-v0: in the"
+            " time in which a body as high as its hips falls, as often as robots of half a metre do 40 times"
+            " a second. It sees the motion of the trunk on the scale on which disturbances change it, and the"
+            " load of each hoof. A fall costs 100 instead of 15, and `tracking` weighs 64 instead of 16:"
+            " compare no returns with Horse-v0's. The reference gait falls in every fifth episode. `terrain`,"
+            " `strength` and `push_impulse` change these disturbances; `size` does not.",
             # With the weights of Horse-v0, agents trade falls and the commanded speed for smoother gaits.
-            {**_HORSE, **rough_ground(1.0, MASS), "reward_weights": {"fall": 100.0, "tracking": 64.0}},
+            {
+                **_HORSE,
+                **rough_ground(1.0, MASS),
+                "dt": 0.04,
+                "observation": ("trunk", "target", "crank", "load", "offset"),
+                "reward_weights": {"fall": 100.0, "tracking": 64.0},
+            },
             reference="reference",
             terms=HORSE_TERMS,
-            entries=HORSE_ENTRIES,
+            entries=ROUGH_ENTRIES,
             body=Horse,
             speeds=(1.172, 3.706),
         ),
