@@ -197,7 +197,7 @@ def names_of(env: gym.Env[Any, Any]) -> list[str]:
 def default_policy(env: gym.Env[Any, Any]) -> str:
     """Return the name of the policy to play if none is named: zero actions where the task starts in a gait of
     its own, else the horse's reference, the run, or the first gait of a preset without one."""
-    if "gait" in env.unwrapped.task.start:  # type: ignore[attr-defined]
+    if "gait" in env.unwrapped.batch.usual_start:  # type: ignore[attr-defined]
         return "zero"
     names = policy_names(env)
     return next((name for name in ("reference", "run") if name in names), names[0])

@@ -324,6 +324,10 @@ class Horse:
             checked["gait"] = gait_numbers("options['gait']", checked["gait"], self.gaits, self.size)
         return with_parameters(checked, settings)
 
+    def raised_share(self, options: Mapping[str, Any], trunk: Trunk) -> float:
+        """Return 1: a horse stands in its gait, and no height ends its episodes."""
+        return 1.0
+
     def draw(
         self, options: Mapping[str, Any], generators: Sequence[np.random.Generator], engine: TrunkEngine
     ) -> Start:
