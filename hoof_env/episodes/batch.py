@@ -583,7 +583,8 @@ class EpisodeBatch:
 
     def measured(self) -> dict[str, Floats]:
         """Return the observation, true and before scaling: entries by name, shape (num_envs,) each."""
-        names = [entry.name for entry in self.plan.observed.entries]
+        # The present frame has the first columns
+        names = self.plan.observation_names[: len(self.plan.observed.entries)]
         out = np.zeros((len(names), self.num_envs))
         if self.row_plans.differ:
             # The kernel measures all rows; only rows under the present plan are right.

@@ -63,6 +63,8 @@ class Body(Protocol):
         command_step: largest change from one commanded speed to the next [m/s].
         start_names, gait_names: names of the numbers with which infos describe an episode's start.
         action_names: names of the actions, leg after leg.
+        renamed: names of entries of the observation, by the task's names for them, that under the body's
+            settings measure another quantity.
         action_form: tag of the meaning of actions, "rates", or of a horse offsets and their spans.
     """
 
@@ -83,6 +85,7 @@ class Body(Protocol):
     gait_names: tuple[str, ...]
     action_names: tuple[str, ...]
     action_form: str
+    renamed: Mapping[str, str]
 
     @property
     def policy_names(self) -> list[str]:

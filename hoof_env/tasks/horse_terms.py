@@ -11,7 +11,7 @@ from hoof_env.gait import PARAMETERS, WIDEST
 from hoof_env.ground.terrain import surface
 from hoof_env.simd import Lanes, Number, absolute, block_at, maximum, minimum, where
 from hoof_env.simd.math import cos_sin
-from hoof_env.tasks.horse_gaits import LEGS
+from hoof_env.tasks.horse_gaits import LEGS, offset_name
 from hoof_env.tasks.observation import (
     CONTEXT_ENTRIES,
     PLAIN,
@@ -124,7 +124,7 @@ HORSE_ENTRIES = (
     ),
     *(
         Entry(
-            f"offset: {leg.replace('_', ' ')}, {name.replace('_', ' ')}",
+            offset_name(leg, name),
             "offset",
             "-",
             _offset(len(PARAMETERS) * i + k),

@@ -208,6 +208,7 @@ class OneLeg:
     action_names: tuple[str, ...] = tuple(f"rate_of_{name}" for name in PARAMETERS)
     action_form = "rates"
     policy_starts: Mapping[str, dict[str, Any]] = MappingProxyType({})
+    renamed: Mapping[str, str] = MappingProxyType({})
     hips: Hips = ONE_HIP
     picture = "leg"
     step_error = 0.01
