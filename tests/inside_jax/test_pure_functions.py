@@ -105,7 +105,7 @@ def test_the_first_second_is_that_of_the_kernels(id):
 
 
 @pytest.mark.parametrize("id", ["HorseLegHop", "HorseLegBalance", "HorseLegBalanceSpeed"])
-def test_a_hop_is_that_of_the_kernels_until_a_leg_falls(id):
+def test_the_first_second_of_a_hop_is_that_of_the_kernels_until_a_leg_falls(id):
     found, count, _ = largest_differences(id)
     print(id, count, found)
     assert 10 <= count < STEPS  # and falls in the same step
