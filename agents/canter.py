@@ -22,11 +22,13 @@ from numpy.typing import NDArray
 from agents import runs
 from agents.command import parse, run
 from agents.evolution import generations, make_strategy, require
+from agents.gait_box import decode, encode
+from agents.gait_costs import CRITERIA, misses_of
+from agents.gait_rig import Rig
 from agents.horse_gaits import speed_of
-from agents.judge import MAX_ERROR, MAX_FALLS, MAX_SLIP, TURNS
 from agents.judges import Bars, read_judges
 from agents.kept import EVIDENCE, check_numbers, check_shape, file_of, read_kept
-from agents.kinematic_gaits import CRITERIA, Rig, decode, encode, misses_of
+from agents.rules import rejection_reason
 from hoof_env._output import check_folder, markdown_table
 from hoof_env.constants import GRAVITY
 from hoof_env.errors import count
@@ -197,13 +199,8 @@ def measured(found: dict[str, Any]) -> dict[str, Any]:
 
 
 def counts(one: dict[str, Any]) -> bool:
-    """Return True if a canter's figures count, by the limits of `agents.judge`."""
-    return bool(
-        one["fell"] <= MAX_FALLS
-        and abs(one["speed_ratio"] - 1) <= MAX_ERROR
-        and all(one[f"slip_{pair}"] < MAX_SLIP for pair in PAIRS)
-        and all(TURNS[0] <= one[f"stances_per_turn_{pair}"] <= TURNS[1] for pair in PAIRS)
-    )
+    """Return True if a canter's figures count."""
+    return not rejection_reason(one)
 
 
 def lands(one: dict[str, Any]) -> bool:

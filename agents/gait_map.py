@@ -3,7 +3,8 @@
 At each of `FROUDES` and for each of `OBJECTIVES` CMA-ES looks for the gait that spares most: work, peak
 force, loading, or all three. Of a horse's kinematics it is given the length of the stride, which does not
 jump where a horse changes gait, and the lag by kind. Duty factors and number of peaks are free, and no figure
-of a horse's forces enters. What gaits need so that figures count is `NEEDED` of `agents.kinematic_gaits`.
+of a horse's forces enters. What gaits need so that figures count is `NEEDED` of
+`agents.gait_costs`.
 
 Walks begin with the stored kinematic walk and go on to slower and faster ones, trots likewise. At each speed
 the mixture comes first, and the others go on from it. A search with any lag goes on from the best walk or
@@ -25,15 +26,17 @@ from numpy.typing import NDArray
 
 from agents import runs
 from agents.evolution import make_strategy, require
+from agents.gait_box import decode, encode
+from agents.gait_costs import misses_of
 from agents.gait_figures import froude_of
+from agents.gait_rig import Rig
 from agents.horse_gaits import speed_of
-from agents.judge import MAX_ERROR, MAX_FALLS, MAX_SLIP, TURNS
 from agents.judges import Bars, read_judges
 from agents.kept import check_numbers, read_kept
-from agents.kinematic_gaits import Rig, decode, encode, misses_of
+from agents.rules import rejection_reason
 from hoof_env.errors import brief
 from hoof_env.tasks.horse import HIP_HEIGHT
-from hoof_env.tasks.horse_gaits import NAMES, PAIRS, horse_gaits, kinematic_speeds
+from hoof_env.tasks.horse_gaits import NAMES, horse_gaits, kinematic_speeds
 
 Floats = NDArray[np.float64]
 
@@ -131,21 +134,15 @@ def costs_of(figures: dict[str, Floats], kind: str, objective: str, froude: floa
 
 
 def stands(figures: dict[str, Any], kind: str, froude: float) -> bool:
-    """Return True if a gait's figures count as of its kind, by the limits of `agents.judge` and with the
-    stride that was given."""
+    """Return True if a gait's figures count, and as of its kind, with the stride that was given."""
     ours = float(figures["lag"])
     for low, high in bars_of(kind, froude).get("lag", []):
         middle = (low + high) / 2
         if abs((ours - middle + 0.25) % 0.5 - 0.25) > (high - low) / 2:
             return False
     # Written so that NaN is a reason, too
-    return bool(
-        figures["fell"] <= MAX_FALLS
-        and abs(figures["speed_ratio"] - 1) <= MAX_ERROR
-        and abs(figures["stride_over_hip"] - stride_at(froude)) <= 2 * STRIDE_BAR
-        and all(figures[f"slip_{pair}"] < MAX_SLIP for pair in PAIRS)
-        and all(TURNS[0] <= figures[f"stances_per_turn_{pair}"] <= TURNS[1] for pair in PAIRS)
-    )
+    keeps_stride = bool(abs(figures["stride_over_hip"] - stride_at(froude)) <= 2 * STRIDE_BAR)
+    return keeps_stride and not rejection_reason(figures)
 
 
 def paced(gaits: Floats, froude: float, before: float) -> Floats:
