@@ -22,19 +22,21 @@ from numpy.typing import NDArray
 from agents import runs
 from agents.command import parse, run
 from agents.evolution import generations, make_strategy, require
+from agents.gait_box import decode, encode
+from agents.gait_costs import CRITERIA, misses_of
+from agents.gait_rig import Rig
 from agents.horse_gaits import speed_of
-from agents.judge import MAX_ERROR, MAX_FALLS, MAX_SLIP, TURNS
 from agents.judges import Bars, read_judges
-from agents.kinematic_gaits import CRITERIA, Rig, decode, encode, misses_of
-from hoof_env._output import markdown_table
+from agents.kept import EVIDENCE, check_numbers, check_shape, file_of, read_kept
+from agents.rules import rejection_reason
+from hoof_env._output import check_folder, markdown_table
 from hoof_env.constants import GRAVITY
-from hoof_env.errors import count, parse_json
+from hoof_env.errors import count
 from hoof_env.tasks.horse import HIP_HEIGHT, PHASE_SPAN
 from hoof_env.tasks.horse_gaits import ACTED, LEGS, NAMES, PAIRS, horse_gaits
 
 Floats = NDArray[np.float64]
 
-EVIDENCE = Path(__file__).parents[1] / "docs" / "evidence"
 NAME = "canter"
 FROUDE = 1.82  # of 5.0 m/s
 STRIDE = 2.68 / HIP_HEIGHT
@@ -43,6 +45,16 @@ STRIDE = 2.68 / HIP_HEIGHT
 FOOTFALL = {"right_hind": (0.25, 0.3), "left_fore": (0.25, 0.3), "right_fore": (0.5, 0.6)}
 """Landings after the left hind leg's, as shares of the stride: of a right lead."""
 LEADING, OTHER = "right_fore", "left_fore"
+FIGURES = (
+    "fell",
+    "speed_ratio",
+    "stride_over_hip",
+    "transport",
+    *(f"{name}_{pair}" for name in ("slip", "duty", "stances_per_turn") for pair in PAIRS),
+    *(f"touch_{leg}" for leg in FOOTFALL),
+    *(f"peak_{leg}" for leg in (LEADING, OTHER)),
+)
+"""Figures of a canter that the page shows."""
 SCALE = 0.03  # of a distance from these [strides]
 MISS = 4.0  # cost of a scale beyond them
 
@@ -91,8 +103,8 @@ class Args:
     """searches"""
     generations: int = 250
     """of each"""
-    found: Path = EVIDENCE / NAME / "found.json"
-    """file of what is found, which is gone on with"""
+    found: Path | None = None
+    """file of what is found, which is gone on with; by default that of the page in --out"""
     out: Path = EVIDENCE
     """folder of the page"""
 
@@ -137,7 +149,9 @@ def split(points: Floats) -> tuple[Floats, Floats]:
 
 def search(seed: int, length: int) -> dict[str, Any]:
     """Return a canter and its figures."""
-    require("agents.canter", "cma")
+    require("agents.canter", "cma", "tqdm")
+    from tqdm import tqdm
+
     began = time.monotonic()
     speed = speed_of(FROUDE)
     rig = Rig(POPULATION * STARTS, num_threads=1, footfall="free")
@@ -161,7 +175,8 @@ def search(seed: int, length: int) -> dict[str, Any]:
     costs = [costs_of(play(np.array(part))) for part in np.array_split(first, 2)]
     best = first[int(np.argmin(np.concatenate(costs)))]
     strategy = make_strategy(best, SPREAD, POPULATION, seed + 1)
-    for _ in generations(strategy, lambda points: costs_of(play(np.array(points))).tolist(), length):
+    improved = generations(strategy, lambda points: costs_of(play(np.array(points))).tolist(), length)
+    for _ in tqdm(improved, f"seed {seed}", length, unit=" generations", leave=False, disable=None):
         pass
     point = strategy.result.xfavorite[None]
     gaits, shifts = split(point)
@@ -184,13 +199,8 @@ def measured(found: dict[str, Any]) -> dict[str, Any]:
 
 
 def counts(one: dict[str, Any]) -> bool:
-    """Return True if a canter's figures count, by the limits of `agents.judge`."""
-    return bool(
-        one["fell"] <= MAX_FALLS
-        and abs(one["speed_ratio"] - 1) <= MAX_ERROR
-        and all(one[f"slip_{pair}"] < MAX_SLIP for pair in PAIRS)
-        and all(TURNS[0] <= one[f"stances_per_turn_{pair}"] <= TURNS[1] for pair in PAIRS)
-    )
+    """Return True if a canter's figures count."""
+    return not rejection_reason(one)
 
 
 def lands(one: dict[str, Any]) -> bool:
@@ -253,23 +263,39 @@ def summary(found: list[dict[str, Any]]) -> str:
     )
 
 
+def content_of_file(content: Any) -> dict[str, Any]:
+    """Return the content of a file of canters; raise KeyError, TypeError or ValueError for another file's."""
+    for k, one in enumerate(content["found"]):
+        check_numbers(f"canter {k}", one, ("seed", *(FIGURES if one.get("starts") == CHECKED else ())))
+        check_shape(f"gait of canter {k}", one["gait"], (len(NAMES),))
+        check_shape(f"shifts of canter {k}", one["shifts"], (len(PAIRS),))
+    return dict(content)
+
+
 def write(args: Args) -> None:
     """Search for what is missing and write the page."""
+    seeds, length = count("--seeds", args.seeds), count("--generations", args.generations)
+    check_folder(args.out)
+    path = file_of(args.found, args.out, NAME, "found.json")
     content: dict[str, Any] = {"found": []}
-    if args.found.is_file():
-        content = parse_json(args.found.read_text(encoding="utf-8"))
+    if path.is_file():
+        content = read_kept(path, "canters that agents.canter found", content_of_file)
     known = {one["seed"] for one in content["found"]}
-    args.found.parent.mkdir(parents=True, exist_ok=True)
-    for seed in range(count("--seeds", args.seeds)):
-        if seed in known:
-            continue
-        one = search(seed, count("--generations", args.generations))
+    to_do = [seed for seed in range(seeds) if seed not in known]
+    print(f"{path}: has {seeds - len(to_do)} of {seeds} searches", flush=True)
+    if to_do:
+        print(f"{len(to_do)} searches to do, of {length} generations each: minutes to hours", flush=True)
+    path.parent.mkdir(parents=True, exist_ok=True)
+    for seed in to_do:
+        one = search(seed, length)
         content["found"].append(one)
         content["versions"] = runs.versions()
-        runs.write_text(args.found, json.dumps(content, indent=1) + "\n")
+        runs.write_text(path, json.dumps(content, indent=1) + "\n")
         print({name: value for name, value in one.items() if not isinstance(value, list)}, flush=True)
-    found = content["found"] = [measured(one) for one in content["found"]]
-    runs.write_text(args.found, json.dumps(content, indent=1) + "\n")
+    found = [measured(one) for one in content["found"]]
+    if found != content["found"]:
+        content["found"] = found
+        runs.write_text(path, json.dumps(content, indent=1) + "\n")
     head = ("figure", "horse", *(f"seed {one['seed']}" for one in found))
     page = PAGE.format(
         command="python -m agents.canter",

@@ -33,10 +33,10 @@ from agents.gait_map import (
 )
 from agents.judge_pictures import DPI, LETTERS, WIDTH
 from agents.judges import read_judges
-from hoof_env._output import markdown_table
-from hoof_env.errors import count
+from agents.kept import EVIDENCE, file_of
+from hoof_env._output import check_folder, markdown_table
+from hoof_env.errors import DataFileError, count
 
-EVIDENCE = Path(__file__).parents[1] / "docs" / "evidence"
 NAME = "gait_change"
 CHANGES = {"walk to trot": (0.35, 0.5), "trot to canter": (2.0, 3.0)}
 """Froude numbers at which horses change gait: from walk to trot Griffin and others (2004) print 0.35 at any
@@ -122,8 +122,8 @@ class Args:
     """searches at each speed, each from its own draws"""
     search: bool = True
     """search for what is missing; without it the page is of what is in the file"""
-    found: Path = EVIDENCE / NAME / "searches.json"
-    """file of found gaits, which is gone on with"""
+    found: Path | None = None
+    """file of found gaits, which is gone on with; by default that of the page in --out"""
     out: Path = EVIDENCE
     """folder of the page"""
 
@@ -415,7 +415,14 @@ def main(argv: list[str] | None = None) -> None:
     """Search for what is missing and write the page."""
     args = parse(Args, argv, "python -m agents.gait_change", __doc__)
     seeds = count("--seeds", args.seeds)
-    write(search_all(args.found, seeds) if args.search else Map(args.found), args.out)
+    check_folder(args.out)
+    path = file_of(args.found, args.out, NAME, "searches.json")
+    found = search_all(path, seeds) if args.search else Map(path)
+    if not compared(found.rows):
+        raise DataFileError(
+            f"{path}: expected walks and trots of one seed and speed, got {len(found.rows)} gaits"
+        )
+    write(found, args.out)
 
 
 if __name__ == "__main__":

@@ -3,7 +3,8 @@
 At each of `FROUDES` and for each of `OBJECTIVES` CMA-ES looks for the gait that spares most: work, peak
 force, loading, or all three. Of a horse's kinematics it is given the length of the stride, which does not
 jump where a horse changes gait, and the lag by kind. Duty factors and number of peaks are free, and no figure
-of a horse's forces enters. What gaits need so that figures count is `NEEDED` of `agents.kinematic_gaits`.
+of a horse's forces enters. What gaits need so that figures count is `NEEDED` of
+`agents.gait_costs`.
 
 Walks begin with the stored kinematic walk and go on to slower and faster ones, trots likewise. At each speed
 the mixture comes first, and the others go on from it. A search with any lag goes on from the best walk or
@@ -25,14 +26,17 @@ from numpy.typing import NDArray
 
 from agents import runs
 from agents.evolution import make_strategy, require
+from agents.gait_box import decode, encode
+from agents.gait_costs import misses_of
 from agents.gait_figures import froude_of
+from agents.gait_rig import Rig
 from agents.horse_gaits import speed_of
-from agents.judge import MAX_ERROR, MAX_FALLS, MAX_SLIP, TURNS
 from agents.judges import Bars, read_judges
-from agents.kinematic_gaits import Rig, decode, encode, misses_of
-from hoof_env.errors import parse_json
+from agents.kept import check_numbers, read_kept
+from agents.rules import rejection_reason
+from hoof_env.errors import brief
 from hoof_env.tasks.horse import HIP_HEIGHT
-from hoof_env.tasks.horse_gaits import NAMES, PAIRS, horse_gaits, kinematic_speeds
+from hoof_env.tasks.horse_gaits import NAMES, horse_gaits, kinematic_speeds
 
 Floats = NDArray[np.float64]
 
@@ -130,21 +134,15 @@ def costs_of(figures: dict[str, Floats], kind: str, objective: str, froude: floa
 
 
 def stands(figures: dict[str, Any], kind: str, froude: float) -> bool:
-    """Return True if a gait's figures count as of its kind, by the limits of `agents.judge` and with the
-    stride that was given."""
+    """Return True if a gait's figures count, and as of its kind, with the stride that was given."""
     ours = float(figures["lag"])
     for low, high in bars_of(kind, froude).get("lag", []):
         middle = (low + high) / 2
         if abs((ours - middle + 0.25) % 0.5 - 0.25) > (high - low) / 2:
             return False
     # Written so that NaN is a reason, too
-    return bool(
-        figures["fell"] <= MAX_FALLS
-        and abs(figures["speed_ratio"] - 1) <= MAX_ERROR
-        and abs(figures["stride_over_hip"] - stride_at(froude)) <= 2 * STRIDE_BAR
-        and all(figures[f"slip_{pair}"] < MAX_SLIP for pair in PAIRS)
-        and all(TURNS[0] <= figures[f"stances_per_turn_{pair}"] <= TURNS[1] for pair in PAIRS)
-    )
+    keeps_stride = bool(abs(figures["stride_over_hip"] - stride_at(froude)) <= 2 * STRIDE_BAR)
+    return keeps_stride and not rejection_reason(figures)
 
 
 def paced(gaits: Floats, froude: float, before: float) -> Floats:
@@ -167,11 +165,27 @@ def order_of(kind: str) -> list[tuple[float, float | None]]:
     return first + [(there, here) for way in (up, down) for here, there in pairwise(way)]
 
 
+def rows_of_file(content: Any) -> tuple[dict[str, str], list[dict[str, Any]]]:
+    """Return the versions with which gaits were found, and the gaits, of a file's content; raise KeyError,
+    TypeError or ValueError for another file's."""
+    rows = [dict(zip(content["columns"], row, strict=True)) for row in content["rows"]]
+    for k, row in enumerate(rows):
+        check_numbers(f"row {k}", row, ("froude", "seed", "wall_s", *NAMES))
+        check_numbers(f"row {k}", row, FIGURES, missing=True)
+        for name, known in (("kind", (*KINDS, FREE)), ("objective", OBJECTIVES), ("froude", FROUDES)):
+            if row[name] not in known:
+                raise ValueError(f"{name} of row {k} is {brief(row[name])}")
+    return dict(content["versions"]), rows
+
+
 class Map:
     """Found gaits in a file, which is written after each speed of each seed.
 
     Args:
         path: the file; one that exists is gone on with.
+
+    Raises:
+        DataFileError: it exists and is no such file.
     """
 
     def __init__(self, path: Path) -> None:
@@ -179,9 +193,7 @@ class Map:
         self.about: dict[str, str] = {}
         self.rows: list[dict[str, Any]] = []
         if path.is_file():
-            content = parse_json(path.read_text(encoding="utf-8"))
-            self.about = content["versions"]
-            self.rows = [dict(zip(content["columns"], row, strict=True)) for row in content["rows"]]
+            self.about, self.rows = read_kept(path, "gaits that agents.gait_change found", rows_of_file)
 
     def at(self, froude: float, seed: int, kinds: Sequence[str]) -> list[dict[str, Any]]:
         """Return what a seed found at a Froude number with gaits of some kinds."""
@@ -336,23 +348,29 @@ def stands_of(row: dict[str, Any], kind: str | None = None) -> bool:
 def search_all(path: Path, seeds: int, first: Effort = FIRST, each: Effort = EACH) -> Map:
     """Search at all speeds with each of some seeds, leaving out what is in the file; return the map."""
     found = Map(path)
-    for seed in range(seeds):
-        searcher: Searcher | None = None
-        order = [(kind, froude, near) for kind in KINDS for froude, near in order_of(kind)]
-        for kind, froude, near in [*order, *((FREE, froude, froude) for froude in FROUDES)]:
-            if found.at(froude, seed, [kind]):
-                continue
-            searcher = searcher or Searcher(seed, first, each)
-            if near is None:
-                stored = horse_gaits()[f"kinematic-{kind}"].to_array()[None]
-                known = paced(stored, froude, froude_of(kinematic_speeds()[f"kinematic-{kind}"], HIP_HEIGHT))
-            elif kind == FREE:
-                known = gaits_of(found.at(froude, seed, [*KINDS]))
-            else:
-                known = paced(gaits_of(found.at(near, seed, [kind])), froude, near)
-            rows = searcher.search(kind, froude, known, near == froude)
-            found.keep(rows)
-            standing = sum(stands_of(row) for row in rows)
-            text = f"seed {seed}, {kind}, Froude number {froude:g}: {standing} of {len(rows)} gaits count"
-            print(text, flush=True)
+    order = [(kind, froude, near) for kind in KINDS for froude, near in order_of(kind)]
+    order += [(FREE, froude, froude) for froude in FROUDES]
+    all_of_them = [(seed, *one) for seed in range(seeds) for one in order]
+    to_do = [one for one in all_of_them if not found.at(one[2], one[0], [one[1]])]
+    print(f"{path}: has {len(all_of_them) - len(to_do)} of {len(all_of_them)} searches", flush=True)
+    if to_do:
+        spent = [row["wall_s"] for row in found.rows]
+        each_takes = f"about {np.mean(spent) / 60:.0f} minutes each" if spent else "minutes each"
+        print(f"{len(to_do)} searches to do, {each_takes}; Ctrl-C loses the present one alone", flush=True)
+    searcher: Searcher | None = None
+    for number, (seed, kind, froude, near) in enumerate(to_do, 1):
+        if searcher is None or searcher.seed != seed:
+            searcher = Searcher(seed, first, each)
+        if near is None:
+            stored = horse_gaits()[f"kinematic-{kind}"].to_array()[None]
+            known = paced(stored, froude, froude_of(kinematic_speeds()[f"kinematic-{kind}"], HIP_HEIGHT))
+        elif kind == FREE:
+            known = gaits_of(found.at(froude, seed, [*KINDS]))
+        else:
+            known = paced(gaits_of(found.at(near, seed, [kind])), froude, near)
+        rows = searcher.search(kind, froude, known, near == froude)
+        found.keep(rows)
+        standing = sum(stands_of(row) for row in rows)
+        place = f"{number} of {len(to_do)}: seed {seed}, {kind}, Froude number {froude:g}"
+        print(f"{place}: {standing} of {len(rows)} gaits count", flush=True)
     return found

@@ -16,8 +16,9 @@ from typing import Any
 from agents import runs
 from agents.command import parse, run
 from agents.gait_figures import play
-from agents.judge import ENV_ID, rejection_reason
+from agents.judge import ENV_ID
 from agents.judges import read_judges
+from agents.rules import rejection_reason
 from hoof_env._output import markdown_table
 from hoof_env.envs.policies import make_policy
 from hoof_env.errors import count

@@ -25,13 +25,14 @@ from numpy.typing import NDArray
 from agents import gait_figures, runs
 from agents.command import parse, run
 from agents.evolution import generations, make_strategy, mean_costs, require
+from agents.kept import check_shape, read_kept
+from agents.rules import MAX_SLIP, TROT
 from hoof_env.constants import GRAVITY
 from hoof_env.envs.policies import make_policy
-from hoof_env.errors import parse_json
 from hoof_env.evaluation.episodes import make_rows
 from hoof_env.simd.threads import limit_threads
 from hoof_env.tasks.horse import HIP_HEIGHT
-from hoof_env.tasks.horse_gaits import LEGS, LIMITS, PAIRS, Stride, bounds
+from hoof_env.tasks.horse_gaits import LEGS, LIMITS, NAMES, PAIRS, Stride, bounds
 
 Floats = NDArray[np.float64]
 
@@ -56,9 +57,6 @@ HARMONICS = 3  # number of harmonics of the trunk's motion
 FALLEN = 0.1  # share of falls at which the speed is raised no more
 TROT_FROUDE = 0.5  # Froude number at which the trot-like family begins
 LAG = 600.0  # cost of a stride between the landings of hind and fore hooves in the trot-like family
-TROT = 0.05
-SLIP = 0.1
-"""Largest lag [strides] and slip of a stance [m] of shipped trot-like gaits: as for agents."""
 
 WEIGHTS = {
     "alive": 11.0,
@@ -263,6 +261,14 @@ def speed_of(froude: float) -> float:
     return float(np.sqrt(froude * GRAVITY * HIP_HEIGHT))
 
 
+def searches_of_file(content: Any) -> dict[str, Any]:
+    """Return a file of searches; raise KeyError, TypeError or ValueError for the content of another one."""
+    for name, one in content["searches"].items():
+        for step in one["steps"]:
+            check_shape(f"gait of {name}", step["gait"], (len(NAMES),))
+    return dict(content)
+
+
 class Finder:
     """Searches for what the file lacks; the file is written after every search."""
 
@@ -270,7 +276,7 @@ class Finder:
         self.args = args
         self.content: dict[str, Any] = {"searches": {}}
         if args.out.is_file():
-            self.content = parse_json(args.out.read_text(encoding="utf-8"))
+            self.content = read_kept(args.out, "searches of agents.horse_gaits", searches_of_file)
 
     def keep(self, name: str, look: Any) -> list[dict[str, Any]]:
         """Return the steps that a search found under this name, or finds now."""
@@ -404,7 +410,7 @@ def shipped(searches: dict[str, Any]) -> dict[str, Any]:
     def may_be_commanded(trot: dict[str, Any]) -> bool:
         """True if the task commands the speed of a trot and the trot slips little."""
         speed = float(trot["speed_m_s"])
-        return speed <= speed_of(HIGHEST) and slip_at(trot["gait"], speed) < SLIP
+        return speed <= speed_of(HIGHEST) and slip_at(trot["gait"], speed) < MAX_SLIP
 
     free = steps_of("free")
     trots = sorted(steps_of("trot-like"), key=lambda step: -float(step["speed_m_s"]))

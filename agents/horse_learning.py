@@ -23,13 +23,13 @@ from numpy.typing import NDArray
 from agents import results, runs, side_by_side
 from agents.command import parse, run
 from agents.gradient_signal import first_step, record, signal_to_noise
+from agents.kept import EVIDENCE, check_numbers, check_shape, read_kept
 from hoof_env._output import check_folder, markdown_table
 from hoof_env.envs.policies import make_policy
-from hoof_env.errors import check_choice, parse_json
+from hoof_env.errors import check_choice
 from hoof_env.evaluation.episodes import make_rows, play_rows
 from hoof_env.policies.find import find_policy
 
-EVIDENCE = Path(__file__).parents[1] / "docs" / "evidence"
 NAME = "horse_learning"
 ENV_ID = "hoof_env/HorseRough-v0"
 
@@ -56,6 +56,9 @@ GAINS = (0.0, 0.2, 0.4, 0.8)
 
 KEPT = ("return", "failed", "success", "speed_m_s", "slip_m", "stance_peak_n", "loading_rate_n_s")
 """Figures of an episode that are kept."""
+
+MEASURED = ("gains", "signal", "steps", "sighted")
+"""Figures besides those of learners."""
 
 STEPPED = ("of the id", "quiet")
 SIZE = 0.3
@@ -320,7 +323,7 @@ form of the task: compare them only within a row.
 
 PAGE = """# What stock PPO's first gradients show on rough ground
 
-Written by `python -m agents.horse_learning` at commit `{commit}`, with [its figures]({name}/figures.json).
+Written by `python -m agents.horse_learning` from [its figures]({name}/figures.json), measured at {commits}.
 `hoof_env/HorseRough-v0`; episodes have seeds from 3,000,000 on, and differences from the zero action are
 paired.
 
@@ -442,7 +445,7 @@ def page(found: Figures, args: Args) -> str:
     sighted = [row_of(one, one["name"]) for one in found.get("sighted", [])]
     return PAGE.format(
         name=NAME,
-        commit=results.commit_of_code(),
+        commits=commits_of(found),
         found=found_text(found),
         starts=f"{args.starts:,}",
         rows=args.rows,
@@ -491,22 +494,72 @@ def found_text(found: Figures) -> str:
     )
 
 
+def figures_of_file(content: Any) -> Figures:
+    """Return the figures of a file's content; raise KeyError, TypeError or ValueError for another file's."""
+    found: Figures = dict(content)
+    if unknown := sorted({*found} - {*MEASURED, "learners", "commits", "versions"}):
+        raise ValueError(f"there are entries {', '.join(unknown)}")
+    for name in {*MEASURED} & {*found}:
+        rows = [found[name][each] for each in SURROUNDINGS] if name == "signal" else found[name]
+        for one in rows:
+            check_numbers(f"a row of {name}", one, REWARDS if name == "signal" else KEPT)
+            if name != "signal":
+                check_shape(f"return over zero of {name}", one["return over zero"], (2,))
+    for case in found.get("learners", {}).values():
+        check_numbers("a case of learners", case, ("steps", "starts"))
+        for one in (case["zero"], *case["seeds"], *case["blind"]):
+            check_numbers("a learner", one, KEPT)
+    # Files once had a commit for all figures
+    measured = [name for name in MEASURED if name in found]
+    measured += [f"learners {name}" for name in found.get("learners", {})]
+    found.setdefault("commits", dict.fromkeys(measured, found.get("versions", {}).get("commit", "unknown")))
+    return found
+
+
+def commits_of(found: Figures) -> str:
+    """Return the commits that measured the figures, with what each measured if there are several."""
+    of_commits: dict[str, list[str]] = {}
+    for name, commit in found["commits"].items():
+        of_commits.setdefault(commit, []).append(name)
+    if len(of_commits) == 1:
+        return f"commit `{next(iter(of_commits))}`"
+    return "commits " + ", ".join(f"`{commit}` ({', '.join(names)})" for commit, names in of_commits.items())
+
+
+def tell_what_is_missing(found: Figures, cases: Sequence[str], args: Args) -> None:
+    """Print what is to be trained and measured."""
+    for name in cases:
+        case = CASES[name]
+        learners = f"{case.seeds} learners and {case.blind} blind twins of {args.steps:,} steps each"
+        print(f"to train: {name}, {learners}; hours", flush=True)
+    missing = [] if args.only else [name for name in MEASURED[:3] if name not in found]
+    print(f"to measure: {', '.join(missing) or 'nothing'}", flush=True)
+
+
 def main(argv: list[str] | None = None) -> None:
     """Measure what the figures lack, and write the page."""
     args = parse(Args, argv, "python -m agents.horse_learning", __doc__)
     check_folder(args.out)
     figures = args.out / NAME / "figures.json"
-    found: Figures = parse_json(figures.read_text(encoding="utf-8")) if figures.is_file() else {}
+    found: Figures = {"commits": {}}
+    if figures.is_file():
+        found = read_kept(figures, "figures that agents.horse_learning measured", figures_of_file)
+    # Before hours in which others may commit
+    versions, commit = runs.versions(), results.commit_of_code()
 
-    def keep(name: str, measured: Any) -> None:
+    def keep(name: str, measured: Any, case: str = "") -> None:
         found[name] = measured
-        figures.parent.mkdir(exist_ok=True)
+        found["commits"][f"{name} {case}".strip()] = commit
+        found["versions"] = versions
+        figures.parent.mkdir(parents=True, exist_ok=True)
         runs.write_text(figures, json.dumps(found, indent=1) + "\n")
 
-    for name in args.only or (CASES if args.train else ()):
-        if name not in found.get("learners", {}):
-            case = CASES[check_choice("only", name, CASES)]
-            keep("learners", found.get("learners", {}) | {name: learn(case, args.steps, args.starts)})
+    asked = [check_choice("only", name, CASES) for name in args.only] or (CASES if args.train else ())
+    cases = [name for name in asked if name not in found.get("learners", {})]
+    tell_what_is_missing(found, cases, args)
+    for name in cases:
+        learnt = {name: learn(CASES[name], args.steps, args.starts)}
+        keep("learners", found.get("learners", {}) | learnt, name)
     if args.only:
         return
     if "gains" not in found:
@@ -517,7 +570,6 @@ def main(argv: list[str] | None = None) -> None:
         keep("steps", measure_steps(args.rows, args.recorded, args.probed))
     if args.sighted:
         keep("sighted", measure_sighted(args.sighted, args.starts))
-    keep("versions", runs.versions())
     runs.write_text(args.out / f"{NAME}.md", page(found, args))
 
 

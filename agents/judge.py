@@ -37,6 +37,7 @@ from agents.gait_figures import SECONDS, mean_lag, play
 from agents.horse_gaits import speed_of
 from agents.judge_pictures import draw
 from agents.judges import of_speeds, read_judges
+from agents.rules import TROT, rejection_reason
 from hoof_env._output import markdown_table
 from hoof_env.envs.policies import start_of
 from hoof_env.errors import ParameterError, check_number, count
@@ -47,12 +48,6 @@ from hoof_env.tasks.horse import HIP_HEIGHT
 from hoof_env.tasks.horse_gaits import PAIRS, kinematic_speeds
 
 ENV_ID = "hoof_env/Horse-v0"
-TROT = 0.05  # largest lag of a trot or a pace [strides]
-
-MAX_FALLS = 0.10  # share of episodes; survivors of more falls are a biased sample
-MAX_ERROR = 0.15  # largest difference from the commanded speed, over that [-]
-MAX_SLIP = 0.10  # largest slip of a stance [m]
-TURNS = (0.95, 1.05)  # stances a turn
 NEAR = 0.1  # largest difference between the Froude numbers reached and of the horse
 WALK = (
     "lag",
@@ -81,28 +76,6 @@ class Args:
     """arguments of the environment: key=value ..., or one JSON object"""
     out: Path = Path("runs/judge")
     """folder for figures.json, table.md, forces.png, footfall.png and speeds.png"""
-
-
-# When figures count: the policy stays up, keeps its speed and does not slip, and hooves land once a turn
-
-
-def rejection_reason(figures: dict[str, Any], pairs: Sequence[str]) -> str:
-    """Return why the figures of these pairs of legs do not count at any speed; an empty text if they do."""
-    reasons = []
-    if figures["fell"] > MAX_FALLS:
-        reasons.append(f"fell in {100 * figures['fell']:.3g} % of episodes")
-    # Written so that NaN is a reason, too
-    speed_ratio = figures["reached"] / figures["speed"]
-    if not abs(speed_ratio - 1) <= MAX_ERROR:
-        reasons.append(f"{speed_ratio:.2f} of the commanded speed")
-    for pair in pairs:
-        slip = figures[f"slip_{pair}"]
-        stances = figures[f"stances_per_turn_{pair}"]
-        if not slip < MAX_SLIP:
-            reasons.append(f"{pair} hooves slip {slip:.2f} m")
-        if not TURNS[0] <= stances <= TURNS[1]:
-            reasons.append(f"{stances:.2f} {pair} stances a turn")
-    return ", ".join(reasons)
 
 
 def distance(figures: dict[str, Any], froude: float) -> float:

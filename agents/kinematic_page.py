@@ -18,12 +18,12 @@ from tyro.conf import Positional
 
 from agents import runs
 from agents.command import parse, run
+from agents.gait_costs import peaked
 from agents.gait_figures import play
 from agents.horse_gaits import speed_of
 from agents.judge import ENV_ID, verdicts
 from agents.judge_pictures import draw
 from agents.judges import searched_bars
-from agents.kinematic_gaits import peaked
 from hoof_env._output import markdown_table
 from hoof_env.envs.policies import make_policy
 from hoof_env.errors import DataFileError, count, parse_json

@@ -26,7 +26,7 @@ from agents.judges import nearest_of, read_judges
 from hoof_env._output import markdown_table
 from hoof_env.constants import GRAVITY
 from hoof_env.lab.compare import Comparison, compare
-from hoof_env.lab.picture import draw
+from hoof_env.lab.picture import draw, warnings_of
 from hoof_env.lab.read import read_record
 from hoof_env.records import export_episode
 from hoof_env.tasks.horse import HIP_HEIGHT, MASS
@@ -65,7 +65,12 @@ left limbs stand for both.
 
 {pictures}
 
-The same by hand, with the files that the command leaves in `{folder}`:
+## Warnings of the comparison
+
+{warnings}
+
+The same by hand, with the files that the command leaves in `{folder}`, without the first {warm:g} s of each
+episode:
 
 ```bash
 {commands}
@@ -146,6 +151,14 @@ def write_published(path: Path, time: Floats, forces: dict[str, Floats]) -> None
     runs.write_text(path, "\n".join(lines) + "\n")
 
 
+def leave_out_beginning(path: Path) -> None:
+    """Leave the first `WARM` seconds of a record out of its file: the first strides depend on the start, and
+    whoever compares the file is to find the same."""
+    head, *rows = path.read_text(encoding="utf-8").splitlines()
+    kept = [row for row in rows if float(row.partition(",")[0]) >= WARM]
+    runs.write_text(path, "\n".join([head, *kept]) + "\n")
+
+
 def compared(kind: str, folder: Path) -> tuple[Comparison, float]:
     """Write and compare both records of a gait; return the comparison, and the share of the weight that the
     horse's forces bear."""
@@ -154,13 +167,8 @@ def compared(kind: str, folder: Path) -> tuple[Comparison, float]:
     horse, gait = folder / f"published-{kind}.csv", folder / f"{name}.csv"
     write_published(horse, time, forces)
     export_episode(gait, name, ENV_ID, seconds=SECONDS)
-    a = read_record(horse, mass=MASS)
-    b = read_record(gait, mass=MASS)
-    # The first strides depend on the start
-    kept = b.time >= WARM
-    b.time = b.time[kept]
-    b.limbs = {limb: force[kept] for limb, force in b.limbs.items()}
-    return compare(a, b, units="BW"), share
+    leave_out_beginning(gait)
+    return compare(read_record(horse, mass=MASS), read_record(gait, mass=MASS), units="BW"), share
 
 
 def rows_of(kind: str, found: Comparison) -> list[list[str]]:
@@ -240,7 +248,10 @@ def write(args: Args) -> None:
             f"![The {kind}: published forces of a horse (A) and the model's (B)]({NAME}/{kind}.png)"
             for kind in of_gaits
         ),
+        warnings="\n".join(f"* {kind}: {text}" for kind, one in of_gaits.items() for text in warnings_of(one))
+        or "None.",
         folder=args.records,
+        warm=WARM,
         commands="\n".join(
             f"hoof-env compare {a} {b} --mass-a {MASS:g} --mass-b {MASS:g} --units BW --out {kind}.png"
             for kind, (a, b) in names.items()

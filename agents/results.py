@@ -210,7 +210,7 @@ def check_policy(kind: str, policy: str, env_id: str) -> None:
     """Raise `DataFileError` unless a row may have a policy, which runs no code of a file and imports nothing:
     a name of the id's, a gait, or a folder with plain data alone."""
     with runs.make_env(env_id) as env:
-        names = [kind] if kind in ("zero", "shipped") else names_of(env)
+        names = [kind] if kind in ("zero", "shipped") else names_of(env, env_id)
     place = ROOT / policy
     is_plain = (place / ABOUT).is_file() and (place / WEIGHTS).is_file() and not (place / FILE).exists()
     is_file = kind not in ("zero", "run", "shipped") and ".." not in Path(policy).parts

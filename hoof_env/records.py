@@ -9,6 +9,7 @@ from __future__ import annotations
 import json
 import sys
 import time
+import warnings
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import asdict
 from pathlib import Path
@@ -37,7 +38,7 @@ from hoof_env.lab.forces import THRESHOLD, above_threshold, in_units, limbs_of, 
 from hoof_env.lab.forces import UNITS as FORCE_UNITS
 from hoof_env.lab.opensim import check_bodies, loads_path, write_mot
 from hoof_env.lab.reactions import JointReactions, reaction_units
-from hoof_env.policies.actor import Actor
+from hoof_env.policies.actor import Actor, lost_command
 from hoof_env.policies.find import default_policy as default_policy
 from hoof_env.policies.find import find_policy as find_policy
 from hoof_env.record.columns import RECORD, Columns, body_units, joined
@@ -106,7 +107,10 @@ def episode(
     if seconds is not None:
         check_number("seconds", seconds, low=0, exclusive_low=True)
     actor = Actor(policy, env, seed)
-    observation, _ = env.reset(seed=seed, options=actor.start | dict(options or {}))
+    start = actor.start | dict(options or {})
+    if "target_speed" not in (options or {}) and (lost := lost_command(start, env)):
+        warnings.warn(f"policy: plays with its own {lost}", stacklevel=2)
+    observation, _ = env.reset(seed=seed, options=start)
     columns = substeps(env)
     yield columns | (_named(env, joints.now()) if joints else {})
     ended = False

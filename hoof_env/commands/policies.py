@@ -103,7 +103,7 @@ def list_ids(env_id: str | None = None) -> None:
     from hoof_env.envs.make_env import make_env
 
     with make_env(env_id) as env:
-        say(f"    policies: {', '.join(names_of(env))}")
+        say(f"    policies: {', '.join(names_of(env, env_id))}")
 
 
 def demo(out: Path = Path("hoof-env-demo"), quick: bool = False, overwrite: bool = False) -> None:

@@ -45,6 +45,31 @@ _KEPT: list[Any] = []
 """Words of all environments, which a handle may name after they are gone."""
 
 
+def numbers_of(asarray: Callable[[Any], Any], value: Any, shape: tuple[int, ...], wanted: str) -> Any:
+    """Return real numbers as an array, also while JAX traces them.
+
+    Args:
+        asarray: function that makes an array, such as `jax.numpy.asarray`.
+        value: array, nested list, scalars that are traced, or anything else.
+        shape: shape of the array.
+        wanted: begin of the message, which says what was expected.
+
+    Raises:
+        ParameterError: another shape, or other objects than real numbers.
+    """
+    try:
+        array = asarray(value)
+    # Each library of tensors has its own errors
+    except Exception as error:
+        reason = str(error).partition("\n")[0]
+        raise ParameterError(f"{wanted}, got {brief(value)}, which is no array ({brief(reason)})") from None
+    # V: halves, such as bfloat16. A key of JAX's has a type of its own, without a kind.
+    kind = getattr(array.dtype, "kind", "")
+    if array.shape != shape or kind not in tuple("fiuV"):
+        raise ParameterError(f"{wanted}, got {array.dtype} of shape {array.shape}")
+    return array
+
+
 class States(NamedTuple):
     """Results of a step, as of EnvPool's.
 
@@ -264,14 +289,9 @@ class XlaSteps:
                 raise ParameterError(
                     f"env_id: expected None, as all environments step together, got {env_id!r}"
                 )
-            actions = actions if hasattr(actions, "dtype") else np.asarray(actions)
-            kind = jnp.result_type(actions) if actions.dtype != object else actions.dtype
-            if jnp.shape(actions) != shape or kind.kind not in "fiuV":  # V: halves, such as bfloat16
-                raise ParameterError(
-                    f"actions: expected finite numbers in [-1, 1], shape {shape}, got {kind} of shape"
-                    f" {jnp.shape(actions)}"
-                )
-            return checked_handle(handle), jnp.asarray(actions, np.float32)
+            wanted = f"actions: expected finite numbers in [-1, 1], shape {shape}"
+            array = numbers_of(jnp.asarray, actions, shape, wanted)
+            return checked_handle(handle), jnp.asarray(array, np.float32)
 
         receives, sends, steps = (_plain(call, has_results) for has_results in (True, False, True))
 

@@ -36,7 +36,7 @@ from hoof_env.episodes.step import (
     StepKernels,
     step_kernels,
 )
-from hoof_env.errors import ParameterError
+from hoof_env.errors import ParameterError, brief
 from hoof_env.simd.compile import Kernel
 from hoof_env.simd.memory import Held
 from hoof_env.simd.threads import run_together
@@ -68,6 +68,13 @@ class Calls:
     blocks: list[tuple[Held]]
 
 
+OF_LEG = ("preset", "hip_height", "hoof_length")
+"""Settings of the leg's shape, with which a task's own reset options may not fit."""
+
+OF_POSTURE = ("gait", "crank_angle", "height")
+"""Reset options that depend on the leg's shape."""
+
+
 class EpisodeBatch:
     """`num_envs` episodes of a task.
 
@@ -83,6 +90,7 @@ class EpisodeBatch:
         measurements: places of the values in the engine's memory that infos contain.
         is_push_unseen: True if a trunk was pushed since the last step, which no observation shows yet.
         unpushed: measurements at the end of the last step, by row, of rows that were due to be pushed.
+        usual_start: reset options of every episode, checked, which those of a call replace.
 
     Args:
         task: task of all episodes.
@@ -117,7 +125,8 @@ class EpisodeBatch:
         self.measurements = InfoLayout(self.engine.features, tuple(self.plan.body.hips))
         self.is_push_unseen = False
         self.unpushed: dict[int, Floats] = {}
-        self._usual_start = self._checked_start()
+        self.usual_start: dict[str, Any] = {}
+        self.usual_start = self._checked_start()
         self._kernels: dict[TaskKind, StepKernels] = {}
         self._calls: dict[Plan, Calls] = {}
         self._open()
@@ -285,6 +294,8 @@ class EpisodeBatch:
         if "pushes" in checked:
             checked["pushes"] = plan.pushes.check_option(checked["pushes"])
         plan.randomization.check(checked.get("parameters", {}), self.engine.substeps)
+        if "gait" in checked or "crank_angle" in checked:
+            self._check_raised({**self.usual_start, **checked})
         return checked
 
     def reset(
@@ -315,31 +326,65 @@ class EpisodeBatch:
 
     def _checked_start(self) -> dict[str, Any]:
         """Return the task's own reset options, in the form that `_start` takes, but for those that a setting
-        replaces: a gait, or a kind of trunk that keeps its height or stands still.
+        replaces: a gait; a kind of trunk that keeps its height or stands still; or a leg that cannot have
+        them, which starts as on an id without such options.
 
         Raises:
             ParameterError: an option that this body, trunk or leg cannot have.
         """
         settings, start = self.plan.asked, dict(self.task.start)
+        meant = self.task.start_for or self.task.settings({})
         if settings.gait is not None:
             start.pop("gait", None)
-        if settings.trunk != self.task.settings({}).trunk:
+        if settings.trunk != meant.trunk:
             held = {"fixed": ("height", "speed"), "rail": ("height",)}
             for name in held.get(settings.trunk, ()):
                 start.pop(name, None)
+        has_other_leg = any(getattr(settings, name) != getattr(meant, name) for name in OF_LEG)
         try:
-            checked = self._check_options(start)
-            if isinstance(checked.get("height"), tuple):
-                checked["height"] = UsualRange(checked["height"])
+            if has_other_leg and not self._can_start(start):
+                for name in OF_POSTURE:
+                    start.pop(name, None)
+            checked = self._check_usual(start)
+            self._check_raised(checked)
             return checked
         except ParameterError as error:
             raise ParameterError(f"{self.task.id}: start: {error}") from None
+
+    def _check_usual(self, start: Mapping[str, Any]) -> dict[str, Any]:
+        """Check reset options of a task's own; return them in the form that `_start` takes."""
+        checked = self._check_options(start)
+        if isinstance(checked.get("height"), tuple):
+            checked["height"] = UsualRange(checked["height"])
+        return checked
+
+    def _can_start(self, start: Mapping[str, Any]) -> bool:
+        """Return True if this leg can start with a task's own reset options at all of their crank angles."""
+        try:
+            checked = self._check_usual(start)
+        except ParameterError:
+            return False
+        return self.plan.body.raised_share(checked, self.engine.trunk) == 1.0
+
+    def _check_raised(self, options: Mapping[str, Any]) -> None:
+        """Check that episodes can start with options, their trunk raised until no hoof is in level ground.
+
+        Raises:
+            ParameterError: the trunk would be too high at all of the crank angles.
+        """
+        if self.plan.body.raised_share(options, self.engine.trunk) == 0.0:
+            given = {name: options[name] for name in ("gait", "crank_angle") if name in options}
+            raise ParameterError(
+                "options: expected a gait and a crank_angle in which the hoof is so little below O that an"
+                " episode starts above the ground and below a height of"
+                f" {float(self.plan.record['highest'][0]):.4g} m, where it fails, got {brief(given)}"
+            )
 
     def _start(self, which: Index, generators: Generators, options: Mapping[str, Any]) -> dict[str, Floats]:
         """Start episodes under the present plan; see `reset`. A seed's meaning includes the order of the
         draws from its generator."""
         plan, rows, engine = self.plan, self.rows, self.engine
-        options = {**self._usual_start, **options}
+        options = {**self.usual_start, **options}
         self.unpushed = {env: values for env, values in self.unpushed.items() if env not in which}
         rows.steps_before[which] += rows.named.steps[which]
         drawn = self._draw_parameters(which, generators, options.get("parameters", {}))
@@ -538,7 +583,8 @@ class EpisodeBatch:
 
     def measured(self) -> dict[str, Floats]:
         """Return the observation, true and before scaling: entries by name, shape (num_envs,) each."""
-        names = [entry.name for entry in self.plan.observed.entries]
+        # The present frame has the first columns
+        names = self.plan.observation_names[: len(self.plan.observed.entries)]
         out = np.zeros((len(names), self.num_envs))
         if self.row_plans.differ:
             # The kernel measures all rows; only rows under the present plan are right.

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields
 from functools import cached_property
 from typing import Any
@@ -109,20 +109,23 @@ class Observed:
         parts = [part for entry in (*self.entries, *self.true_entries) for part in functions_of(entry)]
         return any(map(is_from_outside, parts))
 
-    def names(self, history: int, last_actions: int, actions: Sequence[str]) -> tuple[str, ...]:
+    def names(
+        self, history: int, last_actions: int, actions: Sequence[str], renamed: Mapping[str, str]
+    ) -> tuple[str, ...]:
         """Return the names of the observation's columns.
 
         Args:
             history: number of frames that are observed.
             last_actions: number of actions that are observed.
             actions: names of the actions.
+            renamed: names of entries that measure another quantity than their name says; see `body.Body`.
         """
-        frame = [entry.name for entry in self.entries]
+        frame = [renamed.get(entry.name, entry.name) for entry in self.entries]
         return (
             *frame,
             *(f"{name}, {_ago(k)}" for k in range(1, history) for name in frame),
             *(f"action {_ago(k)}: {name}" for k in range(1, last_actions + 1) for name in actions),
-            *(f"true {entry.name}" for entry in self.true_entries),
+            *(f"true {renamed.get(entry.name, entry.name)}" for entry in self.true_entries),
         )
 
     def fill(self, record: Any, slots: Sequence[int], size: int) -> dict[int, str]:

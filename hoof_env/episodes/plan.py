@@ -122,7 +122,9 @@ class Plan:
     @cached_property
     def observation_names(self) -> tuple[str, ...]:
         """Names of the observation's columns."""
-        return self.observed.names(self.delays.history, self.delays.last_actions, self.action_names)
+        return self.observed.names(
+            self.delays.history, self.delays.last_actions, self.action_names, self.body.renamed
+        )
 
     @property
     def legs(self) -> int:

@@ -24,6 +24,7 @@ from hoof_env._input import as_path
 from hoof_env._output import markdown_table, staged
 from hoof_env._version import __version__
 from hoof_env.envs.make_env import make_env
+from hoof_env.envs.policies import start_of
 from hoof_env.errors import DataFileError, ParameterError, count
 from hoof_env.evaluation.episodes import FINAL_SEEDS, play, score_vector
 from hoof_env.evaluation.statistics import (
@@ -38,6 +39,7 @@ from hoof_env.evaluation.statistics import (
     over_seeds,
     transport,
 )
+from hoof_env.policies.actor import lost_command
 from hoof_env.policies.find import find_policy, is_function, is_model, read_policy_record
 from hoof_env.policies.record import environment_of
 
@@ -151,7 +153,7 @@ def evaluate(
         # All are found before the first is played.
         found = {name: find(name, env, known) for name in policies}
         for name, policy in found.items():
-            _tell_of_own_command(name, policy, published)
+            _tell_of_own_command(name, policy, env, published)
         tell = _Progress(len(found) * len(seeds))
         scores = []
         for name, policy in found.items():
@@ -167,19 +169,22 @@ def evaluate(
     return Evaluation(known, arguments, seeds, scores)
 
 
-def _tell_of_own_command(name: str, policy: Any, published: bool) -> None:
-    """Warn of a policy that starts with a commanded speed of its own: its episodes are not the others'.
+def _tell_of_own_command(name: str, policy: Any, env: gym.Env[Any, Any], published: bool) -> None:
+    """Warn of a policy whose episodes start with a commanded speed in place of the one that was asked for.
 
     Raises:
-        ParameterError: the episodes of the published tables are asked for.
+        ParameterError: a policy has a commanded speed of its own, and the episodes of the published tables,
+            with the task's commands, are asked for.
     """
-    speed = (getattr(policy, "start", None) or {}).get("target_speed")
-    if speed is None:
-        return
-    text = f"policy {name}: plays at its own commanded speed, {float(speed):.2f} m/s, and not at the task's"
-    if published:
-        raise ParameterError(f"{text}: expected a policy for the task's commands in the published episodes")
-    warnings.warn(f"{text}: do not compare its return with other policies'", stacklevel=3)
+    start = start_of(policy)
+    speed = start.get("target_speed")
+    if published and speed is not None:
+        raise ParameterError(
+            f"policy {name}: expected one for the task's commands in the published episodes, got one that"
+            f" starts with its own, {float(speed):.2f} m/s"
+        )
+    if lost := lost_command(start, env):
+        warnings.warn(f"policy {name}: plays with its own {lost}", stacklevel=3)
 
 
 def _seeds(episodes: int | None, seed: int | None, published: bool) -> range:

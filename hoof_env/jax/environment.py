@@ -13,6 +13,7 @@ from gymnasium.utils import seeding
 from hoof_env.dynamics.advance import ONE_BY_ONE
 from hoof_env.dynamics.layout import engine_layout
 from hoof_env.envs.manual import MULTI_OBJECTIVE, task_of_id
+from hoof_env.envs.xla import numbers_of
 from hoof_env.episodes.batch import EpisodeBatch
 from hoof_env.episodes.observation_kernel import Observer
 from hoof_env.episodes.scene import Scene, TaskKind
@@ -274,11 +275,9 @@ class JaxEnv:
     def _advance(self, state: State, action: Any) -> Any:
         """Return state, reward, terms and terms with a weight of 1 after the kernel of a step."""
         task, kind = self._task, self._kind
-        if jnp.shape(action) != (self.num_actions,):
-            raise ParameterError(
-                f"action: expected shape ({self.num_actions},), got {jnp.shape(action)}; jax.vmap takes many"
-            )
-        taken = jnp.asarray(action, kind)
+        shape = (self.num_actions,)
+        wanted = f"action: expected numbers in [-1, 1], shape {shape}, of which jax.vmap takes many"
+        taken = jnp.asarray(numbers_of(jnp.asarray, action, shape, wanted), kind)
         cells = {
             "data": _cells(state.engine),
             "episode": self._episode_cells(state.episode),

@@ -46,6 +46,12 @@ def report(found: Comparison) -> str:
         for text in of_model(record.limbs, record.time)
     ]
     lines += ["", *remarks] if remarks else []
+    return "\n".join([*lines, *(f"warning: {text}" for text in warnings_of(found))])
+
+
+def warnings_of(found: Comparison) -> list[str]:
+    """Return warnings of the records, of limbs that are left out, of doubtful stances, and of fore-aft forces
+    in opposite directions, with the remedy."""
     # A record that is compared with itself shows its warnings once, with the options of both.
     same = (found.a.name, found.a.notes) == (found.b.name, found.b.notes)
     warnings = [f"{found.a.name}: {note if same else for_one(note, '-a')}" for note in found.a.notes]
@@ -54,7 +60,7 @@ def report(found: Comparison) -> str:
     for limb, errors in found.limbs.items():
         if "fore-aft" in errors.forces and errors.forces["fore-aft"].r < -0.5:
             warnings.append(f"{limb}: fore-aft forces point opposite ways; {_why_opposite(found, limb)}")
-    return "\n".join([*lines, *(f"warning: {text}" for text in warnings)])
+    return warnings
 
 
 def _alone(found: Comparison) -> list[str]:

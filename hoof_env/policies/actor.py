@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import inspect
+from collections.abc import Mapping
 from typing import Any
 
 import gymnasium as gym
@@ -12,6 +13,7 @@ from numpy.typing import NDArray
 from hoof_env.envs.policies import start_of
 from hoof_env.errors import ParameterError, brief
 from hoof_env.policies.find import load_policy
+from hoof_env.tasks.schedules import SPEED
 
 
 class Actor:
@@ -68,6 +70,28 @@ class Actor:
     def restart(self, rows: NDArray[np.bool_]) -> None:
         """Say which rows, shape (n,), begin a new episode with their next observation."""
         self._begins = np.array(rows, bool)
+
+
+def lost_command(start: Mapping[str, Any], env: gym.Env[Any, Any]) -> str:
+    """Return in words that reset options have a commanded speed in place of one that was asked for when the
+    environment was made; "" if it replaces none.
+
+    Args:
+        start: reset options.
+        env: environment, wrapped or not.
+    """
+    speed = start.get("target_speed")
+    leg: Any = env.unwrapped
+    if speed is None or not hasattr(leg, "task"):
+        return ""
+    asked = leg.settings
+    usual = leg.task.settings({"size": asked.size})
+    given = [
+        f"{name}={brief(value)}"
+        for name, value in (("target_speed", asked.target_speed), ("schedule", asked.schedule))
+        if value != getattr(usual, name) and value != speed and (name != "schedule" or SPEED in (value or {}))
+    ]
+    return f"commanded speed {float(speed):.2f} m/s, in place of {' and '.join(given)}" if given else ""
 
 
 def _check_signature(policy: Any) -> None:

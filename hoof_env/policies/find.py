@@ -7,6 +7,7 @@ import sys
 import traceback
 import warnings
 from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import dataclass
 from importlib import import_module
 from pathlib import Path
@@ -17,7 +18,7 @@ import numpy as np
 
 from hoof_env._input import as_path
 from hoof_env.envs.base import array_of
-from hoof_env.envs.open_loop import load_open_loop, open_loop_record
+from hoof_env.envs.open_loop import gait_file, load_open_loop, open_loop_record
 from hoof_env.envs.policies import constant_gait, make_policy, policy_names
 from hoof_env.errors import DataFileError, MissingExtraError, ParameterError, brief, count
 from hoof_env.gait import PARAMETERS, GaitParameters
@@ -188,16 +189,27 @@ def policy_of(policy: Any, env: gym.Env[Any, Any] | None) -> Any:
 # -- all policies ------------------------------------------------------------------------------
 
 
-def names_of(env: gym.Env[Any, Any]) -> list[str]:
-    """Return the names of the policies of an environment of this package."""
-    is_leg = env.unwrapped.action_form == "rates"  # type: ignore[attr-defined]
-    return [*policy_names(env), "open-loop", *(["constant"] if is_leg else []), "shipped"]
+def stored_names(env_id: str) -> list[str]:
+    """Return the names of the policies that the package has for an id in files: the best gait, the best gait
+    that is held, and the trained policy."""
+    own = own_id(env_id)
+    found = []
+    for name, family in (("open-loop", None), ("constant", "constant")):
+        with suppress(DataFileError):
+            gait_file(own, family)
+            found.append(name)
+    return [*found, "shipped"] if own in shipped_ids() else found
+
+
+def names_of(env: gym.Env[Any, Any], env_id: str) -> list[str]:
+    """Return the names of the policies of an environment of this package, which has an id."""
+    return [*policy_names(env), *stored_names(env_id)]
 
 
 def default_policy(env: gym.Env[Any, Any]) -> str:
     """Return the name of the policy to play if none is named: zero actions where the task starts in a gait of
     its own, else the horse's reference, the run, or the first gait of a preset without one."""
-    if "gait" in env.unwrapped.task.start:  # type: ignore[attr-defined]
+    if "gait" in env.unwrapped.batch.usual_start:  # type: ignore[attr-defined]
         return "zero"
     names = policy_names(env)
     return next((name for name in ("reference", "run") if name in names), names[0])
@@ -245,7 +257,7 @@ def find_policy(name: str | None, env: gym.Env[Any, Any], env_id: str, seed: int
     if len(numbers) == len(PARAMETERS):
         return constant_gait(GaitParameters(*numbers), env, starts_in_it=True)
     raise ParameterError(
-        f"policy: expected a name ({', '.join(names_of(env))}), four gait parameters as "
+        f"policy: expected a name ({', '.join(names_of(env, env_id))}), four gait parameters as "
         f"6.28,0.7,-0.2,-0.3, module:function, or the path of a trained model or a gait's .json, got"
         f" {brief(name)}"
     )

@@ -63,6 +63,8 @@ class Body(Protocol):
         command_step: largest change from one commanded speed to the next [m/s].
         start_names, gait_names: names of the numbers with which infos describe an episode's start.
         action_names: names of the actions, leg after leg.
+        renamed: names of entries of the observation, by the task's names for them, that under the body's
+            settings measure another quantity.
         action_form: tag of the meaning of actions, "rates", or of a horse offsets and their spans.
     """
 
@@ -83,6 +85,7 @@ class Body(Protocol):
     gait_names: tuple[str, ...]
     action_names: tuple[str, ...]
     action_form: str
+    renamed: Mapping[str, str]
 
     @property
     def policy_names(self) -> list[str]:
@@ -106,6 +109,10 @@ class Body(Protocol):
         Raises:
             ParameterError: an unknown option or a bad value.
         """
+
+    def raised_share(self, options: Mapping[str, Any], trunk: Trunk) -> float:
+        """Return at what share of the crank angles of checked options a start that is raised out of level
+        ground is below the height at which an episode fails [-]."""
 
     def draw(
         self, options: Mapping[str, Any], generators: Sequence[np.random.Generator], engine: TrunkEngine

@@ -54,6 +54,7 @@ from hoof_env.tasks.horse_gaits import (
     horse_gaits,
     kinematic_phases,
     kinematic_speeds,
+    offset_name,
     rates,
     refer_to_target,
     reference_constants,
@@ -211,6 +212,12 @@ class Horse:
         self.is_free = footfall == "free"
         names = ("phase", *PARAMETERS[1:]) if self.is_free else PARAMETERS
         self.action_names: tuple[str, ...] = tuple(f"{leg}_{name}" for leg, name in product(LEGS, names))
+        # The offset of the first action is in what that action moves
+        self.renamed: Mapping[str, str] = {
+            offset_name(leg, old): offset_name(leg, new)
+            for leg, (old, new) in product(LEGS, zip(PARAMETERS, names, strict=True))
+            if old != new
+        }
         # The spans are in the tag, so that policies, states and datasets with different spans are refused.
         first = f"{PHASE_SPAN:g} strides" if self.is_free else f"{SPANS[0]:g}"
         self.action_form = f"offsets of {first} and {SPANS[1]:g} rad"
@@ -323,6 +330,10 @@ class Horse:
         if checked.get("gait") is not None:
             checked["gait"] = gait_numbers("options['gait']", checked["gait"], self.gaits, self.size)
         return with_parameters(checked, settings)
+
+    def raised_share(self, options: Mapping[str, Any], trunk: Trunk) -> float:
+        """Return 1: a horse stands in its gait, and no height ends its episodes."""
+        return 1.0
 
     def draw(
         self, options: Mapping[str, Any], generators: Sequence[np.random.Generator], engine: TrunkEngine

@@ -382,6 +382,11 @@ def commands_of(gaits: Floats, theta: Floats, count: int) -> Floats:
     return np.concatenate([speed[:, None], pairs[:, 2 : count + 1]], axis=1)
 
 
+def offset_name(leg: str, action: str) -> str:
+    """Return the name of the observed offset of a leg's action."""
+    return f"offset: {leg}, {action}".replace("_", " ")
+
+
 # In the kernels
 
 FOLLOWED = 0.1

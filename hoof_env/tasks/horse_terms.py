@@ -13,7 +13,7 @@ from hoof_env.gait import PARAMETERS, WIDEST
 from hoof_env.ground.terrain import surface
 from hoof_env.simd import Lanes, Number, absolute, block_at, maximum, minimum, where
 from hoof_env.simd.math import cos_sin
-from hoof_env.tasks.horse_gaits import LEGS
+from hoof_env.tasks.horse_gaits import LEGS, offset_name
 from hoof_env.tasks.observation import (
     CONTEXT_ENTRIES,
     LOAD,
@@ -115,9 +115,7 @@ _PER_LEG: tuple[tuple[str, str, str, Callable[[Any, Any], Any], Scale], ...] = (
     ("running peak force", "hoof", "N", lambda leg, scene: leg.strides.running_peak, IN_WEIGHTS),
 )
 
-OFFSETS = tuple(
-    f"offset: {leg.replace('_', ' ')}, {name.replace('_', ' ')}" for leg in LEGS for name in PARAMETERS
-)
+OFFSETS = tuple(offset_name(leg, name) for leg in LEGS for name in PARAMETERS)
 """Names of the offsets, in the order of the actions."""
 
 HORSE_ENTRIES = (

@@ -61,6 +61,7 @@ REACH = 1.0
 distance from O, forward and back, at which a hoof can touch down [m]."""
 
 MAX_TRIES = 100  # draws of a crank angle until the hoof is above the ground
+ANGLES = 72  # crank angles at which a start is looked at before it is drawn
 
 
 @dataclass
@@ -125,8 +126,9 @@ def draw_starts(
     """Draw random starts, one for each generator. Options set values, or ranges to draw from (see
     `check_options`).
 
-    No episode starts with a hoof inside the ground: a trunk that moves up and down starts higher instead, and
-    under any other trunk the crank angle is drawn again. Heights of reset options are taken as they are.
+    No episode starts with a hoof inside the ground: a trunk that moves up and down starts higher instead. The
+    crank angle is drawn again under any other trunk, and where the trunk would start so high that the episode
+    fails. Heights of reset options are taken as they are.
 
     Args:
         options: checked reset options.
@@ -163,19 +165,46 @@ def draw_starts(
         ground = highest(terrain, x, REACH)
     # Ground as high as this touches a hoof point's sole.
     ground = ground + hoof_length
-    if trunk.kind in RISING:
-        if "height" not in options or isinstance(options["height"], UsualRange):
-            height = np.maximum(height, ground - hoof_height(profile, chosen, theta))
-    elif isinstance(turn, tuple):
+    is_raised = trunk.kind in RISING and is_free_height(options)
+    if is_raised or (trunk.kind not in RISING and isinstance(turn, tuple)):
+        most = np.full(n, MAX_HEIGHT * trunk.height) if is_raised else height
+        hoof = hoof_height(profile, chosen, theta)
         # Only rows with a hoof inside the ground draw again, so that neighbours do not change a row's bits.
-        for _ in range(MAX_TRIES):
-            below = np.flatnonzero(height + hoof_height(profile, chosen, theta) < ground)
+        for _ in range(MAX_TRIES if isinstance(turn, tuple) else 0):
+            below = np.flatnonzero(most + hoof < ground)
             if not below.size:
                 break
             theta[below] = _between(turn, np.array([generators[int(k)].random() for k in below]))
+            hoof = hoof_height(profile, chosen, theta)
+        if is_raised:
+            height = np.maximum(height, ground - hoof)
     values = {"crank_angle": theta, "speed": speed, "height": height, "x": x}
     trunk_at = {"x": x, "y": height, "vx": speed}
     return Start(values, chosen, chosen.T[None], theta[None], trunk_at)
+
+
+def is_free_height(options: Mapping[str, Any]) -> bool:
+    """Return True if a trunk may start higher than options say: they set no height, or it is a task's own."""
+    return "height" not in options or isinstance(options["height"], UsualRange)
+
+
+def raised_share(
+    options: Mapping[str, Any],
+    profile: LegProfile,
+    trunk: Trunk,
+    gaits: Sequence[GaitParameters],
+    hoof_length: float,
+) -> float:
+    """Return at what share of the crank angles of reset options a start that is raised out of level ground is
+    below the height at which an episode fails, in that of some gaits in which it is least [-]."""
+    low, high = np.broadcast_to(options.get("crank_angle", (0.0, 2 * np.pi)), 2)
+    theta = np.linspace(low, min(high, low + 2 * np.pi), ANGLES)
+    most = MAX_HEIGHT * trunk.height - hoof_length
+    shares = [
+        np.mean(most + hoof_height(profile, np.tile(gait.to_array(), (ANGLES, 1)), theta) > 0.0)
+        for gait in gaits
+    ]
+    return float(min(shares))
 
 
 def _between(value: float | tuple[float, float], share: Floats) -> Floats:

@@ -22,17 +22,29 @@ from hoof_env.gait import (
     gait_names,
     limits_of,
     load_gait,
+    paper_gaits,
     speed_scale_of,
 )
 from hoof_env.ground.contact import Ground, load_ground
 from hoof_env.leg.geometry import load_geometry
 from hoof_env.leg.presets import preset_error_type, preset_label
+from hoof_env.leg.profile import leg_profile
 from hoof_env.record.surroundings import ONE_HIP, Hips
 from hoof_env.simd import Mask, Pointer, Whole, maximum, minimum, read
 from hoof_env.simd.math import clip
 from hoof_env.tasks.body import BodyKernels
 from hoof_env.tasks.episode import ACTIONS, Episode
-from hoof_env.tasks.leg_starts import MAX_HEIGHT, MIN_HEIGHT, OPTIONS, Start, check_options, draw_starts
+from hoof_env.tasks.leg_starts import (
+    MAX_HEIGHT,
+    MIN_HEIGHT,
+    OPTIONS,
+    RISING,
+    Start,
+    check_options,
+    draw_starts,
+    is_free_height,
+    raised_share,
+)
 from hoof_env.tasks.parameters import check_range, drive_of, ground_of, hoof_spring
 from hoof_env.tasks.settings import ResolvedSettings, Settings
 
@@ -196,6 +208,7 @@ class OneLeg:
     action_names: tuple[str, ...] = tuple(f"rate_of_{name}" for name in PARAMETERS)
     action_form = "rates"
     policy_starts: Mapping[str, dict[str, Any]] = MappingProxyType({})
+    renamed: Mapping[str, str] = MappingProxyType({})
     hips: Hips = ONE_HIP
     picture = "leg"
     step_error = 0.01
@@ -228,7 +241,8 @@ class OneLeg:
         self._spring = hoof_spring(s)
         self.limits = Limits((-PITCH, PITCH)) if s.trunk == "floating" else None
         self.rates = check_rates(s, self.speed_scale)
-        nominal = self.geometry.hip_height + (self._spring.length if self._spring else 0.0)
+        self._length = self._spring.length if self._spring else 0.0
+        nominal = self.geometry.hip_height + self._length
         height = nominal if s.hip_height is None else s.hip_height
         self.height = check_number("hip_height", height, low=MIN_HEIGHT * nominal, high=MAX_HEIGHT * nominal)
 
@@ -308,6 +322,14 @@ class OneLeg:
             self.check_reachable("options['gait']", checked["gait"].to_array())
         return checked
 
+    def raised_share(self, options: Mapping[str, Any], trunk: Trunk) -> float:
+        """Return at what share of the crank angles an episode can start; see `Body.raised_share`."""
+        if trunk.kind not in RISING or not is_free_height(options):
+            return 1.0
+        fixed = options.get("gait") or self.gait
+        gaits = [fixed] if fixed else [*paper_gaits(self.gaits).values()]
+        return raised_share(options, leg_profile(self.geometry), trunk, gaits, self._length)
+
     def draw(
         self, options: Mapping[str, Any], generators: Sequence[np.random.Generator], engine: TrunkEngine
     ) -> Start:
@@ -320,7 +342,7 @@ class OneLeg:
             self.gaits,
             engine.terrain,
             self.gait,
-            self._spring.length if self._spring else 0.0,
+            self._length,
         )
 
     def complete_start(self, start: Start, targets: Floats, options: Any, engine: TrunkEngine) -> None:

@@ -57,6 +57,7 @@ class Task:
         contact_law: user's law instead of `normal_law`; see `dynamics.hoof.contact_force`.
         action_map: map from the task's actions to the body's.
         module: module that registers the task; worker processes import it.
+        start_for: settings for which `start` was made, if it is another task's; None for the task's own.
     """
 
     name: str
@@ -72,6 +73,7 @@ class Task:
     contact_law: Callable[..., Any] | None = None
     action_map: ActionMap | None = None
     module: str = ""
+    start_for: Settings | None = None
 
     @property
     def id(self) -> str:
@@ -543,7 +545,8 @@ def register(
         contact_law: function of penetration [m], its rate [m/s], inverse approach speed [s/m] and the
             ground's constants, which returns the normal force [N]; see `dynamics.hoof.contact_force`.
         action_map: map from user-defined actions to body actions.
-        start: reset options of every episode, which the options of a call replace; None for the base's.
+        start: reset options of every episode, which the options of a call replace; None for the base's, less
+            those that another trunk or leg than the base's cannot have, see docs/own_task.md.
         defaults: settings, see the manual pages.
 
     Raises:
@@ -583,6 +586,7 @@ def register(
         contact_law=contact_law or old.contact_law,
         action_map=action_map or old.action_map,
         start=old.start if start is None else dict(start),
+        start_for=(old.start_for or old.settings({})) if start is None else None,
     )
     groups = dict.fromkeys((*old.chosen({}).observation, *groups_of(new_entries)))
     settings = _checked(task, {"observation": tuple(groups), **defaults})

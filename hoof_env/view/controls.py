@@ -11,14 +11,11 @@ from typing import Any, NamedTuple
 import gymnasium as gym
 import numpy as np
 
-from hoof_env.envs.open_loop import gait_file
-from hoof_env.envs.policies import policy_names
-from hoof_env.errors import DataFileError, HoofEnvError
+from hoof_env.errors import HoofEnvError
 from hoof_env.gait import PARAMETERS
 from hoof_env.leg.mechanism_list import PAPER
 from hoof_env.paper.rows import load_published
-from hoof_env.policies.find import shipped_ids
-from hoof_env.policies.record import own_id
+from hoof_env.policies.find import names_of
 from hoof_env.tasks.settings import ABOUT, check_effect
 from hoof_env.view.simulation import Simulation, unit_of
 
@@ -198,13 +195,8 @@ def known_ids() -> list[str]:
 
 
 def known_policies(simulation: Simulation) -> list[str]:
-    """Return the policies that the page offers: scripted ones, the best open-loop gait, and the
-    shipped one."""
-    names = policy_names(simulation.env)
-    with suppress(DataFileError):  # an id without a gait
-        gait_file(own_id(simulation.env_id))
-        names = [*names, "open-loop"]
-    return [*names, "shipped"] if own_id(simulation.env_id) in shipped_ids() else names
+    """Return the policies that the page offers: scripted ones, and those that the package has for the id."""
+    return names_of(simulation.env, simulation.env_id)
 
 
 def as_text(arguments: Any) -> str:

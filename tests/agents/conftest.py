@@ -2,6 +2,7 @@
 
 import csv
 import json
+import sys
 from pathlib import Path
 
 import pytest
@@ -11,6 +12,8 @@ from stable_baselines3.common.vec_env import DummyVecEnv, VecNormalize
 from agents.runs import make_env, save_model
 from agents.settings import algorithm_class
 from agents.train import Args, Trained, train
+
+sys.path.append(str(Path(__file__).parent))  # for `foreign`
 
 ENV_ID = "hoof_env/HorseLeg-v0"
 SHORT = ("episode_seconds=0.4",)

@@ -1,10 +1,15 @@
 """The map of gaits over speed: what counts, what is better, where it changes, and that searches go on."""
 
+import json
+import shutil
+
 import numpy as np
 import pytest
+from foreign import CUT, FOREIGN
 
 from agents import gait_change as page
 from agents import gait_map
+from hoof_env.errors import DataFileError, ParameterError
 from hoof_env.tasks.horse_gaits import NAMES, horse_gaits
 
 
@@ -113,7 +118,7 @@ def test_what_counts_less_costs_more():
     assert free <= walk
 
 
-def test_a_search_goes_on_where_it_stopped_and_its_page_is_written(tmp_path, monkeypatch):
+def test_a_search_goes_on_where_it_stopped_and_its_page_is_written(tmp_path, monkeypatch, capsys):
     monkeypatch.setattr(gait_map, "FROUDES", (0.2, 0.8))
     monkeypatch.setattr(page, "FROUDES", (0.2, 0.8))
     monkeypatch.setattr(gait_map, "SECONDS", 2.4)
@@ -122,7 +127,9 @@ def test_a_search_goes_on_where_it_stopped_and_its_page_is_written(tmp_path, mon
     found = gait_map.search_all(path, 1, *tiny)
     assert len(found.rows) == 2 * 3 * len(gait_map.OBJECTIVES)
     text = path.read_text()
+    capsys.readouterr()
     again = gait_map.search_all(path, 1, *tiny)
+    assert capsys.readouterr().out == f"{path}: has 6 of 6 searches\n"
     assert path.read_text() == text
     assert again.rows == found.rows
     # What is left out is found again, to the bit but for the time that it took
@@ -131,6 +138,7 @@ def test_a_search_goes_on_where_it_stopped_and_its_page_is_written(tmp_path, mon
     short.about = found.about
     short.keep(kept)
     whole = gait_map.search_all(tmp_path / "short.json", 1, *tiny)
+    assert "short.json: has 5 of 6 searches\n1 searches to do, about " in capsys.readouterr().out
     anew = [one | {"wall_s": 0} for one in whole.rows if (one["froude"], one["kind"]) == (0.8, "walk")]
     assert anew == [
         one | {"wall_s": 0} for one in found.rows if (one["froude"], one["kind"]) == (0.8, "walk")
@@ -140,3 +148,61 @@ def test_a_search_goes_on_where_it_stopped_and_its_page_is_written(tmp_path, mon
     assert "| 0.8 | trot (" in written
     assert "nan" not in written
     assert (tmp_path / "gait_change" / "map.png").stat().st_size > 5000
+
+
+def file_with(*rows, **changes):
+    """Content of a file with some gaits."""
+    content = {"versions": {"commit": "1"}, "columns": [*rows[0]], "rows": [[*one.values()] for one in rows]}
+    return json.dumps(content | changes)
+
+
+GAITS = row(0.2, "walk", 0.25), row(0.2, "trot", 0.0)
+
+
+@pytest.mark.parametrize(
+    "content",
+    [
+        CUT,
+        *FOREIGN,
+        file_with(*GAITS, columns=["froude"]),
+        file_with(*GAITS, versions=3),
+        file_with(GAITS[0] | {"kind": "gallop"}),
+        file_with(GAITS[0] | {"peak": "high"}),
+        file_with({name: value for name, value in GAITS[0].items() if name != "rate"}),
+        file_with(GAITS[0]),
+    ],
+)
+@pytest.mark.parametrize("search", ["--search", "--no-search"])
+def test_other_files_are_refused_and_left_alone(content, search, tmp_path, monkeypatch, capsys):
+    monkeypatch.setattr(page, "search_all", lambda path, seeds: gait_map.Map(path))
+    path = tmp_path / "found.json"
+    path.write_text(content)
+    with pytest.raises(DataFileError, match=r"found\.json: expected "):
+        page.main([search, "--found", str(path), "--out", str(tmp_path / "out")])
+    assert path.read_text() == content
+    assert not (tmp_path / "out" / "gait_change.md").exists()
+
+
+def test_a_committed_page_is_not_replaced_by_a_page_of_another_file(tmp_path, monkeypatch):
+    monkeypatch.setattr(page, "search_all", lambda *_: pytest.fail("was searched"))
+    before = (page.EVIDENCE / "gait_change.md").read_text()
+    for search in ("--search", "--no-search"):
+        with pytest.raises(ParameterError, match="--found: expected a file that exists, got 'missing'"):
+            page.main([search, "--found", "missing"])
+    path = tmp_path / "found.json"
+    path.write_text(file_with(*GAITS))
+    with pytest.raises(ParameterError, match=r"--out: expected another folder"):
+        page.main(["--no-search", "--found", str(path)])
+    with pytest.raises(DataFileError, match="expected walks and trots of one seed and speed, got 0 gaits"):
+        page.main(["--no-search", "--out", str(tmp_path / "empty")])
+    assert (page.EVIDENCE / "gait_change.md").read_text() == before
+
+
+def test_the_committed_page_is_written_from_the_committed_file(tmp_path, capsys):
+    folder = tmp_path / "gait_change"
+    folder.mkdir()
+    shutil.copy(page.EVIDENCE / "gait_change" / "searches.json", folder)
+    page.main(["--no-search", "--out", str(tmp_path)])
+    lines = [(place / "gait_change.md").read_text().splitlines()[4:] for place in (page.EVIDENCE, tmp_path)]
+    assert lines[0] == lines[1]
+    capsys.readouterr()

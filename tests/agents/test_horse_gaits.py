@@ -9,6 +9,7 @@ import pytest
 
 from agents import horse_gaits
 from agents.horse_gaits import BatchRollout, Search, decode, encode, landings, shipped, slip_at, speed_of
+from agents.rules import MAX_SLIP
 from hoof_env.tasks.horse_gaits import FASTEST, HorseGait, bounds, crank_angles, reference_gaits
 from hoof_env.tasks.horse_gaits import horse_gaits as gaits_of_the_package
 
@@ -115,12 +116,12 @@ def test_the_slip_of_a_gait_is_that_of_its_hooves_at_its_speed(name, speed, slid
     _, summaries, _ = BatchRollout(speed, 32, episode_seconds=10.0).play(np.tile(gait, (32, 1)), 0, starts=32)
     mean = np.mean([one["slip_m"] for one in summaries])
     assert mean < slip < 2.5 * mean
-    assert (slip > horse_gaits.SLIP) == slides
+    assert (slip > MAX_SLIP) == slides
 
 
 def test_a_gait_that_falls_has_no_slip_and_the_trot_like_one_little():
     gait = gaits_of_the_package()["trot-like"].to_array().tolist()
-    assert slip_at(gait, 3.66) < horse_gaits.SLIP
+    assert slip_at(gait, 3.66) < MAX_SLIP
     assert slip_at(gait, 1.85) == np.inf  # falls from the start at another speed
 
 

@@ -4,8 +4,10 @@ import json
 
 import numpy as np
 import pytest
+from foreign import CUT, FOREIGN
 
 from agents import horse_learning as page
+from hoof_env.errors import DataFileError
 from hoof_env.evaluation.episodes import make_rows
 
 ZERO = {"return": [10.0, 20.0, 30.0], "failed": [1.0, 0.0, 1.0]}
@@ -62,9 +64,40 @@ def test_the_page_is_written_with_what_was_measured(tmp_path, monkeypatch, capsy
     kept = json.loads((tmp_path / "horse_learning" / "figures.json").read_text())
     zero = kept["gains"][0]
     assert zero["return over zero"] == [0.0, 0.0]
+    assert set(kept["commits"]) == {"gains", "signal", "steps"}
+    assert "to measure: gains, signal, steps" in capsys.readouterr().out
+    before = (tmp_path / "horse_learning" / "figures.json").read_text()
     monkeypatch.setattr(page, "measure_gains", lambda starts: pytest.fail("measured again"))
+    monkeypatch.setattr(page.results, "commit_of_code", lambda: "0123456789ab")
     page.main([*few, "--out", str(tmp_path)])
+    assert (tmp_path / "horse_learning" / "figures.json").read_text() == before
+    assert "to measure: nothing" in capsys.readouterr().out
+    # The commit of the page is that of the figures, and not of its writing
+    assert "0123456789ab" not in (tmp_path / "horse_learning.md").read_text()
+    less = {name: value for name, value in kept.items() if name != "steps"}
+    (tmp_path / "horse_learning" / "figures.json").write_text(json.dumps(less))
+    page.main([*few, "--out", str(tmp_path)])
+    text = (tmp_path / "horse_learning.md").read_text()
+    assert f"`{kept['commits']['gains']}` (gains, signal), `0123456789ab` (steps)" in text
     capsys.readouterr()
+
+
+def test_a_file_of_one_commit_says_so_of_all_figures():
+    of_file = page.figures_of_file({"gains": [], "steps": [], "versions": {"commit": "abc"}})
+    assert page.commits_of(of_file) == "commit `abc`"
+
+
+@pytest.mark.parametrize("content", [CUT, *FOREIGN, '{"gains": [{"gain": 0.0}]}', '{"rows": []}'])
+def test_other_files_are_refused_and_left_alone(content, tmp_path, monkeypatch):
+    for name in ("learn", "measure_gains"):
+        monkeypatch.setattr(page, name, lambda *_: pytest.fail("was measured"))
+    path = tmp_path / "horse_learning" / "figures.json"
+    path.parent.mkdir()
+    path.write_text(content)
+    with pytest.raises(DataFileError, match=r"figures\.json: expected figures that agents\.horse_learning"):
+        page.main(["--out", str(tmp_path)])
+    assert path.read_text() == content
+    assert not (tmp_path / "horse_learning.md").exists()
 
 
 def test_zero_gain_is_the_zero_action():

@@ -4,17 +4,19 @@ import json
 
 import numpy as np
 import pytest
+from foreign import CUT, FOREIGN
 
+from agents import gait_box, gait_costs, gait_rig, start_phases
 from agents import kinematic_gaits as search
 from agents.gait_figures import play
 from agents.horse_gaits import speed_of
 from agents.judges import searched_bars
 from hoof_env.envs.policies import make_policy
-from hoof_env.errors import HoofEnvError, ParameterError
+from hoof_env.errors import DataFileError, HoofEnvError, ParameterError
 from hoof_env.evaluation.episodes import make_rows
 from hoof_env.tasks.horse_gaits import bounds, horse_gaits, kinematic_speeds
 
-TURN = np.arange(search.BINS) / search.BINS
+TURN = np.arange(gait_rig.BINS) / gait_rig.BINS
 
 
 def curve(*peaks, width=0.08):
@@ -24,27 +26,27 @@ def curve(*peaks, width=0.08):
 
 def test_points_of_the_box_are_gaits_that_a_horse_takes():
     points = np.random.default_rng(0).uniform(-1, 1, (50, 16))
-    gaits = search.decode(points)
+    gaits = gait_box.decode(points)
     low, high = bounds()
     assert ((gaits >= low) & (gaits <= high)).all()
-    np.testing.assert_allclose(search.encode(gaits), points, atol=1e-12)
+    np.testing.assert_allclose(gait_box.encode(gaits), points, atol=1e-12)
 
 
 @pytest.mark.parametrize("kind", ["walk", "trot"])
-@pytest.mark.parametrize("stride", search.STRIDES)
+@pytest.mark.parametrize("stride", gait_box.STRIDES)
 def test_a_search_begins_with_the_stride_that_is_asked_for(kind, stride):
     """A crank turns once a stride: hooves that do not slip move by one stride in that time."""
     speed = speed_of(0.25)
-    gaits = search.first_gaits(kind, speed, stride)
+    gaits = gait_box.first_gaits(kind, speed, stride)
     np.testing.assert_allclose(speed * 2 * np.pi / gaits[:, 0] / 1.4, stride)
-    assert len(np.unique(gaits[:, 1])) == len(search.LEADS)
+    assert len(np.unique(gaits[:, 1])) == len(gait_box.LEADS)
 
 
 def test_a_dip_is_as_deep_as_between_two_peaks():
     one = curve((0.5, 1.0), width=0.15)
     two = curve((0.4, 1.0), (0.65, 0.8))
     shoulder = curve((0.5, 1.0), (0.55, 0.3), width=0.15)
-    found = search.dips(np.stack([one, two, shoulder, np.roll(two, 17)], 1))
+    found = gait_rig.dips(np.stack([one, two, shoulder, np.roll(two, 17)], 1))
     assert found[0] == found[2] == 0.0
     between = two[(TURN > 0.4) & (TURN < 0.65)].min()
     assert found[1] == pytest.approx((two[TURN > 0.55].max() - between) / two.max())
@@ -53,7 +55,7 @@ def test_a_dip_is_as_deep_as_between_two_peaks():
 
 def test_a_lag_of_nearly_half_a_stride_is_as_near_to_a_trot_as_one_of_nearly_none():
     lags = np.array([0.01, 0.49, 0.25, 0.06, 0.44])
-    apart = search.distance(lags, -0.05, 0.05, 0.02, is_lag=True)
+    apart = gait_costs.distance(lags, -0.05, 0.05, 0.02, is_lag=True)
     assert apart[0] == apart[1] == 0.0
     assert apart[2] == max(apart)
     assert apart[3] == pytest.approx(apart[4])
@@ -61,15 +63,15 @@ def test_a_lag_of_nearly_half_a_stride_is_as_near_to_a_trot_as_one_of_nearly_non
 
 def test_a_figure_costs_nothing_within_its_bar_and_one_for_each_scale_beyond():
     values = np.array([0.62, 0.58, 0.56, 0.9])
-    apart = search.distance(values, 0.58, 1.0, 0.02, is_lag=False)
+    apart = gait_costs.distance(values, 0.58, 1.0, 0.02, is_lag=False)
     assert apart[0] == apart[3] == 0.0
     assert apart[2] - apart[1] == pytest.approx(1.0)
-    nearest = search.distance(np.array([1.0]), 0.0, 0.09, 0.02, is_lag=False)
+    nearest = gait_costs.distance(np.array([1.0]), 0.0, 0.09, 0.02, is_lag=False)
     assert nearest[0] > 40
 
 
 def figures_of(gaits, speed, starts):
-    return search.Rig(len(gaits) * starts).play(np.array(gaits), speed, 0, starts)
+    return gait_rig.Rig(len(gaits) * starts).play(np.array(gaits), speed, 0, starts)
 
 
 def test_the_rig_measures_what_the_judges_measure():
@@ -103,17 +105,16 @@ def test_a_gait_that_falls_costs_more_than_any_that_stands():
     still[[4, 11]] = 0.3, 1.7  # legs that lie back
     figures = figures_of([walk, still], 1.85, 2)
     assert figures["fell"].tolist() == [0.0, 1.0]
-    bars = search.peaked(searched_bars("walk", 0.2))
-    costs = search.costs_of(figures, bars)
+    bars = gait_costs.peaked(searched_bars("walk", 0.2))
+    costs = gait_costs.costs_of(figures, bars)
     assert np.isfinite(costs).all()
-    assert costs[1] > costs[0] + search.FALL
+    assert costs[1] > costs[0] + gait_costs.FALL
 
 
 def test_the_command_finds_a_gait_and_goes_on_where_it_stopped(tmp_path, monkeypatch, capsys):
     monkeypatch.setattr(search, "STRIDES", (1.6,))
-    monkeypatch.setattr(search, "STARTS", 1)
-    monkeypatch.setattr(search, "SECONDS", 3.0)
-    monkeypatch.setattr(search, "DROPPED", 8)
+    monkeypatch.setattr(gait_rig, "SECONDS", 3.0)
+    monkeypatch.setattr(start_phases, "DROPPED", 8)
     out, shipped = tmp_path / "found.json", tmp_path / "shipped.json"
     argv = ["--gaits", "walk", "--froude", "0.2", "--first", "2", "--more", "1", "--out", str(out)]
     search.main([*argv, "--shipped", str(shipped)])
@@ -123,8 +124,10 @@ def test_the_command_finds_a_gait_and_goes_on_where_it_stopped(tmp_path, monkeyp
     ]  # fmt: skip
     (one,) = json.loads(shipped.read_text()).values()
     assert one["gait"] == found["walk at 0.2 by force, seed 0, best"]["gait"]
+    assert "has 0 of 2 searches\n2 searches to do" in capsys.readouterr().out
     before = out.read_text()
     search.main([*argv, "--shipped", str(shipped)])
+    assert "has 2 of 2 searches\n" in capsys.readouterr().out
     assert out.read_text() == before
     search.main([*argv, "--begin", str(shipped), "--shipped", str(tmp_path / "again.json")])
     assert list(json.loads(out.read_text())["searches"])[2:] == [
@@ -133,6 +136,39 @@ def test_the_command_finds_a_gait_and_goes_on_where_it_stopped(tmp_path, monkeyp
     with pytest.raises(ParameterError, match=r"kinematic-walk"):
         search.main(["--gaits", "trot", "--froude", "1", "--begin", str(shipped), "--out", str(out)])
     capsys.readouterr()
+
+
+@pytest.mark.parametrize(
+    "content", [CUT, *FOREIGN[:-1], '{"searches": {"walk": {"gait": [0.0]}}}', FOREIGN[-1]]
+)
+@pytest.mark.parametrize("option", ["--out", "--begin"])
+def test_other_files_are_refused_and_left_alone(content, option, tmp_path, monkeypatch):
+    monkeypatch.setattr(search, "find", lambda *_: pytest.fail("was searched"))
+    path = tmp_path / "kept.json"
+    path.write_text(content)
+    shipped = tmp_path / "shipped.json"
+    with pytest.raises(
+        DataFileError, match=r"kept\.json: expected (searches|gaits) (of|as) agents\.kinematic"
+    ):
+        search.main([option, str(path), "--shipped", str(shipped)])
+    assert path.read_text() == content
+    assert not shipped.exists()
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        (["--gaits", "walk"], "--froude: expected 1 Froude numbers, one for each of walk, got 2"),
+        (["--gaits", "walk", "canter"], "--gaits: expected one of trot, walk, got 'canter'"),
+        (["--criterion", "speed"], "--criterion: expected one of force, "),
+        (["--froude", "0", "1"], "--froude: expected .* 0"),
+        (["--first", "0"], "--first: expected a whole number, 1 or more, got 0"),
+    ],
+)
+def test_what_no_search_can_take_is_refused_before_the_first(words, message, tmp_path, monkeypatch):
+    monkeypatch.setattr(search, "find", lambda *_: pytest.fail("was searched"))
+    with pytest.raises(ParameterError, match=message):
+        search.main([*words, "--out", str(tmp_path / "a.json"), "--shipped", str(tmp_path / "b.json")])
 
 
 def test_a_start_is_in_the_middle_of_the_phases_from_which_none_falls(monkeypatch):
@@ -148,14 +184,14 @@ def test_a_start_is_in_the_middle_of_the_phases_from_which_none_falls(monkeypatc
         def step(self, actions):
             return None, None, np.full(len(actions), 0.09 < self.phase < 0.31)
 
-    monkeypatch.setattr(search, "make_rows", lambda *_, **__: Horses())
+    monkeypatch.setattr(start_phases, "make_rows", lambda *_, **__: Horses())
     # Free are 0.325 to 0.475 and 0 to 0.075
-    assert search.phase_of(np.zeros(16), 3.6) == pytest.approx(0.45)
+    assert start_phases.phase_of(np.zeros(16), 3.6) == pytest.approx(0.45)
     monkeypatch.setattr(Horses, "step", lambda self, actions: (None, None, np.zeros(len(actions), bool)))
-    assert search.phase_of(np.zeros(16), 3.6) is None
+    assert start_phases.phase_of(np.zeros(16), 3.6) is None
     monkeypatch.setattr(Horses, "step", lambda self, actions: (None, None, np.ones(len(actions), bool)))
     with pytest.raises(HoofEnvError, match=r"3\.60 m/s: expected a phase"):
-        search.phase_of(np.zeros(16), 3.6)
+        start_phases.phase_of(np.zeros(16), 3.6)
 
 
 @pytest.mark.parametrize("name", kinematic_speeds())

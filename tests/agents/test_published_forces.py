@@ -1,10 +1,18 @@
 """Forces of horses as published: what the made curve has, and that the page is written whole."""
 
+import re
+import shlex
+from pathlib import Path
+
 import numpy as np
 import pytest
 
 from agents import published_forces as forces
 from agents.judges import read_judges
+from hoof_env import cli
+from hoof_env.lab.compare import compare
+from hoof_env.lab.picture import report
+from hoof_env.lab.read import read_record
 
 
 @pytest.mark.parametrize(("kind", "speed"), [("walk", 1.6), ("trot", 3.6)])
@@ -33,14 +41,41 @@ def test_the_walk_bears_its_weight():
     assert forces.published("walk", 1.6)[2] == pytest.approx(1, abs=0.05)
 
 
-def test_the_page_has_both_gaits(tmp_path, monkeypatch, capsys):
-    monkeypatch.setattr(forces, "SECONDS", 5.0)
-    forces.main(["--out", str(tmp_path), "--records", str(tmp_path / "records")])
-    text = (tmp_path / "horse_forces.md").read_text()
+@pytest.fixture(scope="module")
+def written(tmp_path_factory):
+    """Folder with the page and its records."""
+    out = tmp_path_factory.mktemp("page")
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(forces, "SECONDS", 5.0)
+        forces.main(["--out", str(out), "--records", str(out / "records")])
+    return out
+
+
+def test_the_page_has_both_gaits(written):
+    text = (written / "horse_forces.md").read_text()
     assert "nan" not in text
     for kind in ("walk", "trot"):
         assert f"| {kind} | fore | vertical |" in text
-        assert (tmp_path / "horse_forces" / f"{kind}.png").stat().st_size > 5000
+        assert (written / "horse_forces" / f"{kind}.png").stat().st_size > 5000
     assert "| walk | hind | fore-aft |" not in text
     assert "| trot | hind | fore-aft |" in text
-    capsys.readouterr()
+
+
+def test_the_commands_of_the_page_find_what_it_says(written, monkeypatch, capsys):
+    """All of their figures, by the numbers of the table, and all of their warnings."""
+    text = (written / "horse_forces.md").read_text()
+    commands = re.findall("^hoof-env (.*)$", text, re.M)
+    monkeypatch.chdir(written)
+    assert len(commands) == 2
+    for kind, command in zip(("walk", "trot"), commands, strict=True):
+        capsys.readouterr()
+        assert cli.main(shlex.split(command)) == 0
+        said = capsys.readouterr().out
+        warned = re.findall("^warning: (.*)$", said, re.M)
+        assert re.findall(rf"^\* {kind}: (.*)$", text, re.M) == warned
+        a, b = (read_record(Path(word), mass=forces.MASS) for word in shlex.split(command)[1:3])
+        found = compare(a, b, units="BW")
+        assert said.startswith(report(found))
+        for row in forces.rows_of(kind, found):
+            assert f"| {' | '.join(row)} |" in text
+    assert "fore-aft forces point opposite ways" in text

@@ -7,7 +7,10 @@ import pytest
 
 from hoof_env import cli
 from hoof_env.commands.policies import EXTRAS
+from hoof_env.envs.policies import start_of
+from hoof_env.errors import DataFileError
 from hoof_env.policies.catalogue import SHOWN, shipped_returns
+from hoof_env.policies.find import find_policy
 
 
 def test_every_id_has_its_lines_with_the_returns_of_its_policies(capsys):
@@ -34,6 +37,20 @@ def test_one_id_has_the_names_of_its_policies(capsys):
     names = capsys.readouterr().out.splitlines()[2].strip().removeprefix("policies: ").split(", ")
     assert {"reference", "zero", "open-loop", "shipped"} <= set(names)
     assert "constant" not in names
+
+
+@pytest.mark.parametrize("env_id", [name for name in gym.registry if name.startswith("hoof_env/")])
+def test_every_name_that_is_listed_can_be_played_and_no_stored_one_is_left_out(env_id, capsys):
+    assert cli.main(["list", "--env-id", env_id]) == 0
+    line = capsys.readouterr().out.splitlines()[-1]
+    names = line.strip().removeprefix("policies: ").split(", ")
+    env = gym.make(env_id)
+    for name in names:
+        observation, _ = env.reset(seed=0, options=start_of(policy := find_policy(name, env, env_id)))
+        assert env.action_space.contains(policy.predict(observation, episode_start=True)[0])
+    for name in {"open-loop", "constant", "shipped"} - set(names):
+        with pytest.raises(DataFileError):
+            find_policy(name, env, env_id)
 
 
 @pytest.mark.parametrize(

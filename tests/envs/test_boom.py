@@ -5,7 +5,9 @@ import numpy as np
 import pytest
 
 import hoof_env
+from hoof_env.dynamics.parts import ONE_LEG
 from hoof_env.errors import ParameterError
+from hoof_env.tasks.registry import HOP, TASKS
 
 PASTERN = {"hoof_stiffness": 1e4, "hoof_damping": 200.0, "hoof_length": 0.3}
 BOOM = {"trunk": "boom", "stiffness": 2e6, "exponent": 1.5, **PASTERN}
@@ -108,8 +110,14 @@ def test_ranges_that_no_start_can_have_are_refused(options, message):
 HIGH = {"gait": "run", "crank_angle": (3.0, 3.7), "height": (1.95, 2.15), "speed": (2.0, 4.0)}
 
 
-def test_a_task_of_ones_own_has_starts_of_its_own():
+@pytest.fixture(scope="module", autouse=True)
+def own_ids():
+    """A task of one's own with starts, and one that is made from it."""
     hoof_env.register("test/Hop-v0", base="leg", start=HIGH, **BOOM)
+    hoof_env.register("test/SlowHop-v0", base="test/Hop-v0", crank_rate=5.0)
+
+
+def test_a_task_of_ones_own_has_starts_of_its_own():
     env = gym.make_vec("test/Hop-v0", num_envs=32)
     _, info = env.reset(seed=0)
     assert info["speed"].min() > 2.0
@@ -118,8 +126,22 @@ def test_a_task_of_ones_own_has_starts_of_its_own():
     assert (info["speed"] == 1.0).all()
     assert info["height"].min() > 1.95
     # an id that is made from this one has its starts, too
-    hoof_env.register("test/SlowHop-v0", base="test/Hop-v0", crank_rate=5.0)
     assert gym.make("test/SlowHop-v0").reset(seed=0)[1]["speed"] > 2.0
+
+
+@pytest.mark.parametrize("trunk", ONE_LEG)
+@pytest.mark.parametrize("base", ["hop", "balance", "test/SlowHop-v0"])
+def test_an_inherited_start_loses_what_another_trunk_cannot_have(base, trunk):
+    name = f"test/{base.removeprefix('test/').removesuffix('-v0')}-{trunk}-v0"
+    hoof_env.register(name, base=base, trunk=trunk)
+    env = gym.make(name)
+    info = env.reset(seed=0)[1]
+    if trunk in ("rail", "fixed"):
+        assert info["height"] == env.unwrapped.engine.trunk.height
+    if trunk == "fixed":
+        assert info["speed"] == 0.0
+    same = gym.make(base, trunk=trunk) if "/" in base else gym.make(TASKS[base].id, trunk=trunk)
+    assert same.unwrapped.batch.usual_start == env.unwrapped.batch.usual_start
 
 
 @pytest.mark.parametrize(
@@ -127,11 +149,17 @@ def test_a_task_of_ones_own_has_starts_of_its_own():
     [
         ("Down", {"speed": (4.0, 1.0)}, r"test/Down-v0: start: options\['speed'\]\[1\]: expected"),
         ("Trot", {"gait": "trot"}, r"test/Trot-v0: start: options\['gait'\]: expected"),
+        (
+            "Far",
+            {"gait": HOP, "crank_angle": (3.0, 3.7), "height": (1.9, 2.0)},
+            "below a height of 3.995 m.*got",
+        ),
         ("Wings", {"wings": 2}, "test/Wings-v0: start: options: expected a mapping with some of gait"),
     ],
 )
 def test_starts_that_no_episode_can_have_are_refused_with_the_id(name, start, message):
-    hoof_env.register(f"test/{name}-v0", base="leg", start=start, **BOOM)
+    preset = "klann" if name == "Far" else "identified"
+    hoof_env.register(f"test/{name}-v0", base="leg", preset=preset, start=start, **BOOM)
     with pytest.raises(ParameterError, match=message):
         gym.make(f"test/{name}-v0")
 

@@ -56,6 +56,19 @@ def test_actions_have_the_names_of_what_they_move():
     assert free.action_names[1::4] == make(HORSE).action_names[1::4]
 
 
+@pytest.mark.parametrize("footfall", ["fixed", "free"])
+def test_an_offset_is_observed_under_the_name_of_the_action_that_moves_it(footfall):
+    env = make(HORSE, footfall=footfall, privileged=["offset"])
+    for k, name in enumerate(env.action_names):
+        env.reset(seed=0)
+        env.step(np.eye(16, dtype=np.float32)[k])
+        moved = [name for name, value in env.raw_observation().items() if "offset: " in name and value]
+        one, side, *what = name.split("_")
+        seen = f"offset: {one} {side}, {' '.join(what)}"
+        assert moved == [seen]
+        assert f"true {seen}" in env.observation_names
+
+
 def test_a_policy_of_one_footfall_is_refused_by_the_other():
     fixed, free = (describe(make(HORSE, footfall=each)) for each in ("fixed", "free"))
     with pytest.raises(DataFileError, match=r"0\.25 strides"):

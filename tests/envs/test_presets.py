@@ -8,7 +8,7 @@ import hoof_env  # noqa: F401  (registers the environments)
 from hoof_env.envs.policies import make_policy
 from hoof_env.errors import ParameterError
 from hoof_env.tasks.one_leg import OneLeg
-from hoof_env.tasks.registry import TASKS
+from hoof_env.tasks.registry import HOP, TASKS
 
 PRESETS = ("jansen", "klann", "fourbar")
 IDS = [task.id for task in TASKS.values() if task.body is OneLeg]
@@ -35,6 +35,32 @@ def test_every_id_of_one_leg_steps_with_every_preset(env_id, preset):
             break
     # A trunk that pitches may fall over before the hoof lands
     assert pressed > 50 or (terminated and env.unwrapped.settings.trunk == "floating")
+
+
+@pytest.mark.parametrize("preset", PRESETS)
+@pytest.mark.parametrize("env_id", IDS)
+def test_no_start_of_a_preset_fails_at_once(env_id, preset):
+    """A trunk that is raised out of the ground stays below the height at which an episode fails."""
+    envs = gym.make_vec(env_id, num_envs=64, preset=preset).unwrapped
+    envs.reset(seed=0)
+    *_, terminated, _, infos = envs.step(np.zeros((64, 4), np.float32))
+    assert not terminated.any()
+    if envs.settings.trunk in ("boom", "floating"):
+        # No fall from a height that only another leg needs
+        assert infos["measured"]["y"].max() < 1.4 * envs.engine.trunk.height
+
+
+def test_reset_options_of_a_leg_that_reaches_too_far_are_refused_or_drawn_again():
+    env = gym.make("hoof_env/HorseLegHop-v0", preset="klann")
+    with pytest.raises(ParameterError, match=r"gait and a crank_angle.* 3.895 m.*got .*'crank_angle': 3.2"):
+        env.reset(options={"gait": HOP, "crank_angle": 3.2})
+    _, taken = env.reset(seed=0, options={"gait": HOP, "crank_angle": 3.2, "height": 2.0})
+    assert taken["height"] == 2.0
+    # Half of the crank angles are too far: those drawn again are not
+    envs = gym.make_vec("hoof_env/HorseLegHop-v0", num_envs=64, preset="klann")
+    _, infos = envs.reset(seed=0, options={"gait": HOP})
+    assert infos["height"].max() < 2.0 * envs.unwrapped.engine.trunk.height
+    assert infos["measured"]["toe_penetration"].max() < 1e-12
 
 
 @pytest.mark.parametrize("preset", PRESETS)

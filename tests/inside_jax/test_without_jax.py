@@ -4,10 +4,11 @@ import subprocess
 import sys
 
 import gymnasium as gym
+import numpy as np
 import pytest
 
 from hoof_env.envs import xla
-from hoof_env.errors import MissingExtraError
+from hoof_env.errors import MissingExtraError, ParameterError
 
 
 def test_a_missing_jax_is_named_with_the_extra(monkeypatch):
@@ -16,6 +17,25 @@ def test_a_missing_jax_is_named_with_the_extra(monkeypatch):
     monkeypatch.setattr(xla, "loaded_jax", xla.loaded_jax.__wrapped__)
     with pytest.raises(MissingExtraError, match=r'need jax: pip install "hoof-env\[jax\]"'):
         envs.xla()
+
+
+@pytest.mark.parametrize(
+    ("value", "got"),
+    [
+        (np.zeros(3), r"float64 of shape \(3,\)"),
+        (np.zeros(4, bool), r"bool of shape \(4,\)"),
+        ([1, [2, 3], 4, 5], r"\[1, \[2, 3\], 4, 5\], which is no array"),
+        ([object()] * 4, "object of shape"),
+        ("left", "<U4 of shape"),
+        (None, "object of shape"),
+    ],
+)
+def test_numbers_of_a_foreign_kind_are_refused_in_words(value, got):
+    with pytest.raises(ParameterError, match=f"^actions: expected four, got {got}"):
+        xla.numbers_of(np.asarray, value, (4,), "actions: expected four")
+    for kind in (np.float32, np.int64, list):
+        taken = [0, 1, -1, 0] if kind is list else np.array([0, 1, -1, 0], kind)
+        assert xla.numbers_of(np.asarray, taken, (4,), "").tolist() == [0, 1, -1, 0]
 
 
 def test_environments_do_not_import_jax():

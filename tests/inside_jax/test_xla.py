@@ -78,6 +78,8 @@ def check_same(envs, actions, states):
         ("HorseLegSpeed", 3, {"episode_seconds": 0.5, "target_seconds": 0.2}),
         ("HorseLeg", 3, {"push_seconds": 0.2, "push_impulse": 40.0, "episode_seconds": 0.5}),
         ("HorseLegTerrain", 3, {"episode_seconds": 0.4}),
+        ("HorseLegBalance", 3, {"episode_seconds": 0.4}),
+        ("HorseLegBalanceSpeed", 3, {"episode_seconds": 0.4, "target_seconds": 0.2}),
         ("HorseRough", 2, {"episode_seconds": 0.3}),
         ("HorseLegMO", 3, {"episode_seconds": 0.4}),
         ("HorseLeg", 16, {"episode_seconds": 0.4, "num_threads": 2}),
@@ -281,7 +283,16 @@ def test_actions_must_be_finite_and_nothing_is_advanced():
 
 
 @pytest.mark.parametrize(
-    "wrong", [np.zeros((3, 1)), np.zeros((2, 4)), np.zeros((3, 4), bool), [[0.0] * 4] * 2, None]
+    "wrong",
+    [
+        np.zeros((3, 1)),
+        np.zeros((2, 4)),
+        np.zeros((3, 4), bool),
+        [[0.0] * 4] * 2,
+        [[0.0] * 4, [0.0]],
+        {},
+        None,
+    ],
 )
 def test_actions_of_another_shape_or_type_are_refused(wrong):
     envs = make()

@@ -1,6 +1,7 @@
 """Every door plays a policy in one way: with its memory, its statistics and the mode of its distribution."""
 
 import ast
+import re
 import sys
 from pathlib import Path
 from types import ModuleType
@@ -13,6 +14,7 @@ import hoof_env
 from agents import dataset, gait_figures, horse_figures, leg_forces
 from agents.blindness import prove
 from hoof_env import records
+from hoof_env.envs.policies import make_policy
 from hoof_env.errors import DataFileError, ParameterError
 from hoof_env.evaluation.episodes import make_rows, play, play_rows, score_vector
 from hoof_env.evaluation.scores import evaluate
@@ -266,3 +268,36 @@ def test_objects_that_cannot_act_are_refused_everywhere(policy, env):
             door(env, policy, [0])
     with pytest.raises(ParameterError, match=r"^policy"):
         score_vector(policy, ID, [0], **SHORT)
+
+
+HORSE = "hoof_env/Horse-v0"
+GAIT = "kinematic-walk"
+HORSE_DOORS = {
+    "evaluate": lambda **kwargs: evaluate([GAIT], HORSE, {"episode_seconds": 0.1, **kwargs}, episodes=1),
+    "record": lambda **kwargs: records.record_episode(gym.make(HORSE, **kwargs), GAIT, seconds=0.1),
+}
+
+
+@pytest.mark.filterwarnings("error")
+@pytest.mark.parametrize("door", HORSE_DOORS)
+def test_a_warning_says_that_a_command_is_lost_only_where_one_was_given(door):
+    """A gait has its own commanded speed, and replaces none that its caller did not choose."""
+    speed = make_policy(GAIT, gym.make(HORSE)).start["target_speed"]
+    for kwargs in ({}, {"size": 0.5}, {"target_speed": speed}):
+        HORSE_DOORS[door](**kwargs)
+    for given in (2.0, (1.2, 1.9)):
+        said = f"own commanded speed {speed:.2f} m/s, in place of target_speed={given}"
+        with pytest.warns(UserWarning, match=re.escape(said)):
+            HORSE_DOORS[door](target_speed=given)
+
+
+@pytest.mark.filterwarnings("error")
+def test_a_command_of_reset_options_is_not_lost():
+    with gym.make(HORSE, target_speed=2.0) as env:
+        played = records.record_episode(env, GAIT, seconds=0.1, options={"target_speed": 1.7})
+    assert len(played)
+
+
+def test_published_episodes_are_not_played_with_another_command():
+    with pytest.raises(ParameterError, match="kinematic-walk: expected one for the task's commands"):
+        evaluate([GAIT], HORSE, published=True)
