@@ -403,12 +403,12 @@ TASKS: Mapping[str, Task] = MappingProxyType(
             _FOUR_LEGS
             + "\n\nThe ground has slopes of up to 10 % and bumps of up to 5 cm. Every 2 to 4 s the trunk is"
             " pushed forward or back, by up to 1.5 m/s times the horse's mass. Neither the ground ahead nor"
-            " the pushes are observed. A policy acts 25 times a second, half as often as on Horse-v0: in the"
-            " time in which a body as high as its hips falls, as often as robots of half a metre do 40 times"
-            " a second. It sees the motion of the trunk on the scale on which disturbances change it, and the"
-            " load of each hoof. A fall costs 100 instead of 15, and `tracking` weighs 64 instead of 16:"
-            " compare no returns with Horse-v0's. The reference gait falls in every fifth episode. `terrain`,"
-            " `strength` and `push_impulse` change these disturbances; `size` does not.",
+            " the pushes are observed. A policy acts 25 times a second, half as often as on Horse-v0; in the"
+            " time in which a body as high as its hips falls, that is as often as a robot with hips at half a"
+            " metre acts at 42 Hz. It sees the motion of the trunk on the scale on which disturbances change"
+            " it, and the load of each hoof. A fall costs 100 instead of 15, and `tracking` weighs 64 instead"
+            " of 16: compare no returns with Horse-v0's. The reference gait falls in every fifth episode."
+            " `terrain`, `strength` and `push_impulse` change these disturbances; `size` does not.",
             # With the weights of Horse-v0, agents trade falls and the commanded speed for smoother gaits.
             {
                 **_HORSE,

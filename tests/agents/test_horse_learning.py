@@ -27,7 +27,7 @@ def test_differences_from_the_zero_action_are_paired():
 
 
 def test_cranks_follow_the_error_of_the_speed():
-    envs = make_rows(page.ENV_ID, 3)
+    envs = make_rows(page.BEFORE, 3)
     seen, _ = envs.reset(seed=0)
     raw = envs.raw_observation()
     error = np.asarray(raw["forward speed"]) - raw["commanded speed"]
@@ -36,13 +36,14 @@ def test_cranks_follow_the_error_of_the_speed():
     assert not np.delete(actions, np.s_[::4], axis=1).any()
 
 
-def test_the_weights_of_the_study_are_those_of_the_id():
-    envs = make_rows(page.ENV_ID, 1)
+@pytest.mark.parametrize("env_id", [page.ENV_ID, page.BEFORE])
+def test_the_weights_of_the_study_are_those_of_the_id(env_id):
+    envs = make_rows(env_id, 1)
     assert envs.weights == page.WEIGHTS
 
 
 def test_learners_and_blind_twins_are_trained_and_played(capsys):
-    case = page.Case(1, 1, {"episode_seconds": 0.4})
+    case = page.Case(1, 1, env_kwargs={"episode_seconds": 0.4})
     found = page.learn(case, 100, 3)
     assert found["steps"] == 100
     for kind in ("seeds", "blind"):
@@ -102,7 +103,7 @@ def test_other_files_are_refused_and_left_alone(content, tmp_path, monkeypatch):
 
 def test_zero_gain_is_the_zero_action():
     one, other = (
-        page.played(make, 3) for make in (page.zero_action, lambda envs: page.CrankFeedback(envs, 0.0))
+        page.played(make, 3, page.BEFORE) for make in (page.zero_action, lambda envs: page.CrankFeedback(envs, 0.0))
     )
     for name, values in one.items():
         assert np.array_equal(values, other[name])
