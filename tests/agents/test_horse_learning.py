@@ -103,7 +103,8 @@ def test_other_files_are_refused_and_left_alone(content, tmp_path, monkeypatch):
 
 def test_zero_gain_is_the_zero_action():
     one, other = (
-        page.played(make, 3, page.BEFORE) for make in (page.zero_action, lambda envs: page.CrankFeedback(envs, 0.0))
+        page.played(make, 3, page.BEFORE)
+        for make in (page.zero_action, lambda envs: page.CrankFeedback(envs, 0.0))
     )
     for name, values in one.items():
         assert np.array_equal(values, other[name])
