@@ -24,6 +24,7 @@ from agents.horse_gaits import speed_of
 from agents.judge import ENV_ID, verdicts
 from agents.judge_pictures import draw
 from agents.judges import searched_bars
+from agents.kept import check_numbers, read_kept
 from hoof_env._output import markdown_table
 from hoof_env.envs.policies import make_policy
 from hoof_env.errors import DataFileError, count, parse_json
@@ -273,6 +274,19 @@ def summary(rows: Sequence[Sequence[str]], figures: Sequence[Figures], episodes:
     )
 
 
+FAMILIES = ("predicted", "trot-like", BY_WORK, "kinematic", "from any phase")
+"""Families of gaits of which figures are kept."""
+
+
+def families_of_file(content: Any) -> tuple[dict[str, Any], dict[str, str]]:
+    """Return the figures of each family and the versions of a file; raise KeyError, TypeError or ValueError
+    for the content of another one."""
+    for family in FAMILIES:
+        for one in content["families"][family]:
+            check_numbers(f"a gait of {family}", one, ("speed", "froude", "fell"))
+    return dict(content["families"]), dict(content["versions"])
+
+
 def write(args: Args) -> None:
     """Play, judge and write."""
     episodes = count("--episodes", args.episodes)
@@ -287,8 +301,8 @@ def write(args: Args) -> None:
         families = played(envs)
         loose = {"from any phase": from_any_phase(envs)}
     else:
-        kept_figures = parse_json((folder / "figures.json").read_text(encoding="utf-8"))
-        families, versions = kept_figures["families"], kept_figures["versions"]
+        what = "figures that agents.kinematic_page kept"
+        families, versions = read_kept(folder / "figures.json", what, families_of_file)
         loose = {"from any phase": families.pop("from any phase")}
     rows = judged_rows(families)
     about = {"command": command, "versions": versions}

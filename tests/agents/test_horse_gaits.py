@@ -6,10 +6,12 @@ import json
 
 import numpy as np
 import pytest
+from foreign import CUT, FOREIGN
 
 from agents import horse_gaits
 from agents.horse_gaits import BatchRollout, Search, decode, encode, landings, shipped, slip_at, speed_of
 from agents.rules import MAX_SLIP
+from hoof_env.errors import DataFileError
 from hoof_env.tasks.horse_gaits import FASTEST, HorseGait, bounds, crank_angles, reference_gaits
 from hoof_env.tasks.horse_gaits import horse_gaits as gaits_of_the_package
 
@@ -132,6 +134,16 @@ def test_the_package_has_gaits_in_the_order_of_their_speeds():
     assert speeds == sorted(set(speeds))
     np.testing.assert_allclose(reference_gaits(np.array(speeds)), _data()["reference"]["gaits"], rtol=1e-12)
     assert {"walk", "fast", "trot-like"} <= set(gaits_of_the_package())
+
+
+@pytest.mark.parametrize("content", [CUT, *FOREIGN, '{"searches": {"free 0": {"steps": [{"gait": [1.0]}]}}}'])
+def test_other_files_are_refused_and_left_alone(content, tmp_path, monkeypatch):
+    monkeypatch.setattr(horse_gaits.Finder, "family", lambda *_: pytest.fail("was searched"))
+    out = tmp_path / "horse.json"
+    out.write_text(content)
+    with pytest.raises(DataFileError, match=r"horse\.json: expected searches of agents\.horse_gaits"):
+        horse_gaits.main(["--out", str(out), "--shipped", str(tmp_path / "gaits.json")])
+    assert out.read_text() == content
 
 
 def test_the_file_is_gone_on_with(tmp_path, monkeypatch, capsys):

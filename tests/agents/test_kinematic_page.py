@@ -2,7 +2,11 @@
 
 import json
 
+import pytest
+from foreign import CUT, FOREIGN
+
 from agents import kinematic_page as page
+from hoof_env.errors import DataFileError
 from hoof_env.tasks.horse_gaits import kinematic_speeds
 
 SEARCH = {
@@ -63,4 +67,16 @@ def test_the_page_is_written_with_its_figures_and_pictures(tmp_path, monkeypatch
     page.main([str(folder / "searches.json"), "--episodes", "4", "--out", str(tmp_path)])
     again = (tmp_path / "horse_gaits.md").read_text()
     assert again[again.index("## By criterion") :] == text[text.index("## By criterion") :]
+    page.main([str(folder / "searches.json"), "--no-play", "--out", str(tmp_path)])
     capsys.readouterr()
+
+
+@pytest.mark.parametrize("content", [CUT, *FOREIGN, '{"families": {"predicted": [{"speed": 1.0}]}}'])
+def test_other_files_of_figures_are_refused_and_left_alone(content, tmp_path):
+    searches, folder = tmp_path / "found.json", tmp_path / "horse_gaits"
+    searches.write_text(json.dumps({"searches": {"walk at 0.2 by force, seed 0, best": SEARCH}}))
+    folder.mkdir()
+    (folder / "figures.json").write_text(content)
+    with pytest.raises(DataFileError, match=r"figures\.json: expected figures .*agents\.kinematic_page kept"):
+        page.main([str(searches), "--no-play", "--out", str(tmp_path)])
+    assert [*folder.iterdir()] == [folder / "figures.json"]

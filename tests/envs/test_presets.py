@@ -7,6 +7,7 @@ import pytest
 import hoof_env  # noqa: F401  (registers the environments)
 from hoof_env.envs.policies import make_policy
 from hoof_env.errors import ParameterError
+from hoof_env.policies.find import default_policy
 from hoof_env.tasks.one_leg import OneLeg
 from hoof_env.tasks.registry import HOP, TASKS
 
@@ -48,6 +49,13 @@ def test_no_start_of_a_preset_fails_at_once(env_id, preset):
     if envs.settings.trunk in ("boom", "floating"):
         # No fall from a height that only another leg needs
         assert infos["measured"]["y"].max() < 1.4 * envs.engine.trunk.height
+
+
+def test_a_leg_without_the_gait_of_a_task_is_played_in_one_of_its_own():
+    named = [
+        default_policy(gym.make("hoof_env/HorseLegHop-v0", preset=name)) for name in ("identified", "klann")
+    ]
+    assert named == ["zero", "run"]
 
 
 def test_reset_options_of_a_leg_that_reaches_too_far_are_refused_or_drawn_again():
