@@ -55,6 +55,7 @@ from hoof_env.tasks.horse_gaits import (
     kinematic_phases,
     kinematic_speeds,
     offset_name,
+    part_followed,
     rates,
     refer_to_target,
     reference_constants,
@@ -154,7 +155,7 @@ class HorseEpisode(Episode):
 HORSE_KERNELS = BodyKernels(
     legs=COUNT,
     episode=HorseEpisode,
-    task_fields=(("is_free", "?"), *reference_type()),
+    task_fields=(("is_free", "?"), ("followed", "f8"), *reference_type()),
     scratch_size=SCRATCH_SIZE,
     command=command_gait,
     on_switch=refer_to_target,
@@ -315,6 +316,7 @@ class Horse:
             "lowest": -np.inf,
             "highest": np.inf,
             "is_free": self.is_free,
+            "followed": part_followed(dt),
             **reference_constants(self.speed_scale, follows=self.gait is None),
         }
 

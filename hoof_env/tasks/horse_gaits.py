@@ -390,8 +390,17 @@ def offset_name(leg: str, action: str) -> str:
 # In the kernels
 
 FOLLOWED = 0.1
-"""Part of the difference between action and offset that a control step adds to the offset [-]: an offset is a
-mean of the last actions, and decays under zero actions."""
+FOLLOWED_IN = 0.02
+"""Part of the difference between action and offset by which the offset moves [-], and the time in which it
+does [s]: an offset is a mean of the last actions, and decays under zero actions."""
+
+
+def part_followed(dt: float) -> float:
+    """Return the part of the difference between action and offset by which the offset moves in a control step
+    of `dt` seconds [-]."""
+    rest = 1.0 - FOLLOWED
+    # The quotient is 1 where `dt` is `FOLLOWED_IN`, to the last bit
+    return float(FOLLOWED * ((1.0 - rest ** (dt / FOLLOWED_IN)) / (1.0 - rest)))
 
 
 def command_gait(
@@ -408,7 +417,7 @@ def command_gait(
         """Follow the action at a place, the k-th of its leg; return the offset in its unit."""
         action = clip(read(actions, n * (COUNT * ACTED) + at, COUNT * ACTED, first_leg.lanes), 1.0)
         offset = episode.offset[at]
-        offset = offset + FOLLOWED * (action - offset)
+        offset = offset + task.followed * (action - offset)
         episode.offset[at] = offset
         return rounded(task.half[k] * offset)
 

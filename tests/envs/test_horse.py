@@ -6,7 +6,7 @@ from pathlib import Path
 import gymnasium as gym
 import numpy as np
 import pytest
-from family import HORSE, actions, make, same
+from family import HORSE, ROUGH, actions, make, same
 from horses import SPEEDS, played, random_gaits, stride_phases
 
 from hoof_env import Sb3VecEnv
@@ -24,6 +24,7 @@ from hoof_env.tasks.horse_gaits import (
     COUPLING,
     FASTEST,
     FOLLOWED,
+    FOLLOWED_IN,
     LEGS,
     NAMES,
     HorseGait,
@@ -89,6 +90,41 @@ def test_offsets_follow_actions_and_fade_under_zeros():
     assert 0.0 < np.abs(expected).max() < 0.05
     env.reset(seed=0)
     assert not env.batch.rows.named.offset.any()
+
+
+@pytest.mark.parametrize("dt", [0.01, 0.02, 0.04])
+def test_offsets_follow_actions_alike_in_time(dt):
+    """However often a policy acts, an action that is held moves the offsets as far."""
+    env = make(HORSE, target_speed=1.85, dt=dt)
+    env.reset(seed=0)
+    action = np.linspace(-1, 1, 16, dtype=np.float32)
+    for _ in range(round(0.2 / dt)):
+        env.step(action)
+    expected = (1 - (1 - FOLLOWED) ** (0.2 / FOLLOWED_IN)) * action.astype(float)
+    np.testing.assert_allclose(env.batch.rows.named.offset[:, 0], expected, rtol=1e-12)
+
+
+def test_rough_ground_is_seen_as_what_it_changes():
+    """The error of the speed and the loads of whole hooves are those that other entries add up to."""
+    groups = ("trunk", "target", "load", "hoof", "offset")
+    env = make(ROUGH, observation=groups)
+    same_env = {
+        name: getattr(env.settings, name) for name in ("terrain", "push_impulse", "push_seconds", "dt")
+    }
+    coarse = make(HORSE, observation=groups, **same_env)
+    for each in (env, coarse):
+        each.reset(seed=3)
+    for action in actions(1, 30, env_id=ROUGH):
+        fine, rough = (each.step(action.astype(np.float32))[0] for each in (env, coarse))
+    raw, other = env.raw_observation(), coarse.raw_observation()
+    assert raw["speed error"] == other["forward speed"] - other["commanded speed"]
+    for leg in LEGS:
+        leg = leg.replace("_", " ")
+        assert raw[f"{leg}: load"] == pytest.approx(raw[f"{leg}: toe load"] + raw[f"{leg}: heel load"])
+    names, places = env.observation_names, coarse.observation_names
+    for name, ratio in (("vertical speed", 1 / 0.3), ("pitch", 5.0), ("pitch rate", 5.0)):
+        seen = np.arctanh(float(rough[places.index(name)]))
+        assert fine[names.index(name)] == pytest.approx(np.tanh(ratio * seen), abs=1e-5)
 
 
 def test_zeros_from_the_start_are_the_reference_gait():

@@ -220,7 +220,7 @@ def test_every_setting_has_its_default(task):
 
 @pytest.mark.parametrize("task", TASKS)
 def test_the_table_of_rewards_agrees_with_the_environment(task):
-    env = gym.make(TASKS[task].id, episode_seconds=0.02)
+    env = gym.make(TASKS[task].id, episode_seconds=0.04)
     _, info = env.reset(seed=0)
     weights = {row[0]: float(row[1]) for row in manual.rewards(TASKS[task]).rows}
     assert [f"reward_{name}" for name in weights] == [name for name in info if name.startswith("reward_")]
