@@ -26,7 +26,7 @@ from hoof_env.tasks.disturbances import rough_ground
 from hoof_env.tasks.hop_terms import BALANCE_ENTRIES, BALANCE_SPEED_TERMS, HOP_ENTRIES, HOP_TERMS
 from hoof_env.tasks.horse import HOOF_STIFFNESS, MASS, Horse
 from hoof_env.tasks.horse_gaits import checked_size
-from hoof_env.tasks.horse_terms import HORSE_ENTRIES, HORSE_TERMS, ROUGH_ENTRIES
+from hoof_env.tasks.horse_terms import HORSE_ENTRIES, HORSE_TERMS, ROUGH_ENTRIES, ROUGH_WEIGHTS
 from hoof_env.tasks.observation import ENTRIES, Entry, check_groups, groups_of
 from hoof_env.tasks.one_leg import OneLeg
 from hoof_env.tasks.reward import TERMS, Term, check_weights
@@ -406,16 +406,16 @@ TASKS: Mapping[str, Task] = MappingProxyType(
             " the pushes are observed. A policy acts 25 times a second, half as often as on Horse-v0; in the"
             " time in which a body as high as its hips falls, that is as often as a robot with hips at half a"
             " metre acts at 42 Hz. It sees the motion of the trunk on the scale on which disturbances change"
-            " it, and the load of each hoof. A fall costs 100 instead of 15, and `tracking` weighs 64 instead"
-            " of 16: compare no returns with Horse-v0's. The reference gait falls in every fifth episode."
-            " `terrain`, `strength` and `push_impulse` change these disturbances; `size` does not.",
-            # With the weights of Horse-v0, agents trade falls and the commanded speed for smoother gaits.
+            " it, and the load of each hoof. All weights of the reward are a fiftieth of Horse-v0's, but"
+            " `tracking` is four times and a fall nearly seven times as dear beside them: compare no returns"
+            " with Horse-v0's. The reference gait falls in every fifth episode. `terrain`, `strength` and"
+            " `push_impulse` change these disturbances; `size` does not.",
             {
                 **_HORSE,
                 **rough_ground(1.0, MASS),
                 "dt": 0.04,
                 "observation": ("trunk", "target", "crank", "load", "offset"),
-                "reward_weights": {"fall": 100.0, "tracking": 64.0},
+                "reward_weights": ROUGH_WEIGHTS,
             },
             reference="reference",
             terms=HORSE_TERMS,
