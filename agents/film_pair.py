@@ -1,12 +1,13 @@
 """Films of two policies in the same episode, one above the other: `python -m agents.film_pair`.
 
 Without arguments it films the best gait without feedback above the shipped agent, on the leg that hops and on
-the leg that balances. A policy whose episode is over stands still in its last picture, until both are.
+the leg that balances. A policy whose episode is over stands still in its last picture, until both are. The
+command also prints figures of the whole episode of each, which say what a film shows.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -19,6 +20,7 @@ from hoof_env import records
 from hoof_env.errors import check_number
 from hoof_env.film import check_film, frames, write_film
 from hoof_env.policies.find import find_policy
+from hoof_env.record.columns import Columns
 
 Picture = NDArray[np.uint8]
 
@@ -34,6 +36,9 @@ INK = (30, 40, 50)
 PAPER = (255, 255, 255)
 """Height of the line above each picture [pixels], size of its letters, their colour and the line's."""
 
+SETTLED = 2.0
+"""Time after which an agent has caught its start [s]."""
+
 NAMES = {"open-loop": "sees nothing: the best gait with a clock", "shipped": "sees: the agent of the package"}
 """Lines above pictures, by policy; others have their names."""
 
@@ -48,14 +53,42 @@ class Args:
     """the upper and the lower policy"""
     seed: int = 1000
     """of the episode, in which all begin"""
-    seconds: float = 5.0
+    seconds: float = 4.0
     """of the episode that are filmed"""
     out: Path = OUT
     """folder of the films, each with the name of its id and -pair"""
 
 
-def pictures_of(env_id: str, policy: str, seed: int, seconds: float) -> list[Picture]:
-    """Return the pictures of an episode, each with a line that says who plays."""
+def figures_of(columns: Sequence[Columns]) -> str:
+    """Write figures of an episode of one leg: its length, and how it hops once it is `SETTLED`; the former
+    alone if it has no stances then."""
+
+    def whole(name: str) -> NDArray[np.float64]:
+        return np.concatenate([np.atleast_1d(each[name]) for each in columns])
+
+    time, ahead, pitch = whole("time"), whole("toe_x") - whole("x"), np.degrees(whole("pitch"))
+    is_loaded = whole("toe_normal") + whole("heel_normal") > 0.0
+    is_settled = time > SETTLED
+    changes = np.diff(is_loaded.astype(int), prepend=is_loaded[0])
+    landed = np.flatnonzero((changes == 1) & is_settled)
+    # The last instant with a load
+    left = np.flatnonzero((changes == -1) & is_settled) - 1
+    text = f"{time[-1]:.1f} s, pitch within {pitch.min():.0f} and {pitch.max():.0f} degrees"
+    if not (len(landed) and len(left)):
+        return text
+    height, speed, rocked = (each[is_settled] for each in (whole("y"), whole("vx"), pitch))
+    return (
+        f"{text}; after {SETTLED:g} s {len(landed) / (time[-1] - SETTLED):.1f} hops a second, in the air for"
+        f" {1 - is_loaded[is_settled].mean():.2f} of the time, the toe lands {ahead[landed].mean():+.2f} m"
+        f" and leaves {ahead[left].mean():+.2f} m ahead of the hip, which is {height.min():.2f} to"
+        f" {height.max():.2f} m high and goes at {speed.min():.1f} to {speed.max():.1f} m/s, pitch within"
+        f" {rocked.min():.0f} and {rocked.max():.0f} degrees"
+    )
+
+
+def pictures_of(env_id: str, policy: str, seed: int, seconds: float) -> tuple[list[Picture], str]:
+    """Return the pictures of an episode, each with a line that says who plays, and figures of the whole
+    episode."""
     import pygame
 
     from hoof_env.render.brush import Brush
@@ -66,11 +99,12 @@ def pictures_of(env_id: str, policy: str, seed: int, seconds: float) -> list[Pic
         renderer = Renderer(records.surroundings(env), size=SIZE)
         filmed = list(frames(renderer, records.episode(env, player, seed, seconds), FPS))
         renderer.close()
+        figures = figures_of(list(records.episode(env, player, seed, records.longest_of(env, None))))
     band: Any = pygame.Surface((SIZE[0], BAND), 0, 32)
     band.fill(PAPER)
     Brush((960, 540)).write(band, NAMES.get(policy, policy), (8, BAND / 2), LETTERS, INK)
     line = pygame.surfarray.array3d(band).transpose(1, 0, 2)
-    return [np.concatenate([line, picture]) for picture in filmed]
+    return [np.concatenate([line, picture]) for picture in filmed], figures
 
 
 def paired(upper: list[Picture], lower: list[Picture]) -> Iterator[Picture]:
@@ -87,9 +121,11 @@ def main(argv: list[str] | None = None) -> None:
     for env_id in args.env_ids:
         path = args.out / f"{env_id.rpartition('/')[2].rpartition('-')[0]}-pair.gif"
         check_film(path, FPS)
-        upper, lower = (pictures_of(env_id, name, args.seed, args.seconds) for name in args.policies)
-        write_film(paired(upper, lower), path, FPS)
+        each = [pictures_of(env_id, name, args.seed, args.seconds) for name in args.policies]
+        write_film(paired(*(pictures for pictures, _ in each)), path, FPS)
         print(f"written: {path}")
+        for name, (_, figures) in zip(args.policies, each, strict=True):
+            print(f"  {name}: {figures}")
 
 
 if __name__ == "__main__":
