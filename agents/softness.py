@@ -13,6 +13,7 @@ speeds at once, from commands that change. Trainings and searches go on where th
 from __future__ import annotations
 
 import json
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -52,6 +53,9 @@ BALANCE = "hoof_env/HorseLegBalanceSpeed-v0"
 SPEEDS = (1.5, 2.25, 3.0)
 """Commanded speeds at which policies are compared [m/s]."""
 
+NEAR = 0.2
+"""Largest difference of a policy's speed from the command, over the command, at which it is compared."""
+
 SEEN = ("crank", "gait", "trunk", "hoof", "target")
 """Observation of the agents; a gait sees nothing, and has no command to see: it is of one speed."""
 
@@ -76,6 +80,9 @@ SOFT = {
     "cost_of_transport": "cost of transport",
 }
 """Figures that are compared; less is softer, or cheaper."""
+
+HARDNESS = ("stance_peak_n", "loading_rate_n_s")
+"""Figures of which both must be lower for a softer gait."""
 
 FAMILIES: Mapping[Literal["constant", "phase"], str] = {
     "constant": "best constant gait",
@@ -171,7 +178,13 @@ def of_gait(path: Path, speed: float) -> dict[str, Any]:
             name: [round(x, 6) for x in (one.mean, one.low, one.high)] for name, one in found.items()
         },
         "searches": [
-            {key: one[key] for key in ("origin", "episodes", "stalled")} for one in record["restarts"]
+            {
+                "origin": one["origin"],
+                "episodes": one["episodes"],
+                "stalled": one["stalled"],
+                "return": round(one["mean"]["return"], 2),
+            }
+            for one in record["restarts"]
         ],
         "commit": record["versions"].get("commit", ""),
     }
@@ -219,11 +232,32 @@ def measure(args: Args) -> dict[str, Any]:
     return data
 
 
+def is_near(speed: float, command: float) -> bool:
+    """True if a policy goes at about the commanded speed."""
+    return abs(speed - command) <= NEAR * command
+
+
 def intervals_of(policy: Any) -> dict[str, Interval]:
     """Return figures with intervals: over episodes of a gait, over seeds of agents."""
     if isinstance(policy, list):
         return over_seeds([{name: seed[name] for name in FIGURES} for seed in policy])
     return {name: Interval(*values) for name, values in policy["intervals"].items()}
+
+
+def compared(data: Mapping[str, Any]) -> dict[float, dict[str, Any]]:
+    """Return the policies of each commanded speed that go at about that speed: gaits, and lists of agents
+    that may be empty."""
+    found: dict[float, dict[str, Any]] = {}
+    for text, entry in data["speeds"].items():
+        speed = float(text)
+        found[speed] = {
+            key: [seed for seed in policy if is_near(seed["speed_m_s"], speed)]
+            if isinstance(policy, list)
+            else policy
+            for key, policy in entry.items()
+            if isinstance(policy, list) or is_near(policy["intervals"]["speed_m_s"][0], speed)
+        }
+    return found
 
 
 POLICIES: Mapping[str, str] = {
@@ -235,17 +269,22 @@ POLICIES: Mapping[str, str] = {
 
 
 def table(data: Mapping[str, Any]) -> str:
-    """Return the table of all policies by speed."""
+    """Return the table of all policies by speed; of agents those that go at about that speed."""
     lines = []
-    for speed, entry in data["speeds"].items():
+    near = compared(data)
+    for text, entry in data["speeds"].items():
         for key, title in POLICIES.items():
-            found = intervals_of(entry[key])
+            is_learnt = isinstance(entry[key], list)
+            policy = near[float(text)][key] if is_learnt else entry[key]
+            seeds = f"{len(policy)} of {len(entry[key])}" if is_learnt else ""
             cells = []
+            found = intervals_of(policy) if policy else {}
             for name, (_, digits, factor) in FIGURES.items():
                 by = 1 / data["weight_n"] if name == "stance_peak_n" else factor
-                cells.append(found[name].text(digits, by))
-            lines.append([speed, title, *cells])
-    return markdown_table(("command m/s", "policy", *(title for title, *_ in FIGURES.values())), lines)
+                cells.append(found[name].text(digits, by) if found else "")
+            lines.append([text, title, seeds, *cells])
+    titles = ("command m/s", "policy", "at this speed", *(title for title, *_ in FIGURES.values()))
+    return markdown_table(titles, lines)
 
 
 def relation(agents: Interval, gait: Interval) -> str:
@@ -255,44 +294,58 @@ def relation(agents: Interval, gait: Interval) -> str:
     return "higher" if agents.above(gait) else "not apart"
 
 
-def relations(data: Mapping[str, Any], family: str) -> dict[str, list[str]]:
-    """Return the relation of agents to a family of gaits, by figure, for each speed."""
-    return {
-        name: [
-            relation(intervals_of(entry["agents"])[name], intervals_of(entry[family])[name])
-            for entry in data["speeds"].values()
-        ]
-        for name in SOFT
-    }
+def relations(data: Mapping[str, Any], family: str, name: str) -> list[tuple[str, float]]:
+    """Return how agents compare with a family of gaits in a figure at each speed, and the ratio of the
+    means; ("", NaN) where either does not go at that speed."""
+    found = []
+    for near in compared(data).values():
+        if family not in near or not near["agents"]:
+            found.append(("", math.nan))
+            continue
+        agents, gait = (intervals_of(near[key])[name] for key in ("agents", family))
+        found.append((relation(agents, gait), agents.mean / gait.mean))
+    return found
 
 
 def relation_table(data: Mapping[str, Any]) -> str:
-    """Return the table of how agents compare with gaits, with the ratio of the means."""
-    lines = []
-    for family, title in FAMILIES.items():
-        found = relations(data, family)
-        for name, figure in SOFT.items():
-            ratios = [
-                intervals_of(entry["agents"])[name].mean / intervals_of(entry[family])[name].mean
-                for entry in data["speeds"].values()
-            ]
-            cells = [f"{word}, {ratio:.2f}" for word, ratio in zip(found[name], ratios, strict=True)]
-            lines.append([title, figure, *cells])
+    """Return the table of how agents compare with gaits."""
+    lines = [
+        [
+            title,
+            figure,
+            *(f"{word}, {ratio:.2f}" if word else "" for word, ratio in relations(data, family, name)),
+        ]
+        for family, title in FAMILIES.items()
+        for name, figure in SOFT.items()
+    ]
     return markdown_table(("beside", "figure", *(f"{speed} m/s" for speed in data["speeds"])), lines)
 
 
 def verdict(data: Mapping[str, Any]) -> str:
     """Write whether agents are softer than the best gait with a clock."""
-    found = relations(data, "phase")
-    soft = [found["stance_peak_n"], found["loading_rate_n_s"]]
+    soft = [[word for word, _ in relations(data, "phase", name)] for name in HARDNESS]
     count_of = {word: sum(each.count(word) for each in soft) for word in ("lower", "higher", "not apart")}
-    total = sum(count_of.values())
     softer = sum(all(word == "lower" for word in pair) for pair in zip(*soft, strict=True))
+    speeds = f"at {softer} of {len(data['speeds'])} speeds both are lower"
     return (
-        f"Of {total} comparisons of stance peak and loading with the best gait with a clock agents are lower"
-        f" in {count_of['lower']}, higher in {count_of['higher']}, and not apart in {count_of['not apart']}."
-        f" At {softer} of {len(data['speeds'])} speeds both are lower, with intervals apart:"
-        f" {'softness is learnt there' if softer else 'that softness is learnt is not shown'}."
+        f"Of {sum(count_of.values())} comparisons of stance peak and loading with the best gait with a clock"
+        f" agents are lower in {count_of['lower']}, higher in {count_of['higher']}, and not apart in"
+        f" {count_of['not apart']}; {speeds}. {'Softness is learnt there.' if softer else not_softer(data)}"
+    )
+
+
+def not_softer(data: Mapping[str, Any]) -> str:
+    """Write what to know of the best gait with a clock where agents are softer at no speed."""
+    searches = [one for entry in data["speeds"].values() for one in entry["phase"]["searches"]]
+    returns = [
+        sorted(one["return"] for one in searches if (one["origin"] == "random") == is_random)
+        for is_random in (True, False)
+    ]
+    blind, begun = (f"{each[0]:.0f} to {each[-1]:.0f}" for each in returns)
+    return (
+        "The agents are not softer than a gait that sees nothing. That gait was found from the gait of"
+        f" `HorseLegHop-v0`: such searches returned {begun}, searches from random points, where a learner"
+        f" begins, too, {blind}."
     )
 
 
@@ -306,12 +359,12 @@ def draw(data: Mapping[str, Any], path: Path) -> None:
         figure = Figure(figsize=(8, 4), layout="constrained")
         for axes, (name, title, factor) in zip(figure.subplots(1, 2), panels, strict=True):
             for family, colour in zip(FAMILIES, (AMBER, GREY), strict=True):
-                found = [intervals_of(entry[family]) for entry in data["speeds"].values()]
+                found = [intervals_of(near[family]) for near in compared(data).values() if family in near]
                 x = [one["speed_m_s"].mean for one in found]
                 y = [factor * one[name].mean for one in found]
                 axes.plot(x, y, "s-", ms=5, color=colour, label=FAMILIES[family])
             for key, colour, filling in (("agents", BLUE, BLUE), ("balancing", GREEN, "none")):
-                seeds = [seed for entry in data["speeds"].values() for seed in entry[key]]
+                seeds = [seed for near in compared(data).values() for seed in near[key]]
                 x = [seed["speed_m_s"] for seed in seeds]
                 y = [factor * seed[name] for seed in seeds]
                 axes.plot(x, y, "o", ms=4, color=colour, mfc=filling, label=POLICIES[key])
@@ -332,7 +385,8 @@ beyond the commanded speed is charged as strongly as travel up to it is paid.
 
 * **Gaits** see nothing. CMA-ES searched for the best constant gait, four numbers that are held, and the best
   gait with a clock at each speed, from random points and from the gaits of `HorseLegHop-v0`, until the last
-  quarter of a search gained less than a hundredth: {episodes} episodes for each gait, {stalled}.
+  quarter of a search gained less than a hundredth: {episodes} episodes for each gait,
+  {stalled}.
 * **Agents** are {seeds} trainings of `ppo_flat`, {steps:,} steps each. One agent goes at all speeds: in its
   training a new speed was commanded every {shortest:g} to {longest:g} s, {slowest:g} to {fastest:g} m/s.
 * **Agents that balance** are the {balancing} of
@@ -341,14 +395,16 @@ beyond the commanded speed is charged as strongly as travel up to it is paid.
   what goes at their speed with the pitch held.
 
 All play the same {starts} episodes at each speed. Agents have interquartile means over seeds and their
-intervals, gaits means over episodes and theirs. The cost of transport is positive work over weight and
-distance.
+intervals, gaits means over episodes and theirs. Agents whose speed differs from the command by more than
+{near:.0%} are left out, as their forces are those of another speed, and gaits are not compared there. The
+cost of transport is positive work over weight and distance.
 
 {table}
 
 ## Beside gaits that see nothing
 
-Whether the agents' figure is lower or higher, with intervals apart, and the ratio of the means:
+Whether the agents' figure is lower or higher, with intervals apart, and the ratio of the means; nothing where
+the gait does not go at that speed:
 
 {relations}
 
@@ -386,6 +442,7 @@ def write(out: Path, data: Mapping[str, Any]) -> Path:
         fastest=fastest,
         balancing=len(entries[0]["balancing"]),
         starts=len(FINAL_SEEDS),
+        near=NEAR,
         table=table(data),
         relations=relation_table(data),
         verdict=verdict(data),

@@ -11,6 +11,9 @@ from hoof_env.evaluation.episodes import score_vector
 from hoof_env.evaluation.statistics import Interval
 
 
+SEARCHES = [{"origin": "random", "return": -3.0}, {"origin": "known gait", "return": 4.0}]
+
+
 def test_the_task_is_the_hop_with_a_charge_for_overspeed():
     slow, usual = (
         gym.make(softness.ID, **softness.command_of(speed)).unwrapped for speed in (1.0, softness.SPEEDS[-1])
@@ -45,6 +48,32 @@ def test_a_gait_of_the_hop_is_charged_for_going_faster_than_asked():
 )
 def test_a_relation_follows_from_the_intervals(agents, gait, word):
     assert softness.relation(Interval(*agents), Interval(*gait)) == word
+
+
+def test_policies_of_another_speed_are_not_compared():
+    def gait(speed):
+        values = {name: [1.0, 0.9, 1.1] for name in softness.FIGURES} | {"speed_m_s": [speed] * 3}
+        return {"intervals": values}
+
+    def agent(speed):
+        return dict.fromkeys(softness.FIGURES, 2.0) | {"speed_m_s": speed}
+
+    entry = {
+        "constant": gait(0.2),
+        "phase": gait(1.7) | {"searches": SEARCHES},
+        "agents": [agent(1.5), agent(0.4), agent(1.6)],
+    }
+    data = {"speeds": {"1.5": entry | {"balancing": []}}}
+    near = softness.compared(data)[1.5]
+    assert "constant" not in near
+    assert [one["speed_m_s"] for one in near["agents"]] == [1.5, 1.6]
+    assert softness.relations(data, "constant", "stance_peak_n")[0][0] == ""
+    assert softness.relations(data, "phase", "stance_peak_n") == [("higher", pytest.approx(2.0))]
+    text = softness.verdict(data)
+    assert "higher in 2" in text
+    assert (
+        "such searches returned 4 to 4, searches from random points, where a learner begins, too, -3" in text
+    )
 
 
 def test_a_page_of_nothing_is_refused_by_name(tmp_path):
