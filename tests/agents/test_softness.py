@@ -10,7 +10,6 @@ from hoof_env.errors import DataFileError
 from hoof_env.evaluation.episodes import score_vector
 from hoof_env.evaluation.statistics import Interval
 
-
 SEARCHES = [{"origin": "random", "return": -3.0}, {"origin": "known gait", "return": 4.0}]
 
 
