@@ -177,6 +177,7 @@ def test_every_frozen_page_says_of_which_commit_it_is():
             "hop.md",
             "jax.md",
             "seeing.md",
+            "softness.md",
             "horse_gaits.md",
             "horse_forces.md",
             "gait_change.md",

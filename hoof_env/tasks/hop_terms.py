@@ -53,9 +53,6 @@ BALANCE_SPEED_TERMS = (
 )
 """Terms of the reward of `HorseLegBalanceSpeed-v0`."""
 
-CARRYING_ENTRIES = tuple(entry for entry in ENTRIES if entry.name != "bearing allowance")
-"""Entries that can be observed of a leg that bears the whole weight."""
-
 SCALES = {
     # A motor's crank also turns back, and beyond the largest rate that a gait may ask for
     TRUE_RATE: tanh_of(10.0),
@@ -64,13 +61,17 @@ SCALES = {
         "tanh(x / (300 weights / s))", lambda x, scene: x / (300.0 * scene.episode.weight), True
     ),
 }
-"""Scales of `HorseLegHop-v0` that differ from other ids', by entry."""
+"""Scales of a leg that bears the whole weight that differ from other ids', by entry."""
 
-HOP_ENTRIES = tuple(replace(entry, scale=SCALES.get(entry.name, entry.scale)) for entry in CARRYING_ENTRIES)
+HOP_ENTRIES = tuple(
+    replace(entry, scale=SCALES.get(entry.name, entry.scale))
+    for entry in ENTRIES
+    if entry.name != "bearing allowance"
+)
 """Entries that can be observed on `HorseLegHop-v0`."""
 
 BALANCE_ENTRIES = (
-    *CARRYING_ENTRIES,
+    *HOP_ENTRIES,
     Entry("pitch", "trunk", "rad", lambda s: s.trunk.state.moving.pitch, tanh_of(0.3)),
     Entry("pitch rate", "trunk", "rad/s", lambda s: s.trunk.report.pitch_rate, tanh_of(2.0)),
 )

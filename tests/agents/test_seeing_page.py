@@ -42,4 +42,17 @@ def test_a_verdict_follows_from_the_intervals(returned, falls, met, apart):
 def test_pushes_are_those_of_rough_ground_and_shares_of_it():
     found = np.array(seeing_page.IMPULSES) / seeing_page.IMPULSES[2]
     assert found == pytest.approx([0.0, 0.5, 1.0, 1.5, 2.0])
-    assert seeing_page.pushed("zero", load_plan("seeing")[1]) == []
+    assert seeing_page.pushed("zero", seeing_page.IDS[1]) == []
+
+
+def test_learners_that_were_pushed_are_compared_without_pushes():
+    pushed = next(entry for entry in load_plan("seeing") if entry.variant == "pushed")
+    assert seeing_page.without_pushes(pushed) == {}
+    assert max(pushed.env_kwargs["push_impulse"]) == seeing_page.IMPULSES[-1]
+
+
+def test_each_learner_of_the_plan_has_its_own_line():
+    keys = [seeing_page.key_of(entry) for entry in load_plan("seeing")]
+    assert len(set(keys)) == len(keys)
+    lines = {f"{env_id} {name}".strip() for env_id in seeing_page.IDS for name in seeing_page.LEARNERS}
+    assert set(keys) <= lines
