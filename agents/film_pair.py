@@ -39,7 +39,11 @@ PAPER = (255, 255, 255)
 SETTLED = 2.0
 """Time after which an agent has caught its start [s]."""
 
-NAMES = {"open-loop": "sees nothing: the best gait with a clock", "shipped": "sees: the agent of the package"}
+NAMES = {
+    "open-loop": "sees nothing: the best gait with a clock",
+    "reference": "sees nothing: the reference gait",
+    "shipped": "sees: the agent of the package",
+}
 """Lines above pictures, by policy; others have their names."""
 
 
@@ -60,20 +64,23 @@ class Args:
 
 
 def figures_of(columns: Sequence[Columns]) -> str:
-    """Write figures of an episode of one leg: its length, and how it hops once it is `SETTLED`; the former
-    alone if it has no stances then."""
+    """Write figures of an episode: its length, and how one leg hops once it is `SETTLED`; the former alone
+    for a horse, or if there are no stances then."""
 
     def whole(name: str) -> NDArray[np.float64]:
         return np.concatenate([np.atleast_1d(each[name]) for each in columns])
 
-    time, ahead, pitch = whole("time"), whole("toe_x") - whole("x"), np.degrees(whole("pitch"))
+    time, pitch = whole("time"), np.degrees(whole("pitch"))
+    text = f"{time[-1]:.1f} s, pitch within {pitch.min():.0f} and {pitch.max():.0f} degrees"
+    if "toe_x" not in columns[0]:
+        return text
+    ahead = whole("toe_x") - whole("x")
     is_loaded = whole("toe_normal") + whole("heel_normal") > 0.0
     is_settled = time > SETTLED
     changes = np.diff(is_loaded.astype(int), prepend=is_loaded[0])
     landed = np.flatnonzero((changes == 1) & is_settled)
     # The last instant with a load
     left = np.flatnonzero((changes == -1) & is_settled) - 1
-    text = f"{time[-1]:.1f} s, pitch within {pitch.min():.0f} and {pitch.max():.0f} degrees"
     if not (len(landed) and len(left)):
         return text
     height, speed, rocked = (each[is_settled] for each in (whole("y"), whole("vx"), pitch))

@@ -341,6 +341,10 @@ the zero action's in the same episodes, as a part of it.
 
 {table}
 
+On the way there, in {curve_starts} of the episodes:
+
+{curve}
+
 """
 
 PAGE = """# What stock PPO learns on rough ground
@@ -349,7 +353,7 @@ Written by `python -m agents.horse_learning` from [its figures]({name}/figures.j
 Episodes have seeds from 3,000,000 on, and differences from the zero action are paired. *As it was* means the
 id until November 2026: 50 actions a second, the observation of `Horse-v0`, and rewards fifty times as large.
 
-**Asked.** Why did stock PPO do harm on rough ground, and what mends it?
+**Asked.** What kept stock PPO from learning steadily on rough ground, and what mends it?
 
 **Found.** {found}
 
@@ -381,7 +385,7 @@ are uncorrelated and of one size, the natural gradient.
 ## Sighted and blind
 
 As it is. `ppo_flat` with its settings, {starts} starts. Blind agents see crank, command and offsets; the best
-of several is chosen by other starts. The gait is the best of three searches.
+of several is chosen by other starts. The gait is the best of several searches.
 
 {sighted}
 """
@@ -425,6 +429,18 @@ def learner_rows(learners: Mapping[str, Figures]) -> list[list[str]]:
     return rows
 
 
+def curve_rows(learners: Mapping[str, Figures]) -> list[list[str]]:
+    """Return a row for each look at the learners of a case that see all."""
+    rows = []
+    for name, of_case in learners.items():
+        for look in of_case["curve"]:
+            ones = look["seeds"]
+            gaining = sum(one["return over zero"][0] >= 0 for one in ones)
+            falls = np.mean([100 * one["failed"] for one in ones])
+            rows.append([name, f"{look['steps']:,}", f"{gaining} of {len(ones)}", f"{falls:.0f}"])
+    return rows
+
+
 def of_kind(steps: Sequence[Figures], weights: str, whitened: bool) -> list[Figures]:
     """Return the samples of a step."""
     return [one for one in steps if one["weights"] == weights and one["whitened"] == whitened]
@@ -455,6 +471,11 @@ def learners_text(learners: Mapping[str, Figures], args: Args) -> str:
         learnt=max(one["steps"] for one in learners.values()),
         starts=f"{args.starts:,}",
         table=markdown_table(head, learner_rows(learners)),
+        curve_starts=CURVE_STARTS,
+        curve=markdown_table(
+            ["form", "steps", "sighted: not below zero action", "falls on the average [%]"],
+            curve_rows(learners),
+        ),
     )
 
 
@@ -511,7 +532,7 @@ def found_text(found: Figures) -> str:
         return f"{min(ones):.0f} to {max(ones):.0f} %"
 
     return (
-        f"{learnt_text(found.get('learners', {}))}Why: of PPO's first gradient, the signal over noise of a"
+        f"{learnt_text(found.get('learners', {}))}Of PPO's first gradient as it was, the signal over noise of a"
         f" rollout was {signal['of the id']:.3f} in the one recording of the table, and {signal['quiet']:.3f}"
         " with quiet weights. Recordings differ by more: ten, samples 0 to 9 of `gradient_signal.record`,"
         " have 0.011 to 0.059 and 0.010 to 0.068, and quiet weights are the better ones in seven, so that no"

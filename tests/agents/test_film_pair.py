@@ -32,3 +32,12 @@ def test_figures_say_where_a_hoof_lands_and_leaves():
     assert "1.0 hops a second, in the air for 0.75" in text
     assert "lands +0.49 m and leaves -0.49 m" in text
     assert "1.40 to 1.60 m high and goes at 3.0 to 3.0 m/s" in text
+
+
+def test_of_a_horse_figures_say_how_long_it_stood():
+    columns = {
+        "time": np.array([0.5, 3.0]),
+        "pitch": np.radians([-10.0, 5.0]),
+        "left_fore_toe_x": np.zeros(2),
+    }
+    assert figures_of([columns]) == "3.0 s, pitch within -10 and 5 degrees"
