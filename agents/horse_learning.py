@@ -532,8 +532,8 @@ def found_text(found: Figures) -> str:
         return f"{min(ones):.0f} to {max(ones):.0f} %"
 
     return (
-        f"{learnt_text(found.get('learners', {}))}Of PPO's first gradient as it was, the signal over noise of a"
-        f" rollout was {signal['of the id']:.3f} in the one recording of the table, and {signal['quiet']:.3f}"
+        f"{learnt_text(found.get('learners', {}))}Of PPO's first gradient as it was, the signal over noise of"
+        f" a rollout was {signal['of the id']:.3f} in the one recording of the table, and {signal['quiet']:.3f}"
         " with quiet weights. Recordings differ by more: ten, samples 0 to 9 of `gradient_signal.record`,"
         " have 0.011 to 0.059 and 0.010 to 0.068, and quiet weights are the better ones in seven, so that no"
         " order of weights is shown. PPO limits the norm of all gradients together, and with returns of"
