@@ -533,9 +533,9 @@ def found_text(found: Figures) -> str:
 
     return (
         f"{learnt_text(found.get('learners', {}))}Of PPO's first gradient as it was, the signal over noise of"
-        f" a rollout was {signal['of the id']:.3f} in the one recording of the table, and {signal['quiet']:.3f}"
-        " with quiet weights. Recordings differ by more: ten, samples 0 to 9 of `gradient_signal.record`,"
-        " have 0.011 to 0.059 and 0.010 to 0.068, and quiet weights are the better ones in seven, so that no"
+        f" a rollout was {signal['of the id']:.3f} in the one recording of the table, and"
+        f" {signal['quiet']:.3f} with quiet weights. Recordings differ by more: ten, samples 0"
+        " to 9 of `gradient_signal.record`, have 0.011 to 0.059 and 0.010 to 0.068, and quiet weights are the better ones in seven, so that no"
         " order of weights is shown. PPO limits the norm of all gradients together, and with returns of"
         " hundreds the value function's share of it leaves little to the policy. With 25 actions a second a"
         " rollout lasts twice as long, and a discounted return sees twice as far. What a step gains depends"

@@ -30,7 +30,8 @@ DRAWN = {"randomize": {"friction": (0.2, 0.8), "trunk_mass": 70.0}}
 @pytest.mark.parametrize("settings", [{}, DRAWN], ids=["plain", "randomized"])
 @pytest.mark.parametrize("env_id", IDS)
 def test_reset_and_step_have_the_same_keys_of_numpys_numbers(env_id, settings):
-    env = gym.make(env_id, episode_seconds=0.06, **settings)
+    env = gym.make(env_id, **settings)
+    env = gym.make(env_id, episode_seconds=3 * env.unwrapped.dt, **settings)
     _, first = env.reset(seed=0)
     infos = [first, *(env.step(taken)[4] for taken in actions(0, 2, env_id=env_id))]
     start, terms = env.unwrapped.body.start_names, env.unwrapped.terms
