@@ -26,7 +26,7 @@ from matplotlib.figure import Figure
 from agents import open_loop, runs
 from agents.command import parse, run
 from agents.experiments.hop_page import figures_of, rounded
-from agents.experiments.outcomes import read_figures
+from agents.kept import read_kept
 from agents.train import Args as TrainingArgs
 from agents.train import train
 from hoof_env import register
@@ -205,12 +205,29 @@ def of_agents(folders: Sequence[Path], env_id: str, speed: float, **env_kwargs: 
     ]
 
 
+def read_known(path: Path) -> dict[str, Any]:
+    """Return the figures of an earlier measurement; empty if there is no such file.
+
+    Raises:
+        DataFileError: the file is malformed.
+    """
+
+    def taken(content: Any) -> dict[str, Any]:
+        for speed in SPEEDS:
+            dict(content["speeds"].get(f"{speed:g}", {}))
+        return dict(content)
+
+    if not path.is_file():
+        return {}
+    return read_kept(path, "figures that agents.softness measured", taken)
+
+
 def measure(args: Args) -> dict[str, Any]:
     """Play all policies that are there, write their figures and return them; figures of agents whose folders
     are not here stay."""
     agents = trained_folders(args.folder, "s*")
     balancing = trained_folders(args.balance, "ppo_flat-HorseLegBalanceSpeed-v0-s*")
-    known = read_figures(args.out / DATA)
+    known = read_known(args.out / DATA)
     envs: Any = make_rows(ID, 1)
     data: dict[str, Any] = {"weight_n": float(np.ravel(envs.weight)[0]), "speeds": {}}
     for speed in SPEEDS:
@@ -325,6 +342,8 @@ def verdict(data: Mapping[str, Any]) -> str:
     """Write whether agents are softer than the best gait with a clock."""
     soft = [[word for word, _ in relations(data, "phase", name)] for name in HARDNESS]
     count_of = {word: sum(each.count(word) for each in soft) for word in ("lower", "higher", "not apart")}
+    if not any(map(any, soft)):
+        return "No agent and gait go at the same speed, so that nothing is compared."
     softer = sum(all(word == "lower" for word in pair) for pair in zip(*soft, strict=True))
     speeds = f"at {softer} of {len(data['speeds'])} speeds both are lower"
     return (
@@ -341,6 +360,8 @@ def not_softer(data: Mapping[str, Any]) -> str:
         sorted(one["return"] for one in searches if (one["origin"] == "random") == is_random)
         for is_random in (True, False)
     ]
+    if not all(returns):
+        return "The agents are not softer than a gait that sees nothing."
     blind, begun = (f"{each[0]:.0f} to {each[-1]:.0f}" for each in returns)
     return (
         "The agents are not softer than a gait that sees nothing. That gait was found from the gait of"

@@ -7,7 +7,8 @@
 A policy is what `hoof-env evaluate` takes, or a folder with runs of agents.train, a row each. The strengths
 are factors of those that `hoof_env.tasks.disturbances` has in units: slopes, bumps, and pushes on the trunk.
 Episode i of every policy has the same ground, start, commands and, as long as it lasts, pushes. Each policy
-plays on its own id, whose disturbances are replaced: the ids of horses differ in nothing else.
+plays on its own id, whose disturbances are replaced: when this was written, the ids of horses differed in
+nothing else; since then `HorseRough-v0` has another control step, observation and reward.
 """
 
 from __future__ import annotations

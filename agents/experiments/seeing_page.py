@@ -358,10 +358,11 @@ seeing gains 0.17 of what the agent gains over the zero action, below the bar of
 At the price of a fall of `HorseLegHop-v0`, 5 a second, the trainings of seed 1 of both ids kept diving
 forward until they fell, for 600,000 steps; with 64 environments, or with a discount of 0.995, seed 1 of
 `HorseLegBalance-v0` did so for 250,000. At 10 a second {upright} of the {trainings} trainings of `ppo_flat`
-that see all, and meet no pushes, fall in under a tenth of their episodes. That price was chosen after these
-trainings, in which the rise of the force saturated on the scale of a suspension; strengths, inertia and
-starts were not. They followed a probe that began in the gait of `HorseLegHop-v0`, under a radius of gyration
-of 0.5 m, and lasted a second an episode after 100,000 steps. 600,000 steps are what the time allowed.
+that see all, and meet no pushes, fall in under a tenth of their episodes. That price was chosen after
+trainings of the ids as they were, in which the rise of the force saturated on the scale of a suspension;
+strengths, inertia and starts were not. They followed a probe that began in the gait of `HorseLegHop-v0`,
+under a radius of gyration of 0.5 m, and lasted a second an episode after 100,000 steps. 600,000 steps are
+what the time allowed.
 """
 
 SECTION = """## `{name}`

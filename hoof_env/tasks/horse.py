@@ -316,7 +316,7 @@ class Horse:
             "lowest": -np.inf,
             "highest": np.inf,
             "is_free": self.is_free,
-            "followed": part_followed(dt),
+            "followed": part_followed(dt / self.speed_scale),
             **reference_constants(self.speed_scale, follows=self.gait is None),
         }
 

@@ -397,7 +397,7 @@ does [s]: an offset is a mean of the last actions, and decays under zero actions
 
 def part_followed(dt: float) -> float:
     """Return the part of the difference between action and offset by which the offset moves in a control step
-    of `dt` seconds [-]."""
+    of `dt` seconds of a horse of size 1 [-]; a similar animal's time is longer by the root of its size."""
     rest = 1.0 - FOLLOWED
     # The quotient is 1 where `dt` is `FOLLOWED_IN`, to the last bit
     return float(FOLLOWED * ((1.0 - rest ** (dt / FOLLOWED_IN)) / (1.0 - rest)))

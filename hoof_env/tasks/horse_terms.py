@@ -160,26 +160,42 @@ HORSE_ENTRIES = (
 )
 """Entries that can be observed of a horse; for each quantity, legs in the order of `LEGS`."""
 
+
+def _of_speed(scale: float) -> Scale:
+    """Return the scale of a speed, tanh(x / scale) for a horse of size 1 [m/s]."""
+    per = 1 / scale
+    return Scale(
+        f"tanh(x / ({scale:g} sqrt(size)))", lambda x, scene: x * (per / scene.task.speed_scale), True
+    )
+
+
 FINE: Mapping[str, Scale] = MappingProxyType(
     {
-        "vertical speed": tanh_of(0.3),
+        "vertical speed": _of_speed(0.3),
         "height above the ground": Scale(
             "tanh((x - 0.83 hip height) / (0.04 hip height))",
             lambda x, scene: (x - 0.83 * scene.task.height) / (0.04 * scene.task.height),
             True,
         ),
         "pitch": tanh_of(0.06),
-        "pitch rate": tanh_of(0.4),
-        "commanded speed": Scale("tanh((x - 2.4) / 0.7)", lambda x, scene: (x - 2.4) * (1 / 0.7), True),
+        "pitch rate": Scale(
+            "tanh(x sqrt(size) / 0.4)", lambda x, scene: x * (1 / 0.4) * scene.task.speed_scale, True
+        ),
+        "commanded speed": Scale(
+            "tanh((x / sqrt(size) - 2.4) / 0.7)",
+            lambda x, scene: (x / scene.task.speed_scale - 2.4) * (1 / 0.7),
+            True,
+        ),
         **dict.fromkeys(OFFSETS, Scale("tanh(3 x)", lambda x, scene: 3.0 * x, True)),
     }
 )
-"""Scales of `HorseRough-v0`, by entry: two thirds of the deviations of an animal that is pushed and acts at
-random. With the scales of `Horse-v0` what disturbs it is a twentieth of the crank's sine."""
+"""Scales of `HorseRough-v0`, by entry: those of the trunk are about two thirds of the deviations of an animal
+that is pushed and acts at random. With the scales of `Horse-v0` a disturbance changes the entries of the
+trunk by a fourteenth to a third of the deviation of the crank's sine."""
 
 ROUGH_ENTRIES = tuple(
     # In place of the speed, the error of the speed: their difference is what a learner would have to find
-    Entry("speed error", "trunk", "m/s", _speed_error, tanh_of(0.3))
+    Entry("speed error", "trunk", "m/s", _speed_error, _of_speed(0.3))
     if entry.name == "forward speed"
     else replace(entry, scale=FINE.get(entry.name, entry.scale))
     for entry in HORSE_ENTRIES

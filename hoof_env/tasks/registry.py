@@ -403,12 +403,12 @@ TASKS: Mapping[str, Task] = MappingProxyType(
             _FOUR_LEGS
             + "\n\nThe ground has slopes of up to 10 % and bumps of up to 5 cm. Every 2 to 4 s the trunk is"
             " pushed forward or back, by up to 1.5 m/s times the horse's mass. Neither the ground ahead nor"
-            " the pushes are observed. A policy acts 25 times a second, half as often as on Horse-v0; in the"
-            " time in which a body as high as its hips falls, that is as often as a robot with hips at half a"
-            " metre acts at 42 Hz. It sees the motion of the trunk on the scale on which disturbances change"
-            " it, and the load of each hoof. All weights of the reward are a fiftieth of Horse-v0's, but"
-            " `tracking` is four times and a fall nearly seven times as dear beside them: compare no returns"
-            " with Horse-v0's. The reference gait falls in every fifth episode. `terrain`, `strength` and"
+            " the pushes are observed. A policy acts 25 times a second, half as often as on Horse-v0. Scaled"
+            " by the root of the height of the hips, 25 Hz are 42 Hz of a robot with hips at 0.5 m. It"
+            " sees the motion of the trunk on the scale on which disturbances change it, and the load of each"
+            " hoof. All weights of the reward are a fiftieth of Horse-v0's, but relative to the rest"
+            " `tracking` weighs four times and a fall nearly seven times as much: compare no returns with"
+            " Horse-v0's. The reference gait falls in every fifth episode. `terrain`, `strength` and"
             " `push_impulse` change these disturbances; `size` does not.",
             {
                 **_HORSE,
