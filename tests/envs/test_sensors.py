@@ -13,7 +13,9 @@ from hoof_env.tasks.observation import ENTRIES, PLAIN, Entry, tanh_of
 from hoof_env.tasks.registry import TASKS
 
 LEG = "hoof_env/HorseLeg-v0"
-GROUPS = {task.id: [*task.settings({}).observation, "pressure"] for task in TASKS.values()}
+GROUPS = {
+    task.id: [*dict.fromkeys((*task.settings({}).observation, "hoof")), "pressure"] for task in TASKS.values()
+}
 CUT = 100.0
 NUMBERS = ("contact", "load")
 
@@ -52,6 +54,9 @@ def test_loads_below_the_threshold_and_their_contacts_are_not_read(env_id):
                     assert cut[f"{theirs}{point} {number}"] == expected
                 below += 0 < load < CUT
                 above += load >= CUT
+            if "load" in groups:
+                read = sum(load for load in loads if load >= CUT)
+                assert cut[f"{theirs}load"] == pytest.approx(read, abs=1e-9)
             total = sum(loads)
             centre = (loads[0] - loads[1]) / total if total > 0 else 0.0
             assert plain[f"{theirs}centre of pressure"] == pytest.approx(centre, abs=1e-6)
