@@ -319,6 +319,8 @@ Policies on [`HorseLegBalance-v0`](../environments/HorseLegBalance.md) and
 `python -m agents.experiments --plan seeing` from [seeing.json](seeing.json). Numbers are means over
 trainings, in brackets the lowest and the highest; a single number is of one policy. Trained by the code of
 {commits}. All play the same episodes, of which agents of several trainings play the first {starts}.
+The plan, `agents/plans/seeing.yml`, has more: where a table has fewer seeds, or lacks a row, they were not
+trained, and the same command goes on.
 
 {sections}
 
