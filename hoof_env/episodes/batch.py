@@ -41,7 +41,7 @@ from hoof_env.simd.compile import Kernel
 from hoof_env.simd.memory import Held
 from hoof_env.simd.threads import run_together
 from hoof_env.simd.user_functions import UserFunctionError, user_error
-from hoof_env.tasks.leg_starts import UsualRange
+from hoof_env.tasks.leg_starts import RISING, UsualRange
 from hoof_env.tasks.registry import Task
 from hoof_env.tasks.reward import BEARING, MAX_STRIDE
 from hoof_env.tasks.settings import ResolvedSettings, Settings
@@ -342,7 +342,9 @@ class EpisodeBatch:
                 start.pop(name, None)
         has_other_leg = any(getattr(settings, name) != getattr(meant, name) for name in OF_LEG)
         try:
-            if has_other_leg and not self._can_start(start):
+            # A trunk that is held is not raised for a gait that reaches below it
+            is_held = self.engine.trunk.kind not in RISING
+            if has_other_leg and ((is_held and "gait" in start) or not self._can_start(start)):
                 for name in OF_POSTURE:
                     start.pop(name, None)
             checked = self._check_usual(start)

@@ -71,6 +71,13 @@ def test_reset_options_of_a_leg_that_reaches_too_far_are_refused_or_drawn_again(
     assert infos["measured"]["toe_penetration"].max() < 1e-12
 
 
+@pytest.mark.parametrize("trunk", ["rail", "fixed", "boom"])
+def test_a_leg_of_another_shape_starts_above_the_ground_under_any_trunk(trunk):
+    envs = gym.make_vec("hoof_env/HorseLegHop-v0", num_envs=64, preset="klann", trunk=trunk)
+    envs.reset(seed=0)
+    assert envs.unwrapped.engine.report["toe_y"].min() >= 0.0
+
+
 @pytest.mark.parametrize("preset", PRESETS)
 def test_gaits_of_presets_carry_the_trunk_and_keep_their_speed(preset):
     """The walk has the Froude number 0.25, the run makes the most of 2.5 m/s."""
