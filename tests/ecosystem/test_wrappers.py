@@ -15,10 +15,15 @@ from gymnasium.vector import AutoresetMode
 from gymnasium.wrappers import vector
 
 STEPS, EPISODES, ROWS = 10, 2, 2
-SHORT = {"episode_seconds": 0.02 * STEPS}
 ACTIONS = np.random.default_rng(0).integers(-8, 9, (ROWS, EPISODES, STEPS // 2, 4)) / np.float32(8)
 """Eighths, which scaling does not round; each is held for two steps."""
 HELD = ACTIONS.repeat(2, axis=2)
+
+
+@functools.cache
+def short(env_id):
+    """Arguments with which an episode has `STEPS` control steps."""
+    return {"episode_seconds": STEPS * gym.make(env_id).unwrapped.dt}
 
 
 def fit(env, actions):
@@ -89,7 +94,7 @@ def assert_same(found, plain, change):
 @functools.cache
 def plain(env_id, row=0):
     """Episodes without wrappers."""
-    return play(gym.make(env_id, **SHORT), row)
+    return play(gym.make(env_id, **short(env_id)), row)
 
 
 def seen(change):
@@ -218,7 +223,7 @@ def native(env_id, **settings):
 def test_single(env_id, case):
     """Single: each of 20 wrappers against the environment alone."""
     wrapper, arguments, actions, change = case
-    env = wrap(gym.make(env_id, **SHORT), wrapper, arguments)
+    env = wrap(gym.make(env_id, **short(env_id)), wrapper, arguments)
     assert_same(play(env, actions=actions), plain(env_id), change)
 
 
@@ -227,7 +232,7 @@ def test_single(env_id, case):
 def test_vector(env_id, case, mode):
     """Native vector, restarting on the next or the same step: each of 11 wrappers, likewise."""
     wrapper, arguments, actions, change = case
-    envs = native(env_id, autoreset_mode=mode, **SHORT)
+    envs = native(env_id, autoreset_mode=mode, **short(env_id))
     if mode == "SAME_STEP" and "Observation" in name_of(case):
         with pytest.raises(ValueError, match="NEXT_STEP or DISABLED"):  # of any environment
             wrap(envs, wrapper, arguments)
@@ -250,10 +255,10 @@ def test_time_aware(env_id):
 
 def test_sticky_action(env_id):
     """`StickyAction`: an action that always sticks is the first one."""
-    env = wrappers.StickyAction(gym.make(env_id, **SHORT), 1 - 1e-12)
+    env = wrappers.StickyAction(gym.make(env_id, **short(env_id)), 1 - 1e-12)
     held = HELD.copy()
     held[:] = HELD[0, 0, 0]
-    assert_same(play(env)[:1], play(gym.make(env_id, **SHORT), actions=held)[:1], same)
+    assert_same(play(env)[:1], play(gym.make(env_id, **short(env_id)), actions=held)[:1], same)
 
 
 def test_discretize(env_id):
@@ -277,9 +282,9 @@ def test_discretize(env_id):
 def test_normalize_reward(env_id, kind):
     """`NormalizeReward`, single and native vector: signs kept, the discounted return's variance near 1."""
     if kind == "single":
-        env = wrappers.NormalizeReward(wrappers.Autoreset(gym.make(env_id, **SHORT)), gamma=0.9)
+        env = wrappers.NormalizeReward(wrappers.Autoreset(gym.make(env_id, **short(env_id))), gamma=0.9)
     else:
-        env = vector.NormalizeReward(native(env_id, **SHORT), gamma=0.9)
+        env = vector.NormalizeReward(native(env_id, **short(env_id)), gamma=0.9)
     env.reset(seed=0)
     env.action_space.seed(0)
     rewards = np.array([env.step(env.action_space.sample())[1] for _ in range(300)])
@@ -289,7 +294,7 @@ def test_normalize_reward(env_id, kind):
 
 def test_renders(env_id):
     """`AddRenderObservation`, `RenderCollection` and `HumanRendering`: frames."""
-    env = gym.make(env_id, render_mode="rgb_array", **SHORT)
+    env = gym.make(env_id, render_mode="rgb_array", **short(env_id))
     pixels = wrappers.AddRenderObservation(env, render_only=True)
     observation, _ = pixels.reset(seed=0)
     np.testing.assert_array_equal(observation, env.render())
@@ -306,7 +311,7 @@ def test_renders(env_id):
 def test_human_rendering(env_id, monkeypatch):
     """`HumanRendering`: a window, here without a screen."""
     monkeypatch.setenv("SDL_VIDEODRIVER", "dummy")
-    env = wrappers.HumanRendering(gym.make(env_id, render_mode="rgb_array", **SHORT))
+    env = wrappers.HumanRendering(gym.make(env_id, render_mode="rgb_array", **short(env_id)))
     env.reset(seed=0)
     env.step(fit(env, HELD)[0, 0, 0])
     assert env.window is not None
@@ -315,7 +320,7 @@ def test_human_rendering(env_id, monkeypatch):
 
 def test_dict_info_to_list(env_id):
     """`DictInfoToList` of a native vector environment: row by row the infos of the environment alone."""
-    envs, alone = vector.DictInfoToList(native(env_id, **SHORT)), gym.make(env_id, **SHORT)
+    envs, alone = vector.DictInfoToList(native(env_id, **short(env_id))), gym.make(env_id, **short(env_id))
     told, (_, wanted) = envs.reset(seed=0)[1], alone.reset(seed=0)
     assert told[0].keys() == wanted.keys()
     assert told[0]["speed"] == wanted["speed"]
@@ -330,7 +335,7 @@ def test_dict_info_to_list(env_id):
 def test_record_video_vector(env_id, tmp_path):
     """`RecordVideo` of the native vector environment: frames of all, not all alike."""
     pytest.importorskip("moviepy", reason='pip install "hoof-env[record]"')
-    envs = native(env_id, render_mode="rgb_array", **SHORT)
+    envs = native(env_id, render_mode="rgb_array", **short(env_id))
     films = vector.RecordVideo(envs, str(tmp_path / "videos"), episode_trigger=lambda number: number == 0)
     films.reset(seed=0)
     for action in [*fit(envs, HELD)[0, 0], *fit(envs, HELD)[0, 1]]:
