@@ -75,7 +75,7 @@ def test_every_page_and_every_id_is_there(site):
     films = {page for page, links in pages.items() if any(image.endswith(".gif") for image in links.images)}
     # They show what no page that plays does: two policies in one episode, published forces beside the
     # horse's. Each has a pause (site/static/animation.js).
-    with_films = ("index", "horse", "evidence/horse_gaits")
+    with_films = ("index", "hop", "horse", "seeing", "evidence/horse_gaits")
     assert films == {Path("docs", f"{name}.html") for name in with_films}
     for name in ("docs/paper.html", "docs/horse.html"):
         assert len(pages[Path(name)].frames) == 1
