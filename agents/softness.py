@@ -26,7 +26,7 @@ from matplotlib.figure import Figure
 from agents import open_loop, runs
 from agents.command import parse, run
 from agents.experiments.hop_page import figures_of, rounded
-from agents.kept import read_kept
+from agents.kept import EVIDENCE, read_kept
 from agents.train import Args as TrainingArgs
 from agents.train import train
 from hoof_env import register
@@ -38,9 +38,6 @@ from hoof_env.evaluation.episodes import FINAL_SEEDS, make_rows, score_vector
 from hoof_env.evaluation.statistics import Interval, estimate, over_seeds
 from hoof_env.tasks.hop_terms import BALANCE_SPEED_TERMS
 from hoof_env.tasks.registry import task_of
-
-EVIDENCE = Path(__file__).parents[1] / "docs" / "evidence"
-"""Folder of the page, its figures and its picture."""
 
 DATA = "softness.json"
 PAGE_FILE = "softness.md"

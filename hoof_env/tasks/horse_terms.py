@@ -40,6 +40,7 @@ IN_WEIGHTS = Scale("tanh(x / weight)", lambda x, scene: x / scene.episode.weight
 
 
 IN_LOADS = Scale("tanh(2 x / weight)", lambda x, scene: 2.0 * x / scene.episode.weight, True)
+"""Scale of the load of a whole hoof."""
 
 
 def _height(scene: ObservationInputs) -> Lanes:
@@ -189,9 +190,8 @@ FINE: Mapping[str, Scale] = MappingProxyType(
         **dict.fromkeys(OFFSETS, Scale("tanh(3 x)", lambda x, scene: 3.0 * x, True)),
     }
 )
-"""Scales of `HorseRough-v0`, by entry: those of the trunk are about two thirds of the deviations of an animal
-that is pushed and acts at random. With the scales of `Horse-v0` a disturbance changes the entries of the
-trunk by a fourteenth to a third of the deviation of the crank's sine."""
+"""Scales of `HorseRough-v0`, by entry. With those of `Horse-v0` a disturbance changes the entries of the
+trunk by much less than a stride changes the sine of the crank angle, and learners follow larger entries."""
 
 ROUGH_ENTRIES = tuple(
     # In place of the speed, the error of the speed: their difference is what a learner would have to find
