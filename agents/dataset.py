@@ -10,8 +10,9 @@ gives the same numbers. Next to Minari's files lies manifest.json with the comma
 the returns of each policy and how its episodes start, and the SHA-256 of every file and of the files of
 trained policies. A dataset is written in a folder of its own and moved when it is whole.
 
-Minari's metadata record the form of the actions: `load` and `check_actions` refuse a dataset with actions of
-another form, which may have the same shape.
+Minari's metadata record the form of the actions, the names and scales of what is observed, and the settings:
+`load` and `check_fit` refuse a dataset of another form, other names or other scales, which may have the same
+shapes, and warn of other settings.
 """
 
 from __future__ import annotations
@@ -22,6 +23,7 @@ import os
 import re
 import tempfile
 import tomllib
+import warnings
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
@@ -37,12 +39,19 @@ from agents import runs
 from agents.command import parse, parse_pairs, run
 from agents.levels import SCORES, Level, Levels, Partly
 from hoof_env.envs.policies import start_of
-from hoof_env.errors import DataFileError, MissingExtraError, OutputError, ParameterError, count
+from hoof_env.errors import (
+    DataFileError,
+    MissingExtraError,
+    OutputError,
+    ParameterError,
+    bounded,
+    count,
+)
 from hoof_env.gait import GaitParameters
 from hoof_env.policies.actor import Actor
 from hoof_env.policies.catalogue import SHIPPED
 from hoof_env.policies.find import find_policy, find_saved, is_model, shipped_ids
-from hoof_env.policies.record import describe_actions, own_id
+from hoof_env.policies.record import SCALES, describe, misfits, other_settings, own_id, settings_of
 from hoof_env.policies.saved import ABOUT, STATISTICS, WEIGHTS
 
 MANIFEST = "manifest.json"
@@ -50,6 +59,7 @@ PROJECT = Path(__file__).parents[1] / "pyproject.toml"  # file of the checkout, 
 ID = re.compile(r"(?:[-\w][-\w/]*[-\w]/)?[-\w]+-v\d+")  # Minari's form of an id, but always with a version
 ROOT = "MINARI_DATASETS_PATH"  # variable with Minari's folder of datasets
 ACTIONS = "actions"  # the key of what actions are
+OBSERVED = ("observation_names", SCALES)  # keys of what observations are
 
 
 @dataclass
@@ -136,7 +146,8 @@ def load(dataset_id: str) -> Any:
     """Load a dataset as `minari.load_dataset` does.
 
     Raises:
-        DataFileError: its environment is not registered here, or takes actions of another form today.
+        DataFileError: its environment is not registered here, or takes actions of another form today, or
+            shows other entries or scales.
         MissingExtraError: Minari is not installed.
     """
     try:
@@ -147,7 +158,7 @@ def load(dataset_id: str) -> Any:
     # Before `recover_environment`, which imports what the dataset names
     check_environment(dataset)
     with dataset.recover_environment() as env:
-        check_actions(dataset, env)
+        check_fit(dataset, env)
     return dataset
 
 
@@ -169,16 +180,19 @@ def check_environment(dataset: Any) -> None:
         )
 
 
-def check_actions(dataset: Any, env: Any) -> None:
+def check_fit(dataset: Any, env: Any) -> None:
     """Refuse a dataset, to read it or to add to it, if its actions are not of the form that the environment
-    takes: `DataFileError`."""
-    expected = describe_actions(env)
-    stored = dataset.storage.metadata.get(ACTIONS)
-    if stored != expected.get(ACTIONS):
-        raise DataFileError(
-            f"dataset {dataset.spec.dataset_id}: expected actions {expected.get(ACTIONS)}, got {stored}; "
-            "make it again by agents.dataset"
-        )
+    takes, or its observations have other names or scales: `DataFileError`. Warn of other settings, as they
+    were recorded; an older dataset has its actions' form only."""
+    here, there = describe(env), dataset.storage.metadata
+    unlike = misfits(there, {key: here[key] for key in OBSERVED if key in here})
+    if there.get(ACTIONS) != here.get(ACTIONS):
+        unlike.append(f"{ACTIONS} {there.get(ACTIONS)}, expected {here.get(ACTIONS)}")
+    name = dataset.spec.dataset_id
+    if unlike:
+        raise DataFileError(f"dataset {name}: made with {'; '.join(unlike)}; make it again by agents.dataset")
+    if "settings" in there and (other := other_settings(there, env)):
+        warnings.warn(bounded(f"dataset {name}: made with {'; '.join(other)}"), stacklevel=2)
 
 
 def _check_policies(policies: Sequence[str], level: str | None) -> None:
@@ -291,7 +305,9 @@ def _collect(minari: Any, env: Any, args: Args, episodes: int, dataset_id: str) 
         requirements=[f"hoof-env=={hoof_env.__version__}"],
         **_described(args),
     )
-    metadata: dict[str, Any] = {**describe_actions(env)}
+    here = describe(env)
+    metadata: dict[str, Any] = {key: here[key] for key in (ACTIONS, *OBSERVED) if key in here}
+    metadata["settings"] = settings_of(env)
     if levels:
         # Minari's names for the ends of the normalised score
         metadata |= {"ref_min_score": levels.scale.random, "ref_max_score": levels.scale.shipped}

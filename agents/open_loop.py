@@ -34,7 +34,7 @@ from agents import runs
 from agents.command import parse, parse_pairs, run
 from agents.evolution import generations, make_strategy, mean_costs, require
 from hoof_env._output import check_folder
-from hoof_env.envs.open_loop import COMMAND, GAIT, gait_file, open_loop, open_loop_record
+from hoof_env.envs.open_loop import COMMAND, GAIT, SCALES, gait_file, open_loop, open_loop_record
 from hoof_env.errors import DataFileError, HoofEnvError, ParameterError, check_number, parse_json
 from hoof_env.evaluation.episodes import make_rows, play_rows
 from hoof_env.evaluation.statistics import estimate
@@ -491,11 +491,13 @@ def write(
     gait = {}
     if "constant" in best["parameters"]:
         gait = {"gait": dict(zip(PARAMETERS, best["parameters"]["constant"], strict=True))}
+    scales = objective.env.observation_scales
     content = {
         **about,
         "parameters": best["parameters"],
         **gait,
         "dt": objective.env.dt,
+        **({SCALES: {COMMAND: scales[COMMAND]}} if objective.family.powers > 1 else {}),
         "score": score,
         "episodes": sum(restart["episodes"] for restart in restarts),
         **{key: round(sum(restart[key] for restart in restarts), 1) for key in ("wall_s", "cpu_s")},

@@ -33,6 +33,7 @@ from agents.settings import (
     normalize_arguments,
 )
 from hoof_env.errors import HoofEnvError, OutputError, ParameterError, check_number
+from hoof_env.policies.record import SCALES, misfits
 from hoof_env.policies.saved import WEIGHTS
 
 
@@ -277,6 +278,7 @@ def find_earlier(
     unlike = [
         f"{key}: {theirs!r} there, {ours!r} here" for key, (theirs, ours) in pairs.items() if theirs != ours
     ]
+    unlike += misfits(earlier, {key: record[key] for key in ("observation_names", SCALES) if key in record})
     if unlike:
         raise ParameterError(f"--resume: expected what {folder} was begun with; {'; '.join(unlike)}")
     # A model without checkpoints cannot go on

@@ -562,6 +562,12 @@ class LegBase:
         return tuple(entry.unit for entry in self.batch.plan.observed.entries)
 
     @property
+    def observation_scales(self) -> dict[str, str]:
+        """Formula of the scale of each observed entry, by name, as in "tanh(x / 5)". Files of policies
+        contain it, so that a policy that was trained with other scales is refused."""
+        return self.batch.plan.observation_scales
+
+    @property
     def action_form(self) -> str:
         """Meaning of actions: "rates" of the gait parameters of one leg, offsets from a horse's
         gait and their spans, as in "offsets of 0.4 and 0.04 rad", or the form of a user's map.

@@ -49,6 +49,9 @@ BLIND = ("crank", "gait", "target", "offset")
 COMMAND = "commanded speed"
 """Name of the observed command."""
 
+SCALES = "observation_scales"
+"""Entry of a gait's file with the scale of the command, if the gait depends on it."""
+
 
 def check_blind(settings: Any) -> None:
     """Raise `ParameterError` if an environment with these settings observes the ground, or anything that
@@ -181,7 +184,7 @@ def open_loop_record(path: Path | str) -> dict[str, Any]:
                 raise ValueError(f"{name} {brief(value)}")
         if not isinstance(record.get("env_id"), str | None):
             raise TypeError(f"env_id {brief(record['env_id'])}")
-        for name in ("env_kwargs", "versions"):
+        for name in ("env_kwargs", "versions", SCALES):
             if not isinstance(record.get(name, {}), dict):
                 raise TypeError(f"{name} {brief(record[name])}")
     except (OSError, ValueError, TypeError, KeyError, AttributeError) as error:
@@ -240,7 +243,8 @@ def load_open_loop(path_or_env_id: str | Path, env: Any, family: str | None = No
         family: family of that gait, "constant" or "phase"; None takes the better one.
 
     Raises:
-        DataFileError: there is no such gait, it cannot be read, or the environment has another body.
+        DataFileError: there is no such gait, it cannot be read, or the environment has another body or shows
+            the command on another scale.
     """
     path = Path(path_or_env_id)
     if path.suffix != ".json":
@@ -253,15 +257,23 @@ def load_open_loop(path_or_env_id: str | Path, env: Any, family: str | None = No
             f"open-loop gait {path}: expected the form {form!r} of {type(bare).__name__}, whose actions are"
             f" {bare.action_form}, got {brief(record['form'])}"
         )
+    there, present = (scales.get(COMMAND) for scales in (record.get(SCALES, {}), bare.observation_scales))
+    if there and present and there != present:
+        raise DataFileError(
+            f"open-loop gait {path}: expected a gait that was found with the scale {present!r} of the"
+            f" {COMMAND}, got {brief(there)}; search again by agents.open_loop"
+        )
     here = bare.spec and bare.spec.id
     unlike = []
     if here and (there := record.get("env_id") or here) not in (here, STANDS_FOR.get(here)):
         unlike.append(f"{there}, here {here}")
     if (made_with := record.get("versions", {}).get("hoof-env", __version__)) != __version__:
         unlike.append(f"hoof-env {made_with}, here {__version__}")
-    for key, there in record.get("env_kwargs", {}).items():
+    made_under = record.get("env_kwargs", {}) | ({"dt": record["dt"]} if "dt" in record else {})
+    for key, there in made_under.items():
+        value = bare.dt if key == "dt" else getattr(bare.settings, key, None)
         # Through JSON, as the record's value went: tuples are lists there.
-        if (present := json.loads(json.dumps(getattr(bare.settings, key, None), default=str))) != there:
+        if (present := json.loads(json.dumps(value, default=str))) != there:
             unlike.append(f"{key}={brief(there)}, here {brief(present)}")
     if unlike:
         warnings.warn(bounded(f"open-loop gait {path}: found for {'; '.join(unlike)}"), stacklevel=2)

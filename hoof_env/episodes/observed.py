@@ -128,6 +128,17 @@ class Observed:
             *(f"true {renamed.get(entry.name, entry.name)}" for entry in self.true_entries),
         )
 
+    def scales(self, renamed: Mapping[str, str]) -> dict[str, str]:
+        """Return the formula of each entry's scale, by name.
+
+        Args:
+            renamed: as in `names`.
+        """
+        return {
+            renamed.get(entry.name, entry.name): entry.scale.text
+            for entry in (*self.entries, *self.true_entries)
+        }
+
     def fill(self, record: Any, slots: Sequence[int], size: int) -> dict[int, str]:
         """Fill in its part of the task's record; return the group of the entry in each slot that is observed.
 

@@ -127,6 +127,11 @@ class Plan:
         )
 
     @property
+    def observation_scales(self) -> dict[str, str]:
+        """Formulas of the scales of what is observed, by entry."""
+        return self.observed.scales(self.body.renamed)
+
+    @property
     def legs(self) -> int:
         """Number of legs."""
         return self.body.kernels.legs

@@ -307,8 +307,9 @@ def load_policy(policy: Any, env: gym.Env[Any, Any] | None = None, seed: int = 0
         seed: seed of the policy "random".
 
     Raises:
-        DataFileError: no such file; or the policy is for another id, other spaces, other observations or
-            another form of actions. With other settings, or of another version of hoof-env, it warns.
+        DataFileError: no such file; or the policy is for another id, other spaces, other observations,
+            other scales of them, or another form of actions. With other settings, dt among them, or of
+            another version of hoof-env, it warns.
         ParameterError: no such name, or an environment is needed.
         MissingExtraError: an extra is missing that the file needs.
     """

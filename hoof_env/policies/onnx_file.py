@@ -30,7 +30,7 @@ OUTPUT = "action"
 """Names of input and output in files of `agents.export`. In others the input may have any name, and the
 actions are the output of this name or the first one."""
 
-OBJECTS = ("env_kwargs", "settings")
+OBJECTS = ("env_kwargs", "settings", "observation_scales")
 LISTS = (*OBJECTS, "observation_names", "action_names")
 """Metadata of an .onnx file that are JSON; the others are text."""
 
@@ -46,7 +46,7 @@ class OnnxPolicy(FilePolicy):
     Attributes:
         path: the file.
         record: the file's metadata: env_id, env_kwargs, settings, both spaces, names of observations and
-            actions, algo, and the version of hoof_env in which it was trained.
+            actions, scales of observations, algo, and the version of hoof_env in which it was trained.
 
     Args:
         path: a file of `agents.export` or `stamp_onnx`, or a folder that holds one as policy.onnx.
@@ -141,11 +141,11 @@ def _entry(key: str, text: str) -> Any:
 def stamp_onnx(path: str | Path, env: gym.Env[Any, Any], **record: str) -> OnnxPolicy:
     """Mark an ONNX file of any exporter as a policy for an environment; return the policy.
 
-    The file is changed in place: its metadata get the id, arguments, settings, spaces and names of the
-    environment, the form of its actions, and this version of hoof-env. All commands and `load_policy` take it
-    then, and refuse it where it does not fit. Its graph stays as it is. It must take observations as `env`
-    gives them, (batch, k), and give mean actions, (batch, n), as the output "action" or the first one; with a
-    batch of fixed size that is 1. Actions beyond [-1, 1] are clipped by the environment.
+    The file is changed in place: its metadata get the id, arguments, settings, spaces, names and scales of
+    the environment, the form of its actions, and this version of hoof-env. All commands and `load_policy`
+    take it then, and refuse it where it does not fit. Its graph stays as it is. It must take observations as
+    `env` gives them, (batch, k), and give mean actions, (batch, n), as the output "action" or the first one;
+    with a batch of fixed size that is 1. Actions beyond [-1, 1] are clipped by the environment.
 
     >>> import gymnasium as gym, hoof_env
     >>> env = gym.make("hoof_env/HorseLeg-v0")

@@ -20,6 +20,8 @@ from hoof_env.errors import DataFileError, bounded, brief, parse_json
 
 RECORD = {
     "env_kwargs": dict,
+    "observation_names": list,
+    "observation_scales": dict,
     "settings": dict,
     "args": dict,
     "versions": dict,
@@ -34,13 +36,22 @@ def describe_spaces(env: Any) -> dict[str, Any]:
     return {"observation_space": str(env.observation_space), "action_space": str(env.action_space)}
 
 
+SCALES = "observation_scales"
+"""Entry of a record with the formulas of the scales of what a policy sees, by name."""
+
+SHOWN = 4
+"""Number of scales that a message names."""
+
+
 def describe(env: Any) -> dict[str, Any]:
-    """Return the spaces of an environment, the names of its observations and actions, and the form of its
-    actions; entries that the environment lacks are left out."""
+    """Return the spaces of an environment, names and scales of its observations, names of its actions, and
+    their form; entries that the environment lacks are left out."""
     description = describe_spaces(env)
     for key in ("observation_names", "action_names"):
         if names := getattr(env.unwrapped, key, None):
             description[key] = list(names)
+    if scales := getattr(env.unwrapped, SCALES, None):
+        description[SCALES] = dict(scales)
     return description | describe_actions(env)
 
 
@@ -52,9 +63,9 @@ def describe_actions(env: Any) -> dict[str, str]:
 
 
 def describe_env(env: gym.Env[Any, Any]) -> dict[str, Any]:
-    """Return the entries of run.json about an environment: spaces, form of the actions and all settings."""
+    """Return the entries of run.json about an environment: those of `describe` and all settings."""
     settings = settings_of(env)
-    return describe_spaces(env) | describe_actions(env) | ({"settings": settings} if settings else {})
+    return describe(env) | ({"settings": settings} if settings else {})
 
 
 def settings_of(env: Any) -> dict[str, Any]:
@@ -84,7 +95,11 @@ def about(env: Any, env_id: str, env_kwargs: dict[str, Any], record: dict[str, A
     settings = record.get("settings") or settings_of(env)
     made_with = record.get("versions", {}).get("hoof-env", __version__)
     environment = {"env_id": env_id, "env_kwargs": env_kwargs, "settings": settings, "hoof_env": made_with}
-    return environment | describe(env) | known
+    here = describe(env)
+    # A policy may be older than the entry, and of other scales than today's
+    if record and SCALES not in record:
+        here.pop(SCALES, None)
+    return environment | here | known
 
 
 def environment_of(
@@ -153,32 +168,48 @@ def refuse_misfit(path: Path, there: dict[str, Any], here: dict[str, Any]) -> No
         there: description of the environment in which it was trained; entries that it lacks are not compared.
         here: description of the environment in which it is to play, as `describe` returns it.
     """
-    unlike = []
-    for key, expected in here.items():
-        trained = there.get(key, expected)
-        if trained != expected and not (key == "env_id" and same_id(trained, expected)):
-            unlike.append(_difference(key, trained, expected))
-        # What follows from another environment is not told
-        if key == "env_id" and unlike:
-            break
-    if unlike:
+    if unlike := misfits(there, here):
         name_there, _, version_there = str(there.get("env_id")).rpartition("-v")
         name_here, _, version_here = str(here.get("env_id")).rpartition("-v")
         if name_there == name_here != "" and version_there != version_here:
             unlike.append("another version of an id is another task")
         if "env_id" not in there:
             unlike.append("the file names no id; give the one of its training")
+        if any(words.startswith(SCALES) for words in unlike):
+            commit = there.get("versions", {}).get("commit")
+            code = f"commit {commit}" if commit else "the commit"
+            unlike.append(f"train it again, or play it in {code} of its training")
         raise DataFileError(f"policy {path}: trained for {'; '.join(unlike)}")
 
 
-def _difference(key: str, trained: Any, expected: Any) -> str:
-    """Write how an entry differs; of names only those that are more or fewer."""
+def misfits(there: dict[str, Any], here: dict[str, Any]) -> list[str]:
+    """Return in words how descriptions of two environments differ, as far as both have an entry; see
+    `refuse_misfit`."""
+    unlike = []
+    for key, expected in here.items():
+        trained = there.get(key, expected)
+        if trained != expected and not (key == "env_id" and same_id(trained, expected)):
+            unlike += _differences(key, trained, expected)
+        # What follows from another environment is not told
+        if key == "env_id" and unlike:
+            break
+    return unlike
+
+
+def _differences(key: str, trained: Any, expected: Any) -> list[str]:
+    """Write how an entry differs: of names those that are more or fewer, of scales those of the same name."""
+    if isinstance(trained, dict) and isinstance(expected, dict):
+        other = [name for name in expected if trained.get(name, expected[name]) != expected[name]]
+        words = [f"{name}: {brief(trained[name])}, expected {expected[name]!r}" for name in other[:SHOWN]]
+        words += [f"{len(other) - SHOWN} more"] if len(other) > SHOWN else []
+        return [f"{key}, {'; '.join(words)}"] if words else []
     if not (isinstance(trained, list) and isinstance(expected, list)):
-        return f"{key} {trained}, expected {expected}"
+        return [f"{key} {trained}, expected {expected}"]
     more = [str(name) for name in trained if name not in expected]
     fewer = [str(name) for name in expected if name not in trained]
     words = [f"{word} {', '.join(names)}" for word, names in (("with", more), ("without", fewer)) if names]
-    return f"{key} {' and '.join(words) or 'in another order'}, expected {len(expected)} of this environment"
+    how = " and ".join(words) or "in another order"
+    return [f"{key} {how}, expected {len(expected)} of this environment"]
 
 
 def check_record(path: Path, record: dict[str, Any], env: Any, env_id: str) -> None:
@@ -192,6 +223,16 @@ def check_record(path: Path, record: dict[str, Any], env: Any, env_id: str) -> N
         env_id: the id of `env`.
     """
     refuse_misfit(path, record, {"env_id": env_id, **describe(env)})
+    unlike = other_settings(record, env)
+    made_with = record.get("hoof_env", record.get("versions", {}).get("hoof-env", __version__))
+    if made_with != __version__:
+        unlike.append(f"hoof-env {made_with}, here {__version__}")
+    if unlike:
+        warnings.warn(bounded(f"policy {path}: trained with {'; '.join(unlike)}"), stacklevel=3)
+
+
+def other_settings(record: dict[str, Any], env: Any) -> list[str]:
+    """Return in words which settings of a record an environment has not, its control step among them."""
     here = settings_of(env)
     # A record without settings has the arguments only; the settings that they do not set count as equal. One
     # that its settings lack is newer than the policy, which was trained as the default has it.
@@ -199,16 +240,11 @@ def check_record(path: Path, record: dict[str, Any], env: Any, env_id: str) -> N
     there = default_settings_of(env) | there if here else there
     # Environments of other packages have no settings to compare.
     names = sorted({*here, *record.get("settings", {})}) if here else []
-    unlike = [
+    return [
         f"{key}={brief(there.get(key))}, here {brief(here.get(key))}"
         for key in names
         if there.get(key) != here.get(key)
     ]
-    made_with = record.get("hoof_env", record.get("versions", {}).get("hoof-env", __version__))
-    if made_with != __version__:
-        unlike.append(f"hoof-env {made_with}, here {__version__}")
-    if unlike:
-        warnings.warn(bounded(f"policy {path}: trained with {'; '.join(unlike)}"), stacklevel=3)
 
 
 def read_record(folder: Path | str) -> dict[str, Any]:

@@ -41,7 +41,6 @@ from hoof_env.policies.plain import DIGEST, FORMAT, Normalizer, built_box, check
 from hoof_env.policies.plain import WEIGHTS as WEIGHTS
 from hoof_env.policies.record import check_record as check_record
 from hoof_env.policies.record import describe as describe
-from hoof_env.policies.record import describe_actions as describe_actions
 from hoof_env.policies.record import describe_env as describe_env
 from hoof_env.policies.record import describe_spaces, refuse_misfit
 from hoof_env.policies.record import environment_of as environment_of

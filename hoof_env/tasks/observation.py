@@ -54,7 +54,7 @@ class Scale:
     """Scaling of a measured number to [-1, 1]; the result is clipped.
 
     Attributes:
-        text: formula, for the manual page.
+        text: formula, for the manual page and for files of policies, which are refused under another one.
         apply: function of the number and the `ObservationInputs`; None for the identity.
         saturates: True if the hyperbolic tangent of the result is taken.
 

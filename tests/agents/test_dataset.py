@@ -64,10 +64,40 @@ def test_a_replay_gives_the_same_bits(shelf, env_id, policies):
 def test_a_dataset_says_what_its_actions_are(shelf):
     data, _ = written(shelf, "run")
     assert dataset.load("hoof_env/some-v0").total_episodes == 2
-    for form, said in (("offsets", "got offsets"), (None, "got None")):
+    for form, said in (
+        ("offsets", "actions offsets, expected rates"),
+        (None, "actions None, expected rates"),
+    ):
         data.storage.update_metadata({"actions": form})
-        with pytest.raises(DataFileError, match=f"some-v0: expected actions rates, {said}"):
+        with pytest.raises(DataFileError, match=f"some-v0: made with {said}; make it again"):
             dataset.load("hoof_env/some-v0")
+
+
+@pytest.mark.parametrize(
+    ("entry", "value", "said"),
+    [
+        ("observation_names", ["pitch"], "observation_names with pitch and without sin"),
+        (
+            "observation_scales",
+            {"forward speed": "tanh(x / 9)"},
+            r"observation_scales, forward speed: 'tanh\(x / 9\)', expected 'tanh\(x / 5\)'; make it again",
+        ),
+    ],
+)
+def test_a_dataset_says_what_its_observations_are(shelf, entry, value, said):
+    data, _ = written(shelf, "run")
+    data.storage.update_metadata({entry: value})
+    with pytest.raises(DataFileError, match=f"some-v0: made with {said}"):
+        dataset.load("hoof_env/some-v0")
+
+
+def test_other_settings_of_a_dataset_are_reported(shelf):
+    """As those of an id of which the control step has changed."""
+    data, _ = written(shelf, "run")
+    settings = data.storage.metadata["settings"]
+    data.storage.update_metadata({"settings": settings | {"dt": 0.04}})
+    with pytest.warns(UserWarning, match=r"some-v0: made with dt=0\.04, here 0\.02$"):
+        dataset.load("hoof_env/some-v0")
 
 
 def test_a_dataset_without_a_tag_is_neither_read_nor_added_to(shelf):
@@ -78,10 +108,10 @@ def test_a_dataset_without_a_tag_is_neither_read_nor_added_to(shelf):
     for _ in range(5):
         collector.step(np.zeros(4, np.float32))
     old = collector.create_dataset("hoof_env/old-v0")
-    with pytest.raises(DataFileError, match="got None"):
+    with pytest.raises(DataFileError, match="actions None"):
         dataset.load("hoof_env/old-v0")
-    with pytest.raises(DataFileError, match="got None"):
-        dataset.check_actions(old, env)
+    with pytest.raises(DataFileError, match="actions None"):
+        dataset.check_fit(old, env)
 
 
 def test_the_manifest_has_hashes_licence_and_returns(shelf):

@@ -100,6 +100,8 @@ def test_metadata(env, exported):
     assert record["env_kwargs"] == KWARGS
     assert (record["algo"], record["seed"]) == ("ppo", "0")
     assert record["action_names"] == list(env.unwrapped.action_names)
+    assert record["observation_scales"] == env.unwrapped.observation_scales
+    assert record["observation_scales"]["forward speed"] == "tanh(x / 5)"
     assert record["actions"] == "rates"
     with make_env("hoof_env/Horse-v0") as horse:
         names = describe(horse)["action_names"]
@@ -130,6 +132,10 @@ def test_other_settings_and_another_version_are_reported(env, exported, trained,
         pytest.warns(UserWarning, match=r"trained with target_speed=\[2.5, 2.5\], here \[1, 1\]$"),
     ):
         find_policy(str(exported), other, ENV_ID)
+    with make_env(ENV_ID, **KWARGS, dt=0.01) as other:
+        for path in (exported, trained.folder):
+            with pytest.warns(UserWarning, match=r"trained with dt=0\.02, here 0\.01$"):
+                find_policy(str(path), other, ENV_ID)
     with make_env(ENV_ID) as other, pytest.warns(UserWarning, match=r"episode_seconds=0\.4, here 10\.0$"):
         find_policy(str(old), other, ENV_ID)
     with pytest.warns(UserWarning, match="trained with gone=1, here None$"):
@@ -153,6 +159,13 @@ def test_a_file_names_the_version_that_trained(env):
     about = export.about(env, ENV_ID, KWARGS, there)
     assert (about["hoof_env"], about["settings"]) == ("0.0.1", {"dt": 0.5})
     assert export.about(env, ENV_ID, KWARGS, {})["settings"]["episode_seconds"] == 0.4
+
+
+def test_an_export_knows_no_more_scales_than_its_run(env):
+    there = {"algo": "ppo", "observation_scales": {"height": "tanh(x / 9)"}}
+    assert "observation_scales" not in export.about(env, ENV_ID, KWARGS, {"algo": "ppo"})
+    for record in ({}, there):
+        assert export.about(env, ENV_ID, KWARGS, record)["observation_scales"]["height"].startswith("tanh((x")
 
 
 def test_a_file_that_acts_otherwise_is_not_written(tmp_path, monkeypatch):

@@ -169,6 +169,7 @@ def test_a_file_is_whole_and_its_gait_gets_the_score_it_names(tmp_path, env, fam
     low, high = found["score"]["interval95"]["return"]
     assert low < found["score"]["mean"]["return"] < high
     assert found["form"] == families.GAIT
+    assert "observation_scales" not in found  # no command
     assert ("gait" in found) == (family == "constant")
     assert list(found.get("gait", {}).values()) == found["parameters"].get("constant", [])
     assert found["command"].startswith("python")

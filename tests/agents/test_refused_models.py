@@ -120,6 +120,12 @@ RUNS = [
     (record(env_id=RAIL), "HorseLegRail-v0, expected"),
     (record(actions="offsets"), "actions offsets, expected rates"),
     (
+        record(observation_scales={"forward speed": "tanh(x / 9)", "toe load": "tanh(x / 3 weights)"}),
+        r"observation_scales, forward speed: 'tanh\(x / 9\)', expected 'tanh\(x / 5\)'; train it again, or",
+    ),
+    (record(observation_names=["pitch"]), "observation_names with pitch and without .*forward speed"),
+    (record(observation_scales=["tanh(x / 5)"]), r"run\.json: expected"),
+    (
         record(observation_space="Box(3)", action_space="Box(1)"),
         r"Box\(3\), expected .*; action_space Box\(1\)",
     ),
@@ -189,15 +195,15 @@ def exported(run, tmp_path_factory):
     return path
 
 
-def tagged(form):
-    """A file with another form of actions, or none, which may have the same shapes."""
+def tagged(**entries):
+    """A file with other entries, which may have the same shapes."""
 
     def write(path):
         import onnx
 
         graph = onnx.load(path)
-        kept = {entry.key: entry.value for entry in graph.metadata_props if entry.key != "actions"}
-        onnx.helper.set_model_props(graph, kept | ({"actions": form} if form else {}))
+        kept = {entry.key: entry.value for entry in graph.metadata_props}
+        onnx.helper.set_model_props(graph, kept | entries)
         onnx.save(graph, path)
 
     return write
@@ -219,7 +225,14 @@ def half(path):
 
 NO_ONNX = r"x\.onnx: expected an ONNX .*agents\.export"
 EXPORTS = [
-    (tagged("offsets"), ENV_ID, KWARGS, "actions offsets, expected rates"),
+    (tagged(actions="offsets"), ENV_ID, KWARGS, "actions offsets, expected rates"),
+    (
+        tagged(observation_scales='{"height": "tanh(x / 9)"}'),
+        ENV_ID,
+        KWARGS,
+        r"observation_scales, height: 'tanh\(x / 9\)', expected 'tanh\(\(x - hip .*; train it again, or",
+    ),
+    (tagged(observation_scales="[1]"), ENV_ID, KWARGS, rf"{NO_ONNX}.*observation_scales: expected a JSON"),
     (None, RAIL, {}, "env_id hoof_env/HorseLeg-v0, expected hoof_env/HorseLegRail-v0"),
     (None, ENV_ID, {"trunk": "rail"}, "observation_space"),
     (None, ENV_ID, {"observation": ["gait", "crank", "trunk", "hoof"]}, "observation_names"),

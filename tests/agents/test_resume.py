@@ -21,7 +21,7 @@ from agents.train import Args, main, train
 from agents.watch import DivergedError
 from hoof_env.errors import DataFileError, OutputError, ParameterError
 from hoof_env.policies.saved import ABOUT, WEIGHTS
-from tests.agents.conftest import ENV_ID, SHORT, TINY, train_tiny, training_episodes
+from tests.agents.conftest import ENV_ID, SHORT, TINY, change, train_tiny, training_episodes
 
 KILLS = 2
 ALWAYS = 1e-9  # seconds between two checkpoints: one between all rollouts
@@ -162,6 +162,13 @@ def stopped(tmp_path_factory):
 def test_another_command_does_not_resume(stopped, changes, said):
     with pytest.raises((ParameterError, DataFileError, OutputError), match=said):
         train(arguments("sac", **{"out": stopped, "resume": True, **changes}))
+
+
+def test_a_run_that_saw_on_another_scale_does_not_resume(stopped, tmp_path):
+    out = shutil.copytree(stopped, tmp_path / "run")
+    change(out / "run.json", observation_scales={"height": "tanh(x / 9)"})
+    with pytest.raises(ParameterError, match=r"observation_scales, height: 'tanh\(x / 9\)', expected"):
+        train(arguments("sac", out, resume=True))
 
 
 def test_other_versions_and_threads_are_reported_on_a_resume(tmp_path):

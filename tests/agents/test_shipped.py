@@ -22,6 +22,7 @@ from hoof_env.evaluation.episodes import score_vector
 from hoof_env.policies.catalogue import SHIPPED as DATA
 from hoof_env.policies.find import find_policy
 from hoof_env.policies.onnx_file import OnnxPolicy
+from hoof_env.policies.record import describe
 from tests.agents.conftest import train_tiny
 
 FOLDERS = sorted(path.parent for path in ship.POLICIES.glob("*/card.md"))
@@ -111,6 +112,15 @@ def assert_undominated(score, costs, names):
             found[name] = np.mean([episode["return"] for episode in episodes]), cost
     returned, cost = found.pop("policy")
     assert all(of_gait < returned or of_cost > cost for of_gait, of_cost in found.values()), found
+
+
+@SHIPPED
+def test_records_have_the_names_and_scales_of_the_id(folder):
+    saved = SavedModel.find(data_of(folder))
+    with make_env(saved.record["env_id"]) as env:
+        here = describe(env)
+    for record in (saved.record, OnnxPolicy(folder).record):
+        assert {key: record.get(key) for key in here} == here
 
 
 @SHIPPED

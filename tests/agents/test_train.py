@@ -35,6 +35,8 @@ def test_run_folder(trained):
     assert record["env_kwargs"] == {"episode_seconds": 0.4}
     assert record["settings"]["episode_seconds"] == 0.4
     assert record["settings"]["trunk"] == "suspended"
+    assert record["settings"]["dt"] == 0.02
+    assert [*record["observation_scales"]] == record["observation_names"]
     assert record["seed"] == 0
     assert record["finished"]["steps"] == 256
     assert {"python", "platform", "hoof-env", "numpy", "gymnasium", "stable-baselines3", "torch"} <= set(

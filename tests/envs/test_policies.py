@@ -289,6 +289,8 @@ def test_a_gait_of_another_id_is_reported(env, tmp_path):
         load_open_loop(write(tmp_path / "bare.json", env_id=None), env)
     with pytest.warns(UserWarning, match=r"found for hoof_env/HorseLeg-v0, here hoof_env/HorseLegRail-v0"):
         load_open_loop(path, gym.make("hoof_env/HorseLegRail-v0"))
+    with pytest.warns(UserWarning, match=r"found for dt=0\.04, here 0\.02"):
+        load_open_loop(write(tmp_path / "slow.json", dt=0.04), env)
 
 
 FIXED = "hoof_env/HorseLegFixed-v0"

@@ -10,7 +10,7 @@ import gymnasium as gym
 import numpy as np
 import pytest
 
-from hoof_env.envs.open_loop import load_open_loop, open_loop
+from hoof_env.envs.open_loop import GAITS, load_open_loop, open_loop
 from hoof_env.envs.policies import make_policy
 from hoof_env.errors import DataFileError, ParameterError
 
@@ -94,6 +94,7 @@ FILES = [
     ({**GAIT, "env_kwargs": [1]}, rf"{NO_GAIT}.*env_kwargs \[1\]"),
     ({**GAIT, "env_id": 5}, f"{NO_GAIT}.*env_id 5"),
     ({**GAIT, "versions": None}, f"{NO_GAIT}.*versions None"),
+    ({**GAIT, "observation_scales": "tanh"}, f"{NO_GAIT}.*observation_scales 'tanh'"),
     ("", NO_GAIT),
     ("[]", NO_GAIT),
     ("{}", f"{NO_GAIT}.*'parameters'"),
@@ -121,6 +122,22 @@ def test_a_file_for_an_environment_whose_actions_mean_something_else(tmp_path):
     path.write_text(json.dumps(content))
     with pytest.raises(DataFileError, match=r"constant: expected an environment .*leg, got a horse"):
         load_open_loop(path, horse())
+
+
+def test_a_gait_for_a_command_on_another_scale(tmp_path):
+    """Of HorseRough-v0, as it was when the speed was seen as on Horse-v0."""
+    path = tmp_path / "gait.json"
+    record = json.loads((GAITS / "HorseRough-v0-phase.json").read_text())
+    rough = made("hoof_env/HorseRough-v0")
+    for scales in (record["observation_scales"], {}):
+        path.write_text(json.dumps(record | {"observation_scales": scales}))
+        load_open_loop(path, rough)
+    path.write_text(json.dumps(record | {"observation_scales": {"commanded speed": "tanh(x / 5)"}}))
+    expected = (
+        r"scale 'tanh\(\(x / sqrt\(size\) - 2\.4\) / 0\.7\)' of the .*, got 'tanh\(x / 5\)'; search again"
+    )
+    with pytest.raises(DataFileError, match=expected):
+        load_open_loop(path, rough)
 
 
 def test_an_id_without_a_gait():

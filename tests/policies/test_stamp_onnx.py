@@ -55,6 +55,7 @@ def test_a_file_of_any_exporter(env, tmp_path, batch):
     assert (policy.record["env_id"], policy.record["algo"]) == (ENV_ID, "mine")
     assert policy.record["env_kwargs"] == SETTINGS
     assert policy.record["actions"] == "rates"
+    assert policy.record["observation_scales"] == env.unwrapped.observation_scales
     seen = np.random.default_rng(1).uniform(-1, 1, (7, 22)).astype(np.float32)
     again = hoof_env.load_policy(path, env)
     np.testing.assert_allclose(again.predict(seen)[0], seen @ matrix, atol=1e-6)
