@@ -366,7 +366,7 @@ class EpisodeBatch:
             checked = self._check_usual(start)
         except ParameterError:
             return False
-        return self.plan.body.raised_share(checked, self.engine.trunk) == 1.0
+        return self.plan.body.startable_share(checked, self.engine.trunk) == 1.0
 
     def _check_raised(self, options: Mapping[str, Any]) -> None:
         """Check that episodes can start with options, their trunk raised until no hoof is in level ground.
@@ -374,7 +374,7 @@ class EpisodeBatch:
         Raises:
             ParameterError: the trunk would be too high at all of the crank angles.
         """
-        if self.plan.body.raised_share(options, self.engine.trunk) == 0.0:
+        if self.plan.body.startable_share(options, self.engine.trunk) == 0.0:
             given = {name: options[name] for name in ("gait", "crank_angle") if name in options}
             raise ParameterError(
                 "options: expected a gait and a crank_angle in which the hoof is so little below O that an"

@@ -110,9 +110,9 @@ class Body(Protocol):
             ParameterError: an unknown option or a bad value.
         """
 
-    def raised_share(self, options: Mapping[str, Any], trunk: Trunk) -> float:
-        """Return at what share of the crank angles of checked options a start that is raised out of level
-        ground is below the height at which an episode fails [-]."""
+    def startable_share(self, options: Mapping[str, Any], trunk: Trunk) -> float:
+        """Return at what share of the crank angles of checked options an episode can start: raised out of
+        level ground, the trunk is still below the height at which an episode fails [-]."""
 
     def draw(
         self, options: Mapping[str, Any], generators: Sequence[np.random.Generator], engine: TrunkEngine

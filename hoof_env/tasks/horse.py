@@ -333,8 +333,8 @@ class Horse:
             checked["gait"] = gait_numbers("options['gait']", checked["gait"], self.gaits, self.size)
         return with_parameters(checked, settings)
 
-    def raised_share(self, options: Mapping[str, Any], trunk: Trunk) -> float:
-        """Return 1: a horse stands in its gait, and no height ends its episodes."""
+    def startable_share(self, options: Mapping[str, Any], trunk: Trunk) -> float:
+        """Return 1: a horse starts in its gait at any crank angle."""
         return 1.0
 
     def draw(

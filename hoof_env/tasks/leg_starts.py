@@ -188,15 +188,15 @@ def is_free_height(options: Mapping[str, Any]) -> bool:
     return "height" not in options or isinstance(options["height"], UsualRange)
 
 
-def raised_share(
+def startable_share(
     options: Mapping[str, Any],
     profile: LegProfile,
     trunk: Trunk,
     gaits: Sequence[GaitParameters],
     hoof_length: float,
 ) -> float:
-    """Return at what share of the crank angles of reset options a start that is raised out of level ground is
-    below the height at which an episode fails, in that of some gaits in which it is least [-]."""
+    """Return at what share of the crank angles of reset options an episode can start, in that of some gaits
+    in which it is least [-]; see `body.Body.startable_share`."""
     low, high = np.broadcast_to(options.get("crank_angle", (0.0, 2 * np.pi)), 2)
     theta = np.linspace(low, min(high, low + 2 * np.pi), ANGLES)
     most = MAX_HEIGHT * trunk.height - hoof_length

@@ -43,7 +43,7 @@ from hoof_env.tasks.leg_starts import (
     check_options,
     draw_starts,
     is_free_height,
-    raised_share,
+    startable_share,
 )
 from hoof_env.tasks.parameters import check_range, drive_of, ground_of, hoof_spring
 from hoof_env.tasks.settings import ResolvedSettings, Settings
@@ -322,13 +322,13 @@ class OneLeg:
             self.check_reachable("options['gait']", checked["gait"].to_array())
         return checked
 
-    def raised_share(self, options: Mapping[str, Any], trunk: Trunk) -> float:
-        """Return at what share of the crank angles an episode can start; see `Body.raised_share`."""
+    def startable_share(self, options: Mapping[str, Any], trunk: Trunk) -> float:
+        """Return at what share of the crank angles an episode can start; see `Body.startable_share`."""
         if trunk.kind not in RISING or not is_free_height(options):
             return 1.0
         fixed = options.get("gait") or self.gait
         gaits = [fixed] if fixed else [*paper_gaits(self.gaits).values()]
-        return raised_share(options, leg_profile(self.geometry), trunk, gaits, self._length)
+        return startable_share(options, leg_profile(self.geometry), trunk, gaits, self._length)
 
     def draw(
         self, options: Mapping[str, Any], generators: Sequence[np.random.Generator], engine: TrunkEngine
