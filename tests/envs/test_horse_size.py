@@ -3,8 +3,11 @@
 import gymnasium as gym
 import numpy as np
 import pytest
-from family import HORSE, actions, make, same
+from family import HORSE, ROUGH, actions, make, same
 from horses import SEEDS, played
+from hypothesis import given as of_any
+from hypothesis import settings as run_with
+from hypothesis import strategies as st
 
 from hoof_env import register
 from hoof_env.constants import GRAVITY
@@ -81,6 +84,40 @@ def test_horses_of_all_sizes_fall_at_the_same_instant(size):
         last.append((steps, *info.get("end", [""])))
     assert "joint" in last[0][1]
     assert last[1] == last[0]
+
+
+def seen_while_moving(env_id, size, seed, phase, froude, pitch):
+    """Observations at a start and after each of some steps of random actions and a push, for a size."""
+    pace = size**0.5
+    world = similar_world(size) | {"dt": 0.04 * pace, "target_speed": None, "terrain": None}
+    env = make(env_id, **world)
+    speed = pace * (froude * GRAVITY * 1.4) ** 0.5
+    push = round(0.08 * pace, 9), 400.0 * size**3.5, 0.0
+    options = {"phase": phase, "speed": 1.2 * speed, "pitch": pitch, "target_speed": speed, "pushes": [push]}
+    frames = [env.reset(seed=seed, options=options)[0]]
+    for action in actions(seed, 6, env_id=env_id):
+        seen, _, failed, _, _ = env.step(action)
+        if failed:
+            break
+        frames.append(seen)
+    return np.array(frames)
+
+
+@of_any(
+    size=st.floats(0.4, 2.0), seed=st.integers(0, 2**31), phase=st.floats(0.0, 1.0),
+    froude=st.floats(0.1, 1.0), pitch=st.floats(-0.1, 0.1),
+)  # fmt: skip
+@run_with(max_examples=12, deadline=None, derandomize=True)
+def test_animals_of_all_sizes_see_rough_ground_alike(size, seed, phase, froude, pitch):
+    """At similar states, reached by similar pushes on level ground, all entries are equal."""
+    one, other = (seen_while_moving(ROUGH, each, seed, phase, froude, pitch) for each in (1.0, size))
+    np.testing.assert_allclose(other, one, atol=1e-4)
+
+
+def test_the_entries_of_level_ground_differ_with_the_size():
+    """Speeds and rates are seen on scales that do not go with it, so the property above is one of its id."""
+    one, other = (seen_while_moving(HORSE, each, 3, 0.2, 0.5, 0.0) for each in (1.0, 0.5))
+    assert np.abs(other - one).max() > 0.1
 
 
 def figures(size, froude, world=None):
