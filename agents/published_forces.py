@@ -26,8 +26,10 @@ from agents.judges import nearest_of, read_judges
 from hoof_env._output import markdown_table
 from hoof_env.constants import GRAVITY
 from hoof_env.lab.compare import Comparison, compare
+from hoof_env.lab.forces import THRESHOLD
 from hoof_env.lab.picture import draw, warnings_of
 from hoof_env.lab.read import read_record
+from hoof_env.lab.stances import whole_stances
 from hoof_env.records import export_episode
 from hoof_env.tasks.horse import HIP_HEIGHT, MASS
 from hoof_env.tasks.horse_gaits import PAIRS, kinematic_speeds
@@ -61,7 +63,8 @@ so well do numbers of several sources fit together.
 {table}
 
 RMSE and errors are B less A in body weights; brackets have A's own figure. Touchdown is laid on touchdown,
-left limbs stand for both.
+left limbs stand for both. The model is planar, so left and right are names: its left fore limb is here the
+one that lands after the left hind limb as on a horse, and `--map-b` below gives it that name.
 
 {pictures}
 
@@ -159,16 +162,39 @@ def leave_out_beginning(path: Path) -> None:
     runs.write_text(path, "\n".join([head, *kept]) + "\n")
 
 
-def compared(kind: str, folder: Path) -> tuple[Comparison, float]:
-    """Write and compare both records of a gait; return the comparison, and the share of the weight that the
-    horse's forces bear."""
+def renamed(gait: Path, kind: str) -> dict[str, str]:
+    """Return the fore limbs of the model's record by other names, so that the left one is that which lands
+    after the left hind limb as on a horse, empty if it is. In the plane left and right are names."""
+    record = read_record(gait, mass=MASS)
+    landings = {
+        limb: np.array([first for first, _ in whole_stances(force[:, 1], THRESHOLD, record.rate)])
+        for limb, force in record.limbs.items()
+    }
+    hind = landings["left_hind"]
+    strides = {limb: at / np.mean(np.diff(hind)) for limb, at in landings.items()}
+    lag = float(read_judges()[kind]["lag"]["horse"])
+
+    def off(limb: str) -> float:
+        """Return how far the lag of a fore limb is from a horse's [strides]."""
+        turns = np.exp(2j * np.pi * (strides[limb][:, None] - strides["left_hind"] - lag))
+        return abs(float(np.angle(turns.mean())) / (2 * np.pi))
+
+    crossed = {"left_fore": "right_fore", "right_fore": "left_fore"}
+    return crossed if off("right_fore") < off("left_fore") else {}
+
+
+def compared(kind: str, folder: Path) -> tuple[Comparison, float, dict[str, str]]:
+    """Write and compare both records of a gait; return the comparison, the share of the weight that the
+    horse's forces bear, and the model's limbs that have other names there."""
     name = f"kinematic-{kind}"
     time, forces, share = published(kind, kinematic_speeds()[name])
     horse, gait = folder / f"published-{kind}.csv", folder / f"{name}.csv"
     write_published(horse, time, forces)
     export_episode(gait, name, ENV_ID, seconds=SECONDS)
     leave_out_beginning(gait)
-    return compare(read_record(horse, mass=MASS), read_record(gait, mass=MASS), units="BW"), share
+    limbs = renamed(gait, kind)
+    found = compare(read_record(horse, mass=MASS), read_record(gait, limbs, mass=MASS), units="BW")
+    return found, share, limbs
 
 
 def rows_of(kind: str, found: Comparison) -> list[list[str]]:
@@ -224,12 +250,15 @@ HEAD = (
 
 def write(args: Args) -> None:
     """Compare and write the page."""
+    # Before the pictures are written
+    commit = runs.versions().get("commit", "unknown")
     folder = args.out / NAME
     folder.mkdir(parents=True, exist_ok=True)
     args.records.mkdir(parents=True, exist_ok=True)
-    of_gaits, shares, rows = {}, [], []
+    of_gaits, shares, rows, named = {}, [], [], {}
     for kind in ("walk", "trot"):
-        found, share = compared(kind, args.records)
+        found, share, limbs = compared(kind, args.records)
+        named[kind] = "".join(f" {name}={limb}" for name, limb in limbs.items())
         of_gaits[kind] = found
         shares.append(f"{share:.2f} ({kind})")
         rows += rows_of(kind, found)
@@ -240,7 +269,7 @@ def write(args: Args) -> None:
     }
     page = PAGE.format(
         command="python -m agents.published_forces",
-        commit=runs.versions().get("commit", "unknown"),
+        commit=commit,
         shares=" and ".join(shares),
         found=summary(of_gaits),
         table=markdown_table(HEAD, rows),
@@ -253,7 +282,8 @@ def write(args: Args) -> None:
         folder=args.records,
         warm=WARM,
         commands="\n".join(
-            f"hoof-env compare {a} {b} --mass-a {MASS:g} --mass-b {MASS:g} --units BW --out {kind}.png"
+            f"hoof-env compare {a} {b}{' --map-b' * bool(named[kind])}{named[kind]} --mass-a {MASS:g}"
+            f" --mass-b {MASS:g} --units BW --out {kind}.png"
             for kind, (a, b) in names.items()
         ),
     )

@@ -73,9 +73,20 @@ def test_the_commands_of_the_page_find_what_it_says(written, monkeypatch, capsys
         said = capsys.readouterr().out
         warned = re.findall("^warning: (.*)$", said, re.M)
         assert re.findall(rf"^\* {kind}: (.*)$", text, re.M) == warned
-        a, b = (read_record(Path(word), mass=forces.MASS) for word in shlex.split(command)[1:3])
+        paths = [Path(word) for word in shlex.split(command)[1:3]]
+        limbs = forces.renamed(paths[1], kind)
+        assert ("--map-b left_fore=right_fore right_fore=left_fore" in command) == bool(limbs)
+        a, b = read_record(paths[0], mass=forces.MASS), read_record(paths[1], limbs, mass=forces.MASS)
         found = compare(a, b, units="BW")
         assert said.startswith(report(found))
         for row in forces.rows_of(kind, found):
             assert f"| {' | '.join(row)} |" in text
     assert "fore-aft forces point opposite ways" in text
+    assert "scatter" not in text
+
+
+def test_the_fore_limb_that_lands_as_on_a_horse_is_compared(written):
+    """Whatever it is called: the walk's left hind limb is followed by the right fore limb of the record."""
+    gaits = {kind: written / "records" / f"kinematic-{kind}.csv" for kind in ("walk", "trot")}
+    found = {kind: forces.renamed(path, kind).get("left_fore") for kind, path in gaits.items()}
+    assert found == {"walk": "right_fore", "trot": None}
