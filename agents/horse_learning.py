@@ -1,7 +1,7 @@
-"""What stock PPO learns on rough ground, and what kept it from learning: `python -m agents.horse_learning`.
+"""How steadily stock PPO learns on rough ground, and why: `python -m agents.horse_learning`.
 
 On the id as it was, it measures how much of PPO's first gradient is signal under several weights of the
-reward, and what a step along it gains. Then it trains stock PPO of several seeds and blind twins on each of
+reward, and what a step along it gains. It trains stock PPO of several seeds and blind twins on each of
 `CASES`, plays all of them and policies that need no learning on the same 1,000 starts, and writes
 `docs/evidence/horse_learning.md` with its figures. What is among the figures is not measured again.
 """
@@ -130,7 +130,8 @@ CASES = {
     "as it is, with 50 actions a second": Case(5, 0, env_kwargs={"dt": 0.02}),
     "as it is, with rewards fifty times as large": Case(5, 0, env_kwargs={"reward_weights": WEIGHTS}),
 }
-"""Forms of the task under which stock PPO learns: the id's own, the one before, and with one change each."""
+"""Forms of the task under which stock PPO is trained: the id's own, the one before, and with one change each.
+The page has those whose training is through."""
 
 
 class CrankFeedback:

@@ -302,4 +302,4 @@ ROUGH_WEIGHTS: Mapping[str, float] = MappingProxyType(
 )
 """Weights of `HorseRough-v0`: a fiftieth of the ones above, but `tracking` four times and `fall` nearly seven
 times as much. With the ratios of `Horse-v0`, agents trade falls and the commanded speed for smoother gaits.
-Stock PPO limits the norm of all gradients together: with values of hundreds the policy's part is lost."""
+Stock PPO limits the norm of all gradients together: values of hundreds leave little of the policy's part."""
