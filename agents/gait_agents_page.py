@@ -1,0 +1,322 @@
+"""Section and figure of the page `docs/evidence/gait_change.md` on agents: at which speed their lag jumps,
+and whether it is learnt or that with which they began."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+
+from agents.gait_agents import FROUDES, NONE, Agent, Herd, Row, counts
+from agents.gait_map import (
+    CHANGES,
+    CHECKED,
+    CLOSE,
+    JUMP,
+    MIXTURE,
+    OBJECTIVES,
+    TITLES,
+    apart,
+    jumps_between,
+    turned,
+    value_of,
+)
+from agents.gait_task import COMMANDS, KEPT, SPARED, STARTS
+from agents.judge_pictures import DPI, LETTERS, WIDTH
+from agents.judges import read_judges
+from agents.rules import rejection_reason
+from hoof_env._output import markdown_table
+from hoof_env.tasks.horse import PHASE_SPAN, SPANS
+
+CHANGE = CHANGES["walk to trot"]
+COLOURS = {"walk": "#0072B2", "trot": "#D55E00"}
+SYMBOLS = {"walk": "o", "trot": "^"}
+
+SECTION = """## Agents
+
+**Asked.** Does one agent for all speeds, whose footfall is free, change its lag, at which speed, and by what
+it spares?
+
+**Trained.** {agents}, by `ppo_flat`, {steps:,} steps each, at commit `{commit}`
+([figures]({name}/agents.json)). The task is that of `HorseRough-v0` on level ground without pushes, with
+`footfall="free"`, 50 actions a second and one command an episode, from Froude number {low:g} to {high:g}
+(`agents/gait_task.py`). Per second the reward is {alive:g} for staying up, {tracking:g} (1 - 2 e) for a
+relative error e of the speed, less {slip:g} times the slip over the commanded distance and {spared:g} times
+the objective, and {fall:g} less for a fall. Actions shift each leg by up to {span:g} strides, so that any lag
+is in reach, and change the swing by up to {swing:g} rad. They do so around the gaits above that were searched
+for the mixture with seed 0, at the rate of the command, so that strides are given here, too. Half of the
+agents begin with walks and half with trots, which tells what is learnt from what is inherited.
+
+**Found.** {found}
+
+![Work, peak force, loading and their mixture of agents that spare them, and their lag, over the Froude
+number]({name}/agents.png)
+
+Lines are means over seeds, symbols single seeds, faint ones of speeds at which an agent does not count;
+dashes are the lags of the gaits around which agents act. Each agent played the same {starts} starts at each
+command; the rules of a gait that counts are those above without the given stride.
+
+### Where the lag of agents jumps
+
+{jumps}
+
+*Counting* are pairs of an agent and a speed. A lag *jumps* where it differs by more than {jump:g} strides
+from one speed at which the agent counts to the next such one.
+
+### Which beginning pays
+
+Means over the seeds that count, their number in brackets; *untrained* are the searched gaits as they are.
+
+{paying}
+
+"""
+
+
+def mean_of(lags: Sequence[float]) -> float:
+    """Return the circular mean of lags, from -0.1 to 0.4 [strides]; NaN of none."""
+    if not len(lags):
+        return float("nan")
+    return turned(float(np.angle(np.mean(np.exp(4j * np.pi * np.array(lags)))) / (4 * np.pi)))
+
+
+def some(rows: Sequence[Row], start: str, objective: str, froude: float | None = None) -> list[Row]:
+    """Return the figures of the agents with a beginning and an objective, at all speeds or one."""
+    return [
+        row
+        for row in rows
+        if row["start"] == start and row["objective"] == objective and froude in (None, row["froude"])
+    ]
+
+
+def seeds_of(rows: Sequence[Row], start: str, objective: str) -> list[int]:
+    """Return the seeds of the agents with a beginning and an objective."""
+    return sorted({row["seed"] for row in some(rows, start, objective)})
+
+
+def lags_at(rows: Sequence[Row]) -> list[float]:
+    """Return the lags of rows that have one."""
+    return [row["lag"] for row in rows if row["lag"] is not None]
+
+
+def lags_of(rows: Sequence[Row], agent: Agent) -> list[tuple[float, float]]:
+    """Return the Froude numbers at which an agent counts, and its lag there [strides], from -0.1 to 0.4."""
+    own = [row for row in some(rows, agent.start, agent.objective) if row["seed"] == agent.seed]
+    return [(row["froude"], turned(row["lag"])) for row in own if counts(row)]
+
+
+def jump_rows(rows: Sequence[Row]) -> list[list[str]]:
+    """Return a row for each objective and beginning: how many count, lags at low and high speed, jumps."""
+    table = []
+    for objective in OBJECTIVES:
+        for start in STARTS:
+            of_both = some(rows, start, objective)
+            if not of_both:
+                continue
+            seeds = seeds_of(rows, start, objective)
+            told = []
+            for seed in seeds:
+                found = jumps_between(lags_of(rows, Agent(start, objective, seed)))
+                told += [f"seed {seed}, {a:g} to {b:g}: {x:.2f} to {y:.2f}" for a, b, x, y in found]
+            low = [row for row in of_both if row["froude"] < CHANGE[0]]
+            high = [row for row in of_both if row["froude"] > CHANGE[1]]
+            before = some(rows, start, NONE)
+            lags = [
+                f"{mean_of(lags_at([row for row in before if row['froude'] in speeds])):.2f} to"
+                f" {mean_of(lags_at(part)):.2f}"
+                for part, speeds in ((part, {row["froude"] for row in part}) for part in (low, high))
+            ]
+            counting = sum(counts(row) for row in of_both)
+            table.append(
+                [
+                    TITLES[objective],
+                    start,
+                    str(len(seeds)),
+                    f"{counting} of {len(of_both)}",
+                    *lags,
+                    "; ".join(told) or "none",
+                ]
+            )
+    return table
+
+
+def value_at(rows: Sequence[Row], start: str, objective: str, froude: float) -> tuple[float, int]:
+    """Return the mean of what the agents that count spare at a speed, and how many they are."""
+    values = [float(value_of(row, objective)) for row in some(rows, start, objective, froude) if counts(row)]
+    return (float(np.mean(values)) if values else float("nan")), len(values)
+
+
+def best_at(rows: Sequence[Row], objective: str, froude: float) -> str:
+    """Return the beginning whose agents spare most at a speed; "equal" if another's do as well, "none" where
+    no agent counts."""
+    values = {start: value_at(rows, start, objective, froude)[0] for start in STARTS}
+    known = {start: value for start, value in values.items() if np.isfinite(value)}
+    if not known:
+        return "none"
+    first = min(known, key=lambda start: known[start])
+    is_close = any(value / known[first] - 1 < CLOSE for start, value in known.items() if start != first)
+    return "equal" if is_close else first
+
+
+def paying_rows(rows: Sequence[Row]) -> list[list[str]]:
+    """Return a row for each objective and speed: what agents of each beginning spare, and their lags."""
+    table = []
+    for objective in OBJECTIVES:
+        for froude in FROUDES:
+            cells = [TITLES[objective], f"{froude:g}"]
+            for start in STARTS:
+                value, number = value_at(rows, start, objective, froude)
+                lag = mean_of([row["lag"] for row in some(rows, start, objective, froude) if counts(row)])
+                cells.append(f"{value:.2f} at lag {lag:.2f} ({number})" if number else "-")
+            untrained = [some(rows, start, NONE, froude) for start in STARTS]
+            shown = [f"{value_of(of[0], objective):.2f}" if counts(of[0]) else "-" for of in untrained]
+            cells.append(", ".join(shown))
+            table.append([*cells, best_at(rows, objective, froude)])
+    return table
+
+
+def inherited(rows: Sequence[Row], objective: str) -> tuple[float, float]:
+    """Return the mean distance of the lags of agents that began with a walk's from those that began with a
+    trot's, over speeds, untrained and trained [strides]."""
+    distances = []
+    for of in (NONE, objective):
+        each = []
+        for froude in FROUDES:
+            means = [mean_of(lags_at(some(rows, start, of, froude))) for start in ("walk", "trot")]
+            each.append(abs(apart(*means)))
+        distances.append(float(np.nanmean(each)))
+    return distances[0], distances[1]
+
+
+def told(rows: Sequence[Row]) -> str:
+    """Return what was found, in sentences."""
+    trained = [row for row in rows if row["objective"] != NONE]
+    agents = [*dict.fromkeys(Agent(row["start"], row["objective"], row["seed"]) for row in trained)]
+    fell = sum(not row["fell"] <= 0.1 for row in trained)
+    reasons = [rejection_reason({n: np.nan if x is None else x for n, x in row.items()}) for row in trained]
+    slow = sum("of the commanded speed" in reason for reason in reasons)
+    slipping = sum("slip" in reason for reason in reasons)
+    landing = sum("stances a turn" in reason for reason in reasons)
+    counting = sum(not reason for reason in reasons)
+    text = [
+        f"Of {len(trained)} pairs of an agent and a speed {counting} count; {fell} fall too often, {slow}"
+        f" miss the speed, {slipping} slip too far and {landing} do not land once a turn"
+    ]
+    low, high = CHANGE
+    for objective in OBJECTIVES:
+        of_objective = [agent for agent in agents if agent.objective == objective]
+        jumps = [jumps_between(lags_of(rows, agent)) for agent in of_objective]
+        falling = [
+            (a, b)
+            for found in jumps
+            for a, b, before, after in found
+            if apart(after, before) < 0 and a <= high and b >= low
+        ]
+        text.append(
+            f"By {TITLES[objective]} the lag of {sum(map(bool, jumps))} of {len(of_objective)} agents jumps"
+            f" somewhere, and of {len(falling)} it falls between speeds that touch {low:g} to {high:g}"
+        )
+    parts = []
+    for objective in OBJECTIVES:
+        before, after = inherited(rows, objective)
+        parts.append(f"{after:.2f} by {TITLES[objective]}")
+    text.append(
+        f"Agents that begin with walks and those that begin with trots are {before:.2f} strides of lag apart"
+        f" untrained, on the average over speeds, and trained {', '.join(parts)}"
+    )
+    for objective in OBJECTIVES:
+        best = [(best_at(rows, objective, froude), f"{froude:g}") for froude in FROUDES]
+        named = {"equal": "both", "none": "neither"}
+        told_of = [
+            f"{named.get(kind, kind)} at {', '.join(froude for one, froude in best if one == kind)}"
+            for kind in (*STARTS, *named)
+            if any(one == kind for one, _ in best)
+        ]
+        text.append(f"By {TITLES[objective]} the beginning that pays most is {'; '.join(told_of)}")
+    return ". ".join(text) + "."
+
+
+def draw(rows: Sequence[Row], path: Path) -> None:
+    """Write a picture: what agents spare by beginning and speed, and their lag."""
+    from matplotlib.figure import Figure
+
+    picture = Figure((WIDTH / DPI, 6.2), dpi=DPI, layout="constrained")
+    axes = picture.subplots(2, len(OBJECTIVES), sharex=True, sharey="row")
+    walk = read_judges()["walk"]["lag"]["bar"]
+    for column, objective in enumerate(OBJECTIVES):
+        for axis in axes[:, column]:
+            axis.axvspan(*CHANGE, color="0.85", lw=0)
+            axis.set_xscale("log")
+            axis.tick_params(labelsize=LETTERS)
+            axis.grid(alpha=0.3)
+        up, down = axes[:, column]
+        down.axhspan(*walk, color=COLOURS["walk"], alpha=0.12, lw=0)
+        down.axhspan(-0.05, 0.05, color=COLOURS["trot"], alpha=0.12, lw=0)
+        for start in STARTS:
+            style = {"color": COLOURS[start]}
+            for row in some(rows, start, objective):
+                if row["lag"] is None:
+                    continue
+                faint = {"ms": 3, "ls": "", "marker": SYMBOLS[start], "alpha": 0.7 if counts(row) else 0.15}
+                up.plot([row["froude"]], [value_of(row, objective)], **style, **faint)
+                down.plot([row["froude"]], [turned(row["lag"])], **style, **faint)
+            means = [value_at(rows, start, objective, froude)[0] for froude in FROUDES]
+            up.plot(FROUDES, means, lw=1.4, label=f"from {start}", **style)
+            for of, dash, width in ((objective, "-", 1.4), (NONE, "--", 0.9)):
+                lags = [mean_of(lags_at(some(rows, start, of, froude))) for froude in FROUDES]
+                down.plot(FROUDES, lags, dash, lw=width, **style)
+        up.set_title(TITLES[objective], fontsize=LETTERS)
+        down.set_xlabel("Froude number", fontsize=LETTERS)
+        down.set_xticks([0.1, 0.3, 1], ["0.1", "0.3", "1"])
+        down.set_xticks([], minor=True)
+    axes[0, 0].set_ylabel("figure over its scale, less is better [-]", fontsize=LETTERS)
+    axes[1, 0].set_ylabel("lag [strides]", fontsize=LETTERS)
+    axes[0, 0].legend(fontsize=LETTERS, frameon=False)
+    picture.savefig(path, metadata={"Software": None})
+
+
+JUMP_HEAD = (
+    "spared",
+    "beginning",
+    "seeds",
+    "counting",
+    "lag under Fr 0.35, untrained to trained",
+    "lag above Fr 0.5, untrained to trained",
+    "lag jumps at Fr",
+)
+PAYING_HEAD = ("spared", "Fr", *(f"from {start}" for start in STARTS), "untrained walk, trot", "best")
+
+
+def section(herd: Herd, name: str, folder: Path) -> str:
+    """Return the section of a page and write its figure; nothing without agents.
+
+    Args:
+        herd: figures of agents.
+        name: folder of the figure in the page's links.
+        folder: that folder.
+    """
+    if not herd.rows:
+        return ""
+    rows = herd.rows
+    draw(rows, folder / "agents.png")
+    numbers = [f"{len(seeds_of(rows, start, MIXTURE))} from {start}s" for start in STARTS]
+    return SECTION.format(
+        agents=f"For each objective {' and '.join(numbers)}",
+        low=COMMANDS[0],
+        high=COMMANDS[1],
+        steps=herd.steps,
+        commit=herd.about.get("commit", "unknown"),
+        name=name,
+        alive=KEPT["alive"],
+        tracking=KEPT["tracking"],
+        slip=KEPT["slip"],
+        spared=SPARED,
+        fall=KEPT["fall"],
+        span=PHASE_SPAN,
+        swing=SPANS[1],
+        found=told(rows),
+        starts=CHECKED,
+        jumps=markdown_table(JUMP_HEAD, jump_rows(rows)),
+        jump=JUMP,
+        paying=markdown_table(PAYING_HEAD, paying_rows(rows)),
+    )
