@@ -1,8 +1,8 @@
 """Agents of `agents.gait_task`: which lag they learn at each speed, by what they spare.
 
-Each is trained by `ppo_flat` for one objective, one seed and one kind of gait to begin with, on commanded
-speeds of Froude numbers 0.1 to 1.1. Then it plays fixed commands: the same starts for all, measured as the
-searched gaits are. Horses that have learnt nothing are played as well.
+Each is trained by `ppo_flat` for one objective or none, one seed and one kind of gait to begin with, on
+commanded speeds of Froude numbers 0.1 to 1.1. Then it plays fixed commands: the same starts for all, measured
+as the searched gaits are. Horses that have learnt nothing are played as well.
 """
 
 from __future__ import annotations
@@ -29,7 +29,9 @@ from hoof_env.policies.find import find_policy
 FROUDES = tuple(froude for froude in gait_map.FROUDES if COMMANDS[0] <= froude <= COMMANDS[1])
 """Froude numbers of the commands: those of the searches that agents are trained on."""
 SEEDS = 5  # trainings for each objective and beginning
+CONTROLS = 3  # trainings without an objective for each beginning
 RUNS = Path("runs", "gait_agents")
+CONTROL = "nothing"  # what an agent without an objective spares
 NONE = "none"  # objective of a horse that has learnt nothing
 FIRST_START = 10**9  # seed of the first start, as of the searched gaits
 
@@ -51,10 +53,11 @@ class Agent(NamedTuple):
 
 def all_agents() -> list[Agent]:
     """Return all agents, those with the same seed together."""
-    untrained = [Agent(start, NONE, 0) for start in STARTS]
-    return untrained + [
-        Agent(start, objective, seed) for seed in range(SEEDS) for objective in OBJECTIVES for start in STARTS
-    ]
+    agents = [Agent(start, NONE, 0) for start in STARTS]
+    for seed in range(SEEDS):
+        spared = (*OBJECTIVES, CONTROL) if seed < CONTROLS else OBJECTIVES
+        agents += [Agent(start, objective, seed) for objective in spared for start in STARTS]
+    return agents
 
 
 def settings() -> dict[str, Any]:
@@ -114,9 +117,15 @@ def rows_of_file(content: Any) -> tuple[dict[str, str], int, list[Row]]:
     for k, row in enumerate(rows):
         check_numbers(f"row {k}", row, ("froude", "seed"))
         check_numbers(f"row {k}", row, FIGURES, missing=True)
-        for name, known in (("start", STARTS), ("objective", (*OBJECTIVES, NONE)), ("froude", FROUDES)):
+        for name, known in (
+            ("start", STARTS),
+            ("objective", (*OBJECTIVES, CONTROL, NONE)),
+            ("froude", FROUDES),
+        ):
             if row[name] not in known:
                 raise ValueError(f"{name} of row {k} is {brief(row[name])}")
+        if not isinstance(row["commit"], str):
+            raise TypeError(f"commit of row {k} is {brief(row['commit'])}")
     return dict(content["versions"]), int(content["steps"]), rows
 
 
@@ -143,10 +152,15 @@ class Herd:
         """Return the agents that have figures."""
         return [*dict.fromkeys(Agent(row["start"], row["objective"], row["seed"]) for row in self.rows)]
 
+    def commits(self) -> list[str]:
+        """Return the commits at which figures were measured."""
+        return [*dict.fromkeys(row["commit"] for row in self.rows)]
+
     def keep(self, rows: list[Row]) -> None:
         """Add rows and write the file."""
-        self.rows += rows
-        self.about = self.about or runs.versions()
+        now = runs.versions()
+        self.rows += [row | {"commit": now.get("commit", "unknown")} for row in rows]
+        self.about = self.about or now
         columns = [*self.rows[0]]
         lines = [json.dumps([row[name] for name in columns]) for row in self.rows]
         head = {"versions": self.about, "steps": self.steps, "columns": columns}

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from agents.gait_agents import FROUDES, NONE, Agent, Herd, Row, counts
+from agents.gait_agents import CONTROL, FROUDES, NONE, Agent, Herd, Row, counts
 from agents.gait_map import (
     CHANGES,
     CHECKED,
@@ -30,6 +30,7 @@ from hoof_env._output import markdown_table
 from hoof_env.tasks.horse import PHASE_SPAN, SPANS
 
 CHANGE = CHANGES["walk to trot"]
+ALL = (*OBJECTIVES, CONTROL)
 COLOURS = {"walk": "#0072B2", "trot": "#D55E00"}
 SYMBOLS = {"walk": "o", "trot": "^"}
 
@@ -38,7 +39,7 @@ SECTION = """## Agents
 **Asked.** Does one agent for all speeds, whose footfall is free, change its lag, at which speed, and by what
 it spares?
 
-**Trained.** {agents}, by `ppo_flat`, {steps:,} steps each, at commit `{commit}`
+**Trained.** {agents}, by `ppo_flat`, {steps:,} steps each, at {commits}
 ([figures]({name}/agents.json)). The task is that of `HorseRough-v0` on level ground without pushes, with
 `footfall="free"`, 50 actions a second and one command an episode, from Froude number {low:g} to {high:g}
 (`agents/gait_task.py`). Per second the reward is {alive:g} for staying up, {tracking:g} (1 - 2 e) for a
@@ -54,8 +55,9 @@ agents begin with walks and half with trots, which tells what is learnt from wha
 number]({name}/agents.png)
 
 Lines are means over seeds, symbols single seeds, faint ones of speeds at which an agent does not count;
-dashes are the lags of the gaits around which agents act. Each agent played the same {starts} starts at each
-command; the rules of a gait that counts are those above without the given stride.
+dashes are the lags of the gaits around which agents act, dots those of agents that spare nothing. Each agent
+played the same {starts} starts at each command; the rules of a gait that counts are those above without the
+given stride.
 
 ### Where the lag of agents jumps
 
@@ -108,35 +110,28 @@ def lags_of(rows: Sequence[Row], agent: Agent) -> list[tuple[float, float]]:
 def jump_rows(rows: Sequence[Row]) -> list[list[str]]:
     """Return a row for each objective and beginning: how many count, lags at low and high speed, jumps."""
     table = []
-    for objective in OBJECTIVES:
+    for objective in ALL:
         for start in STARTS:
-            of_both = some(rows, start, objective)
-            if not of_both:
+            own = some(rows, start, objective)
+            if not own:
                 continue
-            seeds = seeds_of(rows, start, objective)
-            told = []
-            for seed in seeds:
-                found = jumps_between(lags_of(rows, Agent(start, objective, seed)))
-                told += [f"seed {seed}, {a:g} to {b:g}: {x:.2f} to {y:.2f}" for a, b, x, y in found]
-            low = [row for row in of_both if row["froude"] < CHANGE[0]]
-            high = [row for row in of_both if row["froude"] > CHANGE[1]]
-            before = some(rows, start, NONE)
-            lags = [
-                f"{mean_of(lags_at([row for row in before if row['froude'] in speeds])):.2f} to"
-                f" {mean_of(lags_at(part)):.2f}"
-                for part, speeds in ((part, {row["froude"] for row in part}) for part in (low, high))
+            cells = [
+                TITLES.get(objective, objective),
+                f"{start}s",
+                str(len(seeds_of(rows, start, objective))),
             ]
-            counting = sum(counts(row) for row in of_both)
-            table.append(
-                [
-                    TITLES[objective],
-                    start,
-                    str(len(seeds)),
-                    f"{counting} of {len(of_both)}",
-                    *lags,
-                    "; ".join(told) or "none",
-                ]
-            )
+            cells.append(f"{sum(map(counts, own))} of {len(own)}")
+            for is_of in (lambda row: row["froude"] < CHANGE[0], lambda row: row["froude"] > CHANGE[1]):
+                before, after = (
+                    mean_of(lags_at([row for row in of if is_of(row)]))
+                    for of in (some(rows, start, NONE), own)
+                )
+                cells.append(f"{before:.2f} to {after:.2f}")
+            jumps = []
+            for seed in seeds_of(rows, start, objective):
+                found = jumps_between(lags_of(rows, Agent(start, objective, seed)))
+                jumps += [f"seed {seed}, {a:g} to {b:g}: {x:.2f} to {y:.2f}" for a, b, x, y in found]
+            table.append([*cells, "; ".join(jumps) or "none"])
     return table
 
 
@@ -188,51 +183,78 @@ def inherited(rows: Sequence[Row], objective: str) -> tuple[float, float]:
     return distances[0], distances[1]
 
 
+def against_control(rows: Sequence[Row], objective: str) -> float:
+    """Return by which part agents that spare something have less of it than those that spare nothing: a mean
+    over beginnings and the speeds at which both count; NaN without these."""
+    parts = []
+    for start in STARTS:
+        for froude in FROUDES:
+            ours = value_at(rows, start, objective, froude)[0]
+            control = some(rows, start, CONTROL, froude)
+            theirs = [float(value_of(row, objective)) for row in control if counts(row)]
+            if np.isfinite(ours) and theirs:
+                parts.append(1 - ours / np.mean(theirs))
+    return float(np.mean(parts)) if parts else float("nan")
+
+
+def changes_as_horses(jumps: Sequence[tuple[float, float, float, float]]) -> bool:
+    """Return True if a lag jumps once, down, and where horses change."""
+    if len(jumps) != 1:
+        return False
+    a, b, before, after = jumps[0]
+    return apart(after, before) < 0 and a <= CHANGE[1] and b >= CHANGE[0]
+
+
+def listed(values: Sequence[str]) -> str:
+    """Return values as text, in the order of objectives."""
+    return ", ".join(values)
+
+
 def told(rows: Sequence[Row]) -> str:
     """Return what was found, in sentences."""
     trained = [row for row in rows if row["objective"] != NONE]
     agents = [*dict.fromkeys(Agent(row["start"], row["objective"], row["seed"]) for row in trained)]
-    fell = sum(not row["fell"] <= 0.1 for row in trained)
     reasons = [rejection_reason({n: np.nan if x is None else x for n, x in row.items()}) for row in trained]
-    slow = sum("of the commanded speed" in reason for reason in reasons)
-    slipping = sum("slip" in reason for reason in reasons)
-    landing = sum("stances a turn" in reason for reason in reasons)
-    counting = sum(not reason for reason in reasons)
+    words = ("fell in", "of the commanded speed", "slip", "stances a turn")
+    fell, slow, slipping, landing = (sum(word in reason for reason in reasons) for word in words)
     text = [
-        f"Of {len(trained)} pairs of an agent and a speed {counting} count; {fell} fall too often, {slow}"
-        f" miss the speed, {slipping} slip too far and {landing} do not land once a turn"
+        f"Of {len(trained)} pairs of an agent and a speed {reasons.count('')} count; {fell} fall too often,"
+        f" {slow} miss the speed, {slipping} slip too far and {landing} do not land once a turn"
     ]
-    low, high = CHANGE
-    for objective in OBJECTIVES:
-        of_objective = [agent for agent in agents if agent.objective == objective]
-        jumps = [jumps_between(lags_of(rows, agent)) for agent in of_objective]
-        falling = [
-            (a, b)
-            for found in jumps
-            for a, b, before, after in found
-            if apart(after, before) < 0 and a <= high and b >= low
-        ]
-        text.append(
-            f"By {TITLES[objective]} the lag of {sum(map(bool, jumps))} of {len(of_objective)} agents jumps"
-            f" somewhere, and of {len(falling)} it falls between speeds that touch {low:g} to {high:g}"
-        )
-    parts = []
-    for objective in OBJECTIVES:
-        before, after = inherited(rows, objective)
-        parts.append(f"{after:.2f} by {TITLES[objective]}")
+    jumping = []
+    as_horses = []
+    for objective in ALL:
+        own = [agent for agent in agents if agent.objective == objective]
+        if not own:
+            continue
+        jumps = [jumps_between(lags_of(rows, agent)) for agent in own]
+        title = TITLES.get(objective, objective)
+        jumping.append(f"{sum(map(bool, jumps))} of {len(own)} by {title}")
+        as_horses.append(f"{sum(map(changes_as_horses, jumps))} by {title}")
+    text.append(f"The lag jumps anywhere in {listed(jumping)}")
     text.append(
-        f"Agents that begin with walks and those that begin with trots are {before:.2f} strides of lag apart"
-        f" untrained, on the average over speeds, and trained {', '.join(parts)}"
+        f"It jumps once, down, and between speeds that touch {CHANGE[0]:g} to {CHANGE[1]:g} in"
+        f" {listed(as_horses)}"
     )
+    apart_by = {objective: inherited(rows, objective) for objective in ALL if some(rows, "walk", objective)}
+    untrained = next(iter(apart_by.values()))[0]
+    after = [f"{pair[1]:.2f} by {TITLES.get(objective, objective)}" for objective, pair in apart_by.items()]
+    text.append(
+        f"Agents from walks and from trots are {untrained:.2f} strides of lag apart untrained, on the average"
+        f" over speeds, and trained {listed(after)}"
+    )
+    if some(rows, "walk", CONTROL):
+        less = [f"{100 * against_control(rows, one):.0f} % {TITLES[one]}" for one in OBJECTIVES]
+        text.append(f"Sparing pays: agents have less than those that spare nothing by {listed(less)}")
     for objective in OBJECTIVES:
         best = [(best_at(rows, objective, froude), f"{froude:g}") for froude in FROUDES]
         named = {"equal": "both", "none": "neither"}
-        told_of = [
-            f"{named.get(kind, kind)} at {', '.join(froude for one, froude in best if one == kind)}"
+        parts = [
+            f"{named.get(kind, f'{kind}s')} at {', '.join(froude for one, froude in best if one == kind)}"
             for kind in (*STARTS, *named)
             if any(one == kind for one, _ in best)
         ]
-        text.append(f"By {TITLES[objective]} the beginning that pays most is {'; '.join(told_of)}")
+        text.append(f"By {TITLES[objective]} the beginning that pays most is {'; '.join(parts)}")
     return ". ".join(text) + "."
 
 
@@ -262,7 +284,7 @@ def draw(rows: Sequence[Row], path: Path) -> None:
                 down.plot([row["froude"]], [turned(row["lag"])], **style, **faint)
             means = [value_at(rows, start, objective, froude)[0] for froude in FROUDES]
             up.plot(FROUDES, means, lw=1.4, label=f"from {start}", **style)
-            for of, dash, width in ((objective, "-", 1.4), (NONE, "--", 0.9)):
+            for of, dash, width in ((objective, "-", 1.4), (CONTROL, ":", 1.2), (NONE, "--", 0.9)):
                 lags = [mean_of(lags_at(some(rows, start, of, froude))) for froude in FROUDES]
                 down.plot(FROUDES, lags, dash, lw=width, **style)
         up.set_title(TITLES[objective], fontsize=LETTERS)
@@ -300,12 +322,14 @@ def section(herd: Herd, name: str, folder: Path) -> str:
     rows = herd.rows
     draw(rows, folder / "agents.png")
     numbers = [f"{len(seeds_of(rows, start, MIXTURE))} from {start}s" for start in STARTS]
+    controls = len({row["seed"] for row in rows if row["objective"] == CONTROL})
+    commits = herd.commits()
     return SECTION.format(
-        agents=f"For each objective {' and '.join(numbers)}",
+        agents=f"For each objective {' and '.join(numbers)}, and {controls} of each that spare nothing",
         low=COMMANDS[0],
         high=COMMANDS[1],
         steps=herd.steps,
-        commit=herd.about.get("commit", "unknown"),
+        commits=f"commit{'s' * (len(commits) > 1)} {', '.join(f'`{commit}`' for commit in commits)}",
         name=name,
         alive=KEPT["alive"],
         tracking=KEPT["tracking"],

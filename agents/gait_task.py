@@ -47,8 +47,8 @@ TERMS = {"transport": "work", "peak": "stance_peaks", "loading": "steepest_rises
 
 
 def weights_of(objective: str) -> dict[str, float]:
-    """Return the weights of the reward with which a learner spares one of `OBJECTIVES`."""
-    names = OBJECTIVES[objective]
+    """Return the weights of the reward with which a learner spares one of `OBJECTIVES`, or nothing."""
+    names = OBJECTIVES.get(objective, ())
     charged = {TERMS[name]: SPARED / SCALES[name] / len(names) for name in names}
     return dict.fromkeys(("peak", "landing", "pitch", *TERMS.values()), 0.0) | KEPT | charged
 

@@ -9,7 +9,7 @@ from foreign import CUT, FOREIGN
 import hoof_env
 from agents import gait_agents, gait_task
 from agents import gait_agents_page as page
-from agents.gait_agents import NONE, Agent, Herd
+from agents.gait_agents import CONTROL, NONE, Agent, Herd
 from agents.gait_map import OBJECTIVES, SCALES, Map, jumps_between
 from agents.gait_rig import Rig
 from agents.horse_gaits import speed_of
@@ -95,7 +95,7 @@ def rows_of(agent, lags, **changed):
         "duty_fore": 0.5, "duty_hind": 0.5, "transport": 1.0, "peak": 1.0, "loading": 30.0,
     } | changed  # fmt: skip
     return [
-        agent._asdict() | {"froude": froude} | figures | {"lag": lag}
+        agent._asdict() | {"froude": froude} | figures | {"lag": lag, "commit": "1"}
         for froude, lag in zip(gait_agents.FROUDES, lags, strict=True)
     ]
 
@@ -105,11 +105,20 @@ def made():
     count = len(gait_agents.FROUDES)
     changing = [0.25 if froude < 0.4 else 0.01 for froude in gait_agents.FROUDES]
     rows = []
-    for objective in (NONE, *OBJECTIVES):
+    for objective in (NONE, CONTROL, *OBJECTIVES):
         walk = [0.25] * count if objective == NONE else changing
         rows += rows_of(Agent("walk", objective, 0), walk)
         rows += rows_of(Agent("trot", objective, 0), [0.49] * count, transport=2.0)
     return rows
+
+
+def test_every_objective_has_the_same_seeds_from_walks_and_from_trots():
+    agents = gait_agents.all_agents()
+    for start in gait_task.STARTS:
+        for objective in OBJECTIVES:
+            own = [agent.seed for agent in agents if agent[:2] == (start, objective)]
+            assert own == [*range(gait_agents.SEEDS)]
+    assert len({agent.folder for agent in agents}) == len(agents)
 
 
 def test_jumps_and_what_is_inherited_are_told():
@@ -123,7 +132,9 @@ def test_jumps_and_what_is_inherited_are_told():
     assert page.best_at(rows, "work", 0.2) == "walk"
     assert page.best_at(rows, "peak", 0.2) == "equal"
     text = page.told(rows)
-    assert "By work the lag of 1 of 2 agents jumps somewhere, and of 1 it falls between" in text
+    assert "The lag jumps anywhere in 1 of 2 by mixture, 1 of 2 by work" in text
+    assert "between speeds that touch 0.35 to 0.5 in 1 by mixture, 1 by work" in text
+    assert "less than those that spare nothing by 0 % mixture, 0 % work" in text
     # What does not count is no gait
     for row in rows:
         row["slip_hind"] = 0.2
@@ -136,16 +147,17 @@ def test_agents_are_trained_once_and_their_page_is_written(tmp_path, monkeypatch
     monkeypatch.setattr(gait_agents, "settings", lambda: tiny)
     monkeypatch.setattr(gait_agents, "FROUDES", (0.2, 0.8))
     monkeypatch.setattr(page, "FROUDES", (0.2, 0.8))
-    monkeypatch.setattr(gait_agents, "SEEDS", 1)
+    few = [Agent(start, objective, 0) for objective in (NONE, "peak") for start in gait_task.STARTS]
+    monkeypatch.setattr(gait_agents, "all_agents", lambda: few)
     monkeypatch.setattr(gait_agents, "RUNS", tmp_path / "runs")
     monkeypatch.setattr(gait_agents, "CHECKED", 2)
     path = tmp_path / "agents.json"
     herd = gait_agents.complete(path)
-    assert len(herd.rows) == 2 * (2 + 2 * len(OBJECTIVES))
+    assert len(herd.rows) == 2 * len(few)
     text = path.read_text()
     capsys.readouterr()
     again = gait_agents.complete(path)
-    assert capsys.readouterr().out == f"{path}: has 10 of 10 agents\n"
+    assert capsys.readouterr().out == f"{path}: has 4 of 4 agents\n"
     assert path.read_text() == text
     assert again.rows == herd.rows
     assert again.steps == 128
