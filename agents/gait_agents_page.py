@@ -4,6 +4,7 @@ and whether it is learnt or that with which they began."""
 from __future__ import annotations
 
 from collections.abc import Sequence
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -31,6 +32,8 @@ from hoof_env.tasks.horse import PHASE_SPAN, SPANS
 
 CHANGE = CHANGES["walk to trot"]
 ALL = (*OBJECTIVES, CONTROL)
+STEP = (0.35, 0.45)  # played Froude numbers between which horses change
+LEAST = -0.2  # lag that is shown as the least one: agents from trots land their fore hooves early [strides]
 COLOURS = {"walk": "#0072B2", "trot": "#D55E00"}
 SYMBOLS = {"walk": "o", "trot": "^"}
 
@@ -39,7 +42,8 @@ SECTION = """## Agents
 **Asked.** Does one agent for all speeds, whose footfall is free, change its lag, at which speed, and by what
 it spares?
 
-**Trained.** {agents}, by `ppo_flat`, {steps:,} steps each, at {commits}
+**Trained.** {agents}, by `ppo_flat`,
+{steps:,} steps each, at {commits}
 ([figures]({name}/agents.json)). The task is that of `HorseRough-v0` on level ground without pushes, with
 `footfall="free"`, 50 actions a second and one command an episode, from Froude number {low:g} to {high:g}
 (`agents/gait_task.py`). Per second the reward is {alive:g} for staying up, {tracking:g} (1 - 2 e) for a
@@ -47,7 +51,8 @@ relative error e of the speed, less {slip:g} times the slip over the commanded d
 the objective, and {fall:g} less for a fall. Actions shift each leg by up to {span:g} strides, so that any lag
 is in reach, and change the swing by up to {swing:g} rad. They do so around the gaits above that were searched
 for the mixture with seed 0, at the rate of the command, so that strides are given here, too. Half of the
-agents begin with walks and half with trots, which tells what is learnt from what is inherited.
+agents begin with walks and half with trots, which tells what is learnt from what is inherited, and some are
+paid for nothing that horses may spare, which tells what is learnt for it.
 
 **Found.** {found}
 
@@ -68,7 +73,8 @@ from one speed at which the agent counts to the next such one.
 
 ### Which beginning pays
 
-Means over the seeds that count, their number in brackets; *untrained* are the searched gaits as they are.
+Means over the seeds that count, their number in brackets; *untrained* are the searched gaits as they are. The
+*best* beginning is also one where the agents of the other do not count.
 
 {paying}
 
@@ -76,10 +82,10 @@ Means over the seeds that count, their number in brackets; *untrained* are the s
 
 
 def mean_of(lags: Sequence[float]) -> float:
-    """Return the circular mean of lags, from -0.1 to 0.4 [strides]; NaN of none."""
+    """Return the circular mean of lags, from `LEAST` on [strides]; NaN of none."""
     if not len(lags):
         return float("nan")
-    return turned(float(np.angle(np.mean(np.exp(4j * np.pi * np.array(lags)))) / (4 * np.pi)))
+    return turned(float(np.angle(np.mean(np.exp(4j * np.pi * np.array(lags)))) / (4 * np.pi)), LEAST)
 
 
 def some(rows: Sequence[Row], start: str, objective: str, froude: float | None = None) -> list[Row]:
@@ -102,9 +108,9 @@ def lags_at(rows: Sequence[Row]) -> list[float]:
 
 
 def lags_of(rows: Sequence[Row], agent: Agent) -> list[tuple[float, float]]:
-    """Return the Froude numbers at which an agent counts, and its lag there [strides], from -0.1 to 0.4."""
+    """Return the Froude numbers at which an agent counts, and its lag there [strides], from `LEAST` on."""
     own = [row for row in some(rows, agent.start, agent.objective) if row["seed"] == agent.seed]
-    return [(row["froude"], turned(row["lag"])) for row in own if counts(row)]
+    return [(row["froude"], turned(row["lag"], LEAST)) for row in own if counts(row)]
 
 
 def jump_rows(rows: Sequence[Row]) -> list[list[str]]:
@@ -170,28 +176,37 @@ def paying_rows(rows: Sequence[Row]) -> list[list[str]]:
     return table
 
 
-def inherited(rows: Sequence[Row], objective: str) -> tuple[float, float]:
-    """Return the mean distance of the lags of agents that began with a walk's from those that began with a
-    trot's, over speeds, untrained and trained [strides]."""
-    distances = []
-    for of in (NONE, objective):
-        each = []
-        for froude in FROUDES:
-            means = [mean_of(lags_at(some(rows, start, of, froude))) for start in ("walk", "trot")]
-            each.append(abs(apart(*means)))
-        distances.append(float(np.nanmean(each)))
-    return distances[0], distances[1]
+def distance(one: Sequence[Row], other: Sequence[Row]) -> float:
+    """Return the mean distance of the lags of two groups of agents over speeds [strides]; NaN without any."""
+    found = []
+    for froude in FROUDES:
+        groups = [lags_at([row for row in rows if row["froude"] == froude]) for rows in (one, other)]
+        if all(groups):
+            found.append(abs(apart(*map(mean_of, groups))))
+    return float(np.mean(found)) if found else float("nan")
 
 
-def against_control(rows: Sequence[Row], objective: str) -> float:
-    """Return by which part agents that spare something have less of it than those that spare nothing: a mean
-    over beginnings and the speeds at which both count; NaN without these."""
+def between_starts(rows: Sequence[Row], objective: str) -> float:
+    """Return the mean distance of the lags of agents from walks from those of agents from trots [strides]."""
+    return distance(some(rows, "walk", objective), some(rows, "trot", objective))
+
+
+def moved(rows: Sequence[Row], objective: str, others: str) -> float:
+    """Return the mean distance of the lags of agents from those of others with the same beginning
+    [strides]."""
+    return float(
+        np.mean([distance(some(rows, start, objective), some(rows, start, others)) for start in STARTS])
+    )
+
+
+def spared_against(rows: Sequence[Row], objective: str, others: str) -> float:
+    """Return by which part agents that spare something have less of it than those that spare something else:
+    a mean over beginnings and the speeds at which both count; NaN without these."""
     parts = []
     for start in STARTS:
         for froude in FROUDES:
             ours = value_at(rows, start, objective, froude)[0]
-            control = some(rows, start, CONTROL, froude)
-            theirs = [float(value_of(row, objective)) for row in control if counts(row)]
+            theirs = [float(value_of(r, objective)) for r in some(rows, start, others, froude) if counts(r)]
             if np.isfinite(ours) and theirs:
                 parts.append(1 - ours / np.mean(theirs))
     return float(np.mean(parts)) if parts else float("nan")
@@ -205,56 +220,75 @@ def changes_as_horses(jumps: Sequence[tuple[float, float, float, float]]) -> boo
     return apart(after, before) < 0 and a <= CHANGE[1] and b >= CHANGE[0]
 
 
-def listed(values: Sequence[str]) -> str:
-    """Return values as text, in the order of objectives."""
-    return ", ".join(values)
+def beginning_changes_as_horses(rows: Sequence[Row], objective: str) -> bool:
+    """Return True if the beginning whose agents spare most changes once over the speeds, from walks to trots
+    and where horses change; speeds at which both do as well or neither counts are passed over."""
+    best = [(froude, best_at(rows, objective, froude)) for froude in FROUDES]
+    known = [(froude, kind) for froude, kind in best if kind in STARTS]
+    changes = [(a, b, x, y) for (a, x), (b, y) in pairwise(known) if x != y]
+    low, high = CHANGE
+    return [change[2:] for change in changes] == [("walk", "trot")] and (
+        changes[0][0] <= high and changes[0][1] >= low
+    )
 
 
 def told(rows: Sequence[Row]) -> str:
     """Return what was found, in sentences."""
     trained = [row for row in rows if row["objective"] != NONE]
     agents = [*dict.fromkeys(Agent(row["start"], row["objective"], row["seed"]) for row in trained)]
+    spared = [one for one in ALL if all(some(rows, start, one) for start in STARTS)]
+    names = {one: TITLES.get(one, one) for one in spared}
     reasons = [rejection_reason({n: np.nan if x is None else x for n, x in row.items()}) for row in trained]
     words = ("fell in", "of the commanded speed", "slip", "stances a turn")
     fell, slow, slipping, landing = (sum(word in reason for reason in reasons) for word in words)
-    text = [
-        f"Of {len(trained)} pairs of an agent and a speed {reasons.count('')} count; {fell} fall too often,"
-        f" {slow} miss the speed, {slipping} slip too far and {landing} do not land once a turn"
-    ]
     jumping = []
     as_horses = []
-    for objective in ALL:
-        own = [agent for agent in agents if agent.objective == objective]
-        if not own:
-            continue
+    for one in spared:
+        own = [agent for agent in agents if agent.objective == one]
         jumps = [jumps_between(lags_of(rows, agent)) for agent in own]
-        title = TITLES.get(objective, objective)
-        jumping.append(f"{sum(map(bool, jumps))} of {len(own)} by {title}")
-        as_horses.append(f"{sum(map(changes_as_horses, jumps))} by {title}")
-    text.append(f"The lag jumps anywhere in {listed(jumping)}")
+        jumping.append(f"{sum(map(bool, jumps))} of {len(own)} by {names[one]}")
+        as_horses.append(f"{sum(map(changes_as_horses, jumps))} by {names[one]}")
+    where = f"between speeds that touch {CHANGE[0]:g} to {CHANGE[1]:g}"
+    text = [
+        f"Of {len(trained)} pairs of an agent and a speed {reasons.count('')} count; {fell} fall too often,"
+        f" {slow} miss the speed, {slipping} slip too far and {landing} do not land once a turn",
+        f"The lag of an agent jumps somewhere in {', '.join(jumping)}",
+        f"It jumps once, down and {where}, where horses change, in {', '.join(as_horses)}",
+    ]
+    a, b = STEP
+    by = []
+    for one in spared:
+        first, then = (mean_of(lags_at(some(rows, "walk", one, froude))) for froude in STEP)
+        by.append(f"{apart(then, first):+.2f} by {names[one]}")
+    text.append(f"From {a:g} to {b:g} the lag of agents from walks changes by {', '.join(by)}")
+    apart_by = [f"{between_starts(rows, one):.2f} by {names[one]}" for one in spared]
     text.append(
-        f"It jumps once, down, and between speeds that touch {CHANGE[0]:g} to {CHANGE[1]:g} in"
-        f" {listed(as_horses)}"
+        f"On the average over speeds agents from walks and from trots are {between_starts(rows, NONE):.2f}"
+        f" strides of lag apart untrained, and trained {', '.join(apart_by)}"
     )
-    apart_by = {objective: inherited(rows, objective) for objective in ALL if some(rows, "walk", objective)}
-    untrained = next(iter(apart_by.values()))[0]
-    after = [f"{pair[1]:.2f} by {TITLES.get(objective, objective)}" for objective, pair in apart_by.items()]
-    text.append(
-        f"Agents from walks and from trots are {untrained:.2f} strides of lag apart untrained, on the average"
-        f" over speeds, and trained {listed(after)}"
-    )
-    if some(rows, "walk", CONTROL):
-        less = [f"{100 * against_control(rows, one):.0f} % {TITLES[one]}" for one in OBJECTIVES]
-        text.append(f"Sparing pays: agents have less than those that spare nothing by {listed(less)}")
-    for objective in OBJECTIVES:
-        best = [(best_at(rows, objective, froude), f"{froude:g}") for froude in FROUDES]
-        named = {"equal": "both", "none": "neither"}
-        parts = [
-            f"{named.get(kind, f'{kind}s')} at {', '.join(froude for one, froude in best if one == kind)}"
-            for kind in (*STARTS, *named)
-            if any(one == kind for one, _ in best)
+    if CONTROL in spared:
+        by = [f"{moved(rows, one, CONTROL):.2f} by {names[one]}" for one in spared if one != CONTROL]
+        text.append(
+            f"The lag of agents that spare nothing is {moved(rows, CONTROL, NONE):.2f} from that of the gaits"
+            f" around which they act; what is spared moves it from there by {', '.join(by)}"
+        )
+    for others, title in ((CONTROL, "agents that spare nothing"), (NONE, "the gaits around which they act")):
+        if others == NONE or others in spared:
+            of = [one for one in spared if one != CONTROL]
+            less = [f"{100 * spared_against(rows, one, others):.0f} % {names[one]}" for one in of]
+            text.append(f"Where both count, agents have less than {title} by {', '.join(less)}")
+    pooled = [names[one] for one in OBJECTIVES if beginning_changes_as_horses(rows, one)]
+    seeds = sorted({agent.seed for agent in agents})
+    alone = []
+    for one in [one for one in spared if one != CONTROL]:
+        of_seeds = [
+            [row for row in rows if row["seed"] == seed or row["objective"] == NONE] for seed in seeds
         ]
-        text.append(f"By {TITLES[objective]} the beginning that pays most is {'; '.join(parts)}")
+        alone.append(f"{sum(beginning_changes_as_horses(part, one) for part in of_seeds)} by {names[one]}")
+    text.append(
+        f"The beginning that pays most changes once, from walks to trots and {where}, by"
+        f" {', '.join(pooled) or 'nothing'} over all seeds; of {len(seeds)} seeds alone in {', '.join(alone)}"
+    )
     return ". ".join(text) + "."
 
 
@@ -281,9 +315,9 @@ def draw(rows: Sequence[Row], path: Path) -> None:
                     continue
                 faint = {"ms": 3, "ls": "", "marker": SYMBOLS[start], "alpha": 0.7 if counts(row) else 0.15}
                 up.plot([row["froude"]], [value_of(row, objective)], **style, **faint)
-                down.plot([row["froude"]], [turned(row["lag"])], **style, **faint)
+                down.plot([row["froude"]], [turned(row["lag"], LEAST)], **style, **faint)
             means = [value_at(rows, start, objective, froude)[0] for froude in FROUDES]
-            up.plot(FROUDES, means, lw=1.4, label=f"from {start}", **style)
+            up.plot(FROUDES, means, lw=1.4, label=f"from {start}s", **style)
             for of, dash, width in ((objective, "-", 1.4), (CONTROL, ":", 1.2), (NONE, "--", 0.9)):
                 lags = [mean_of(lags_at(some(rows, start, of, froude))) for froude in FROUDES]
                 down.plot(FROUDES, lags, dash, lw=width, **style)
@@ -306,7 +340,7 @@ JUMP_HEAD = (
     "lag above Fr 0.5, untrained to trained",
     "lag jumps at Fr",
 )
-PAYING_HEAD = ("spared", "Fr", *(f"from {start}" for start in STARTS), "untrained walk, trot", "best")
+PAYING_HEAD = ("spared", "Fr", *(f"from {start}s" for start in STARTS), "untrained, walk and trot", "best")
 
 
 def section(herd: Herd, name: str, folder: Path) -> str:

@@ -113,6 +113,9 @@ LIMITS = """* Horses change from walk to trot at Froude numbers 0.35 to 0.5, whe
   elastic. A horse stores a trot's energy in tendons, which makes a trot cheap, and its muscles cost more as
   they shorten faster. Neither is in the model.
 * **The stride is given.** With a free one the cheapest gaits have longer strides than a horse's.
+* **Agents learn around searched gaits.** Their actions change the swing a little and the cranks' rates not at
+  all, so that a lag far from the one with which they begin has to do with a swing that was made for another.
+  More steps, wider actions or another learner might lead further.
 * **Searches end early.** A gait that was not found is no proof that there is none, and the best of few seeds
   is no more than an upper bound. Differences smaller than those between seeds say nothing."""
 

@@ -131,9 +131,9 @@ def value_of(figures: dict[str, Any], objective: str) -> Any:
     return sum(figures[name] / SCALES[name] for name in names) / len(names)
 
 
-def turned(lag: float) -> float:
-    """Return a lag from -0.1 to 0.4 [strides]; half a stride more is the same lag."""
-    return (lag + 0.1) % 0.5 - 0.1
+def turned(lag: float, least: float = -0.1) -> float:
+    """Return a lag within half a stride from the least one on [strides]: half a stride more is the same."""
+    return (lag - least) % 0.5 + least
 
 
 def apart(a: float, b: float) -> float:

@@ -126,15 +126,22 @@ def test_jumps_and_what_is_inherited_are_told():
     agent = Agent("walk", "work", 0)
     (jump,) = jumps_between(page.lags_of(rows, agent))
     assert jump == pytest.approx((0.35, 0.45, 0.25, 0.01))
-    before, after = page.inherited(rows, "work")
-    assert before == pytest.approx(0.24)
-    assert after == pytest.approx((5 * 0.24 + 4 * 0.02) / 9)
+    assert page.between_starts(rows, NONE) == pytest.approx(0.24)
+    assert page.between_starts(rows, "work") == pytest.approx((5 * 0.24 + 4 * 0.02) / 9)
+    assert page.moved(rows, "work", CONTROL) == pytest.approx(0.0)
+    assert page.moved(rows, CONTROL, NONE) == pytest.approx(4 * 0.24 / 9 / 2)
     assert page.best_at(rows, "work", 0.2) == "walk"
     assert page.best_at(rows, "peak", 0.2) == "equal"
     text = page.told(rows)
     assert "The lag jumps anywhere in 1 of 2 by mixture, 1 of 2 by work" in text
-    assert "between speeds that touch 0.35 to 0.5 in 1 by mixture, 1 by work" in text
-    assert "less than those that spare nothing by 0 % mixture, 0 % work" in text
+    assert "once, down and between speeds that touch 0.35 to 0.5 in 1 by mixture, 1 by work" in text
+    assert "from walks to trots and between speeds that touch 0.35 to 0.5, by nothing over all seeds" in text
+    assert "less than agents that spare nothing by 0 % mixture, 0 % work" in text
+    # The other gait pays from 0.45 on
+    for row in rows:
+        if row["objective"] == "work" and row["start"] == "trot" and row["froude"] > 0.4:
+            row["transport"] = 0.5
+    assert page.beginning_changes_as_horses(rows, "work")
     # What does not count is no gait
     for row in rows:
         row["slip_hind"] = 0.2
