@@ -243,17 +243,21 @@ def told(rows: Sequence[Row]) -> str:
     fell, slow, slipping, landing = (sum(word in reason for reason in reasons) for word in words)
     jumping = []
     as_horses = []
+    is_null = True
     for one in spared:
         own = [agent for agent in agents if agent.objective == one]
         jumps = [jumps_between(lags_of(rows, agent)) for agent in own]
         jumping.append(f"{sum(map(bool, jumps))} of {len(own)} by {names[one]}")
-        as_horses.append(f"{sum(map(changes_as_horses, jumps))} by {names[one]}")
+        changing = sum(map(changes_as_horses, jumps))
+        is_null = is_null and not changing
+        as_horses.append(f"{changing} by {names[one]}")
     where = f"between speeds that touch {CHANGE[0]:g} to {CHANGE[1]:g}"
     text = [
         f"Of {len(trained)} pairs of an agent and a speed {reasons.count('')} count; {fell} fall too often,"
         f" {slow} miss the speed, {slipping} slip too far and {landing} do not land once a turn",
         f"The lag of an agent jumps somewhere in {', '.join(jumping)}",
-        f"It jumps once, down and {where}, where horses change, in {', '.join(as_horses)}",
+        f"It jumps once, down and {where}, where horses change, in {', '.join(as_horses)}"
+        + (": a null result" if is_null else ""),
     ]
     a, b = STEP
     by = []
@@ -275,7 +279,7 @@ def told(rows: Sequence[Row]) -> str:
     for others, title in ((CONTROL, "agents that spare nothing"), (NONE, "the gaits around which they act")):
         if others == NONE or others in spared:
             of = [one for one in spared if one != CONTROL]
-            less = [f"{100 * spared_against(rows, one, others):.0f} % {names[one]}" for one in of]
+            less = [f"{100 * spared_against(rows, one, others):z.0f} % {names[one]}" for one in of]
             text.append(f"Where both count, agents have less than {title} by {', '.join(less)}")
     pooled = [names[one] for one in OBJECTIVES if beginning_changes_as_horses(rows, one)]
     seeds = sorted({agent.seed for agent in agents})
