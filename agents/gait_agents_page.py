@@ -220,6 +220,16 @@ def changes_as_horses(jumps: Sequence[tuple[float, float, float, float]]) -> boo
     return apart(after, before) < 0 and a <= CHANGE[1] and b >= CHANGE[0]
 
 
+def steps_of(rows: Sequence[Row], start: str, objective: str) -> list[float]:
+    """Return the change of the lag of each agent over `STEP`, counting or not [strides]."""
+    found = []
+    for seed in seeds_of(rows, start, objective):
+        own = [row for row in some(rows, start, objective) if row["seed"] == seed]
+        first, then = (mean_of(lags_at([row for row in own if row["froude"] == froude])) for froude in STEP)
+        found.append(apart(then, first))
+    return found
+
+
 def beginning_changes_as_horses(rows: Sequence[Row], objective: str) -> bool:
     """Return True if the beginning whose agents spare most changes once over the speeds, from walks to trots
     and where horses change; speeds at which both do as well or neither counts are passed over."""
@@ -262,8 +272,8 @@ def told(rows: Sequence[Row]) -> str:
     a, b = STEP
     by = []
     for one in spared:
-        first, then = (mean_of(lags_at(some(rows, "walk", one, froude))) for froude in STEP)
-        by.append(f"{apart(then, first):+.2f} by {names[one]}")
+        steps = steps_of(rows, "walk", one)
+        by.append(f"{np.mean(steps):+.2f} ({min(steps):+.2f} to {max(steps):+.2f}) by {names[one]}")
     text.append(f"From {a:g} to {b:g} the lag of agents from walks changes by {', '.join(by)}")
     apart_by = [f"{between_starts(rows, one):.2f} by {names[one]}" for one in spared]
     text.append(
