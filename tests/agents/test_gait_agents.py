@@ -133,8 +133,8 @@ def test_jumps_and_what_is_inherited_are_told():
     assert page.best_at(rows, "work", 0.2) == "walk"
     assert page.best_at(rows, "peak", 0.2) == "equal"
     text = page.told(rows)
-    assert "The lag jumps anywhere in 1 of 2 by mixture, 1 of 2 by work" in text
-    assert "once, down and between speeds that touch 0.35 to 0.5 in 1 by mixture, 1 by work" in text
+    assert "The lag of an agent jumps somewhere in 1 of 2 by mixture, 1 of 2 by work" in text
+    assert "touch 0.35 to 0.5, where horses change, in 1 by mixture, 1 by work" in text
     assert "from walks to trots and between speeds that touch 0.35 to 0.5, by nothing over all seeds" in text
     assert "less than agents that spare nothing by 0 % mixture, 0 % work" in text
     # The other gait pays from 0.45 on
@@ -142,6 +142,8 @@ def test_jumps_and_what_is_inherited_are_told():
         if row["objective"] == "work" and row["start"] == "trot" and row["froude"] > 0.4:
             row["transport"] = 0.5
     assert page.beginning_changes_as_horses(rows, "work")
+    assert page.steps_of(rows, "walk", "work") == pytest.approx([-0.24])
+    assert "null" not in text
     # What does not count is no gait
     for row in rows:
         row["slip_hind"] = 0.2
@@ -152,15 +154,15 @@ def test_jumps_and_what_is_inherited_are_told():
 def test_agents_are_trained_once_and_their_page_is_written(tmp_path, monkeypatch, capsys):
     tiny = gait_agents.settings() | {"n_envs": 8, "n_steps": 16, "n_timesteps": 128, "batch_size": 64}
     monkeypatch.setattr(gait_agents, "settings", lambda: tiny)
-    monkeypatch.setattr(gait_agents, "FROUDES", (0.2, 0.8))
-    monkeypatch.setattr(page, "FROUDES", (0.2, 0.8))
+    monkeypatch.setattr(gait_agents, "FROUDES", (0.2, 0.35, 0.45, 0.6))
+    monkeypatch.setattr(page, "FROUDES", (0.2, 0.35, 0.45, 0.6))
     few = [Agent(start, objective, 0) for objective in (NONE, "peak") for start in gait_task.STARTS]
     monkeypatch.setattr(gait_agents, "all_agents", lambda: few)
     monkeypatch.setattr(gait_agents, "RUNS", tmp_path / "runs")
     monkeypatch.setattr(gait_agents, "CHECKED", 2)
     path = tmp_path / "agents.json"
     herd = gait_agents.complete(path)
-    assert len(herd.rows) == 2 * len(few)
+    assert len(herd.rows) == 4 * len(few)
     text = path.read_text()
     capsys.readouterr()
     again = gait_agents.complete(path)
