@@ -2,7 +2,8 @@
 
 It searches for the best walks, trots and free gaits at twelve speeds (`agents.gait_map`), leaving out what is
 in the file, and writes `docs/evidence/gait_change.md` with its figure: which gait spares more at each speed,
-by work, peak force, loading and their mixture, and at which speed the better one changes.
+by work, peak force, loading and their mixture, and at which speed the better one changes. Then it trains
+agents that choose their footfall (`agents.gait_agents`), which tell whether they change their gait.
 """
 
 from __future__ import annotations
@@ -17,18 +18,26 @@ import numpy as np
 
 from agents import runs
 from agents.command import parse, run
+from agents.gait_agents import Herd, complete
+from agents.gait_agents_page import section
 from agents.gait_map import (
+    CHANGES,
+    CLOSE,
     FREE,
     FROUDES,
+    JUMP,
     KINDS,
     MIXTURE,
     OBJECTIVES,
     SCALES,
     STRIDE_BAR,
+    TITLES,
     Map,
+    jumps_between,
     search_all,
     stands_of,
     stride_at,
+    turned,
     value_of,
 )
 from agents.judge_pictures import DPI, LETTERS, WIDTH
@@ -38,14 +47,8 @@ from hoof_env._output import check_folder, markdown_table
 from hoof_env.errors import DataFileError, count
 
 NAME = "gait_change"
-CHANGES = {"walk to trot": (0.35, 0.5), "trot to canter": (2.0, 3.0)}
-"""Froude numbers at which horses change gait: from walk to trot Griffin and others (2004) print 0.35 at any
-size, and foals change at 0.37 to 0.69 (doi 10.1016/j.jbiomech.2025.113078)."""
-JUMP = 0.1  # smallest change of the lag from one speed to the next that is one of gait [strides]
-CLOSE = 0.02  # least difference of what is spared that makes one gait better than another, relative
 COLOURS = {"walk": "#0072B2", "trot": "#D55E00", FREE: "#555555"}
 SYMBOLS = {"walk": "o", "trot": "^", FREE: "x"}
-TITLES = {"work": "work", "peak": "peak force", "loading": "loading", "mixture": "mixture"}
 
 Row = dict[str, Any]
 
@@ -90,7 +93,7 @@ The best over all seeds; in brackets the number of seeds of which the search fou
 
 {table}
 
-## What horses do, and what the model cannot say
+{agents}## What horses do, and what the model cannot say
 
 {limits}
 
@@ -110,6 +113,9 @@ LIMITS = """* Horses change from walk to trot at Froude numbers 0.35 to 0.5, whe
   elastic. A horse stores a trot's energy in tendons, which makes a trot cheap, and its muscles cost more as
   they shorten faster. Neither is in the model.
 * **The stride is given.** With a free one the cheapest gaits have longer strides than a horse's.
+* **Agents learn around searched gaits.** Their actions change the swing a little and the cranks' rates not at
+  all, so that a lag far from the one with which they begin has to do with a swing that was made for another.
+  More steps, wider actions or another learner might lead further.
 * **Searches end early.** A gait that was not found is no proof that there is none, and the best of few seeds
   is no more than an upper bound. Differences smaller than those between seeds say nothing."""
 
@@ -121,7 +127,7 @@ class Args:
     seeds: int = 3
     """searches at each speed, each from its own draws"""
     search: bool = True
-    """search for what is missing; without it the page is of what is in the file"""
+    """search for gaits and train agents that are missing; without it the page is of what is in the files"""
     found: Path | None = None
     """file of found gaits, which is gone on with; by default that of the page in --out"""
     out: Path = EVIDENCE
@@ -161,17 +167,13 @@ def lags_of(rows: Sequence[Row], objective: str) -> list[tuple[float, float]]:
     for froude in FROUDES:
         row = best_of(rows, froude, FREE, objective)
         if row is not None:
-            found.append((froude, (float(row["lag"]) + 0.1) % 0.5 - 0.1))
+            found.append((froude, turned(float(row["lag"]))))
     return found
 
 
 def jumps_of(rows: Sequence[Row], objective: str) -> list[tuple[float, float, float, float]]:
     """Return where the lag of the best gait jumps: two Froude numbers, and the lags at them."""
-    return [
-        (a, b, before, after)
-        for (a, before), (b, after) in pairwise(lags_of(rows, objective))
-        if abs((after - before + 0.25) % 0.5 - 0.25) > JUMP
-    ]
+    return jumps_between(lags_of(rows, objective))
 
 
 def seeds_of(rows: Sequence[Row]) -> list[int]:
@@ -383,8 +385,8 @@ SPEED_HEAD = (
 )
 
 
-def write(found: Map, out: Path) -> None:
-    """Write the page and its figure."""
+def write(found: Map, herd: Herd, out: Path) -> None:
+    """Write the page and its figures."""
     folder = out / NAME
     folder.mkdir(parents=True, exist_ok=True)
     rows = compared(found.rows)
@@ -405,6 +407,7 @@ def write(found: Map, out: Path) -> None:
         close=f"{CLOSE:.0%}",
         jump=f"{JUMP:g}",
         table=markdown_table(SPEED_HEAD, speed_rows(rows)),
+        agents=section(herd, NAME, folder),
         limits=LIMITS,
     )
     runs.write_text(out / f"{NAME}.md", page)
@@ -422,7 +425,8 @@ def main(argv: list[str] | None = None) -> None:
         raise DataFileError(
             f"{path}: expected walks and trots of one seed and speed, got {len(found.rows)} gaits"
         )
-    write(found, args.out)
+    of_agents = args.out / NAME / "agents.json"
+    write(found, complete(of_agents) if args.search else Herd(of_agents), args.out)
 
 
 if __name__ == "__main__":

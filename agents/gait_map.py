@@ -55,6 +55,12 @@ OBJECTIVES = {
     "loading": ("loading",),
 }
 """What is spared: the mean of these figures over their `SCALES`."""
+TITLES = {"work": "work", "peak": "peak force", "loading": "loading", "mixture": "mixture"}
+CHANGES = {"walk to trot": (0.35, 0.5), "trot to canter": (2.0, 3.0)}
+"""Froude numbers at which horses change gait: from walk to trot Griffin and others (2004) print 0.35 at any
+size, and foals change at 0.37 to 0.69 (doi 10.1016/j.jbiomech.2025.113078)."""
+JUMP = 0.1  # smallest change of the lag from one speed to the next that is one of gait [strides]
+CLOSE = 0.02  # least difference of what is spared that makes one gait better than another, relative
 SINGLE = [name for name in OBJECTIVES if name != MIXTURE]
 PRICE = 10.0  # cost of an objective of 1
 FALL = 20.0  # cost of a gait that always falls
@@ -123,6 +129,26 @@ def value_of(figures: dict[str, Any], objective: str) -> Any:
     """Return what is spared [-]: the mean of an objective's figures over their scales."""
     names = OBJECTIVES[objective]
     return sum(figures[name] / SCALES[name] for name in names) / len(names)
+
+
+def turned(lag: float, least: float = -0.1) -> float:
+    """Return a lag within half a stride from the least one on [strides]: half a stride more is the same."""
+    return (lag - least) % 0.5 + least
+
+
+def apart(a: float, b: float) -> float:
+    """Return by how much one lag is larger than another, from -0.25 to 0.25 [strides]."""
+    return (a - b + 0.25) % 0.5 - 0.25
+
+
+def jumps_between(lags: Sequence[tuple[float, float]]) -> list[tuple[float, float, float, float]]:
+    """Return where a lag jumps, of pairs of a Froude number and a lag [strides]: two Froude numbers, and the
+    lags at them."""
+    return [
+        (a, b, before, after)
+        for (a, before), (b, after) in pairwise(lags)
+        if abs(apart(after, before)) > JUMP
+    ]
 
 
 def costs_of(figures: dict[str, Floats], kind: str, objective: str, froude: float) -> Floats:

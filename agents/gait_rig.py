@@ -49,11 +49,12 @@ class Rig:
 
     Args:
         num_envs: number of horses.
-        **settings: arguments of the environment.
+        env_id: id of their environment.
+        **settings: its arguments.
     """
 
-    def __init__(self, num_envs: int, **settings: Any) -> None:
-        envs: Any = make_rows(ENV_ID, num_envs, **{"num_threads": limit_threads(2), **settings})
+    def __init__(self, num_envs: int, env_id: str = ENV_ID, **settings: Any) -> None:
+        envs: Any = make_rows(env_id, num_envs, **{"num_threads": limit_threads(2), **settings})
         self.envs = envs
         features = Features(self.envs.body.harmonics, self.envs.settings.hoof_stiffness is not None, True)
         self.names = stride_sums(features)
@@ -73,6 +74,7 @@ class Rig:
         seconds: float | None = None,
         settled: float | None = None,
         actions: Floats | None = None,
+        policy: Any = None,
     ) -> dict[str, Floats]:
         """Play the beginning of episodes at a commanded speed.
 
@@ -84,6 +86,7 @@ class Rig:
             seconds: length that is played [s]; None for `SECONDS`.
             settled: time from which on figures count [s]; None for `SETTLED`.
             actions: constant actions of each gait, shape (m, 16); None for zeros.
+            policy: acts in place of them around the environment's own gaits, which `gaits` then repeats.
 
         Returns:
             Means of figures over upright episodes, shape (m,) each, named as in `gait_figures.play`; "dip"
@@ -95,7 +98,8 @@ class Rig:
         rows = np.repeat(gaits, starts, axis=0)
         rows = np.concatenate([rows, np.repeat(rows[-1:], envs.num_envs - len(rows), axis=0)])
         n = len(rows)
-        envs.reset(seed=[seed + k % starts for k in range(n)], options={"gait": rows, "target_speed": speed})
+        options = {"target_speed": speed} | ({"gait": rows} if policy is None else {})
+        seen, _ = envs.reset(seed=[seed + k % starts for k in range(n)], options=options)
         acted = np.zeros((n, 16), np.float32)
         if actions is not None:
             of_rows = np.repeat(actions, starts, axis=0)
@@ -115,7 +119,9 @@ class Rig:
         counted = round((SETTLED if settled is None else settled) / envs.dt)
         steps = round((SECONDS if seconds is None else seconds) / envs.dt)
         for k in range(steps):
-            _, rewards, failed, _, infos = envs.step(acted)
+            if policy is not None:
+                acted = np.asarray(policy.predict(seen, deterministic=True)[0], np.float32)
+            seen, rewards, failed, _, infos = envs.step(acted)
             upright &= ~failed
             returns += np.where(upright, rewards, 0.0)
             measured = np.asarray(infos["measured"]).T

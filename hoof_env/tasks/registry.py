@@ -529,6 +529,7 @@ def register(
     contact_law: Callable[..., Any] | None = None,
     action_map: ActionMap | None = None,
     start: Mapping[str, Any] | None = None,
+    body: Callable[[Settings], Body] | None = None,
     **defaults: Any,
 ) -> None:
     """Register a new id for `gymnasium.make` and `make_vec`: a task of this package with further reward terms
@@ -547,6 +548,8 @@ def register(
         action_map: map from user-defined actions to body actions.
         start: reset options of every episode, which the options of a call replace; None for the base's, less
             those that another trunk or leg than the base's cannot have, see docs/own_task.md.
+        body: function that makes the `body.Body` of settings, such as a class derived from
+            `tasks.horse.Horse`; None for the base's.
         defaults: settings, see the manual pages.
 
     Raises:
@@ -565,6 +568,8 @@ def register(
     except ParameterError as error:
         raise ParameterError(f"{env_id}: base: {error}") from None
     _check_laws(env_id, contact_law, action_map)
+    if body is not None and not callable(body):
+        raise ParameterError(f"{env_id}: body: expected a function of settings, got {brief(body)}")
     if start is not None and not isinstance(start, Mapping):
         raise ParameterError(f"{env_id}: start: expected a mapping of reset options, got {brief(start)}")
     _check_twice(env_id, [term.name for term in new_terms])
@@ -585,6 +590,7 @@ def register(
         entries=(*old.entries, *new_entries),
         contact_law=contact_law or old.contact_law,
         action_map=action_map or old.action_map,
+        body=body or old.body,
         start=old.start if start is None else dict(start),
         start_for=(old.start_for or old.settings({})) if start is None else None,
     )

@@ -143,7 +143,7 @@ def test_a_search_goes_on_where_it_stopped_and_its_page_is_written(tmp_path, mon
     assert anew == [
         one | {"wall_s": 0} for one in found.rows if (one["froude"], one["kind"]) == (0.8, "walk")
     ]
-    page.write(found, tmp_path)
+    page.write(found, page.Herd(tmp_path / "agents.json"), tmp_path)
     written = (tmp_path / "gait_change.md").read_text()
     assert "| 0.8 | trot (" in written
     assert "nan" not in written
@@ -201,7 +201,8 @@ def test_a_committed_page_is_not_replaced_by_a_page_of_another_file(tmp_path, mo
 def test_the_committed_page_is_written_from_the_committed_file(tmp_path, capsys):
     folder = tmp_path / "gait_change"
     folder.mkdir()
-    shutil.copy(page.EVIDENCE / "gait_change" / "searches.json", folder)
+    for name in ("searches.json", "agents.json"):
+        shutil.copy(page.EVIDENCE / "gait_change" / name, folder)
     page.main(["--no-search", "--out", str(tmp_path)])
     lines = [(place / "gait_change.md").read_text().splitlines()[4:] for place in (page.EVIDENCE, tmp_path)]
     assert lines[0] == lines[1]
