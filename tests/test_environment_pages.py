@@ -19,9 +19,9 @@ from hoof_env.policies import catalogue
 from hoof_env.tasks import horse, leg_starts
 from hoof_env.tasks.horse_gaits import LEGS
 from hoof_env.tasks.observation import groups_of
-from hoof_env.tasks.parameters import HILLS
 from hoof_env.tasks.registry import TASKS
 from hoof_env.tasks.settings import PER_EPISODE
+from hoof_env.tasks.terrains import DITCHES, HILLS
 
 PAGES = sorted(blocks.PAGES.glob("*.md"))
 TEXTS = {path.stem: path.read_text(encoding="utf-8") for path in PAGES}
@@ -163,6 +163,7 @@ def test_parameters_are_those_that_a_reset_takes(name):
 
 def test_all_names_and_no_more_have_words():
     assert set(tables.WORDS["hills"]) == set(HILLS)
+    assert set(tables.WORDS["ditches"]) == set(DITCHES)
     known = inspect.signature(HorseLegVectorEnv).parameters
     arguments = {row[0].strip("`") for row in tables.arguments("HorseLeg").rows}
     vector = set(tables.WORDS["vector"])

@@ -19,10 +19,10 @@ from hoof_env.episodes.costs import COSTS
 from hoof_env.episodes.summaries import SUMMARY
 from hoof_env.tasks import horse, leg_starts
 from hoof_env.tasks.body import Body
-from hoof_env.tasks.parameters import BUMPS, HILLS, SPACING
 from hoof_env.tasks.registry import TASKS, Task
 from hoof_env.tasks.reward import OBJECTIVES, check_weights
 from hoof_env.tasks.settings import PER_EPISODE
+from hoof_env.tasks.terrains import BUMPS, DITCHES, HILLS, SPACING, STEP
 
 WORDS: dict[str, dict[str, Any]] = tomllib.loads(
     Path(__file__).with_name("words.toml").read_text(encoding="utf-8")
@@ -138,9 +138,19 @@ def vector(_: str) -> Table:
 def hills(_: str) -> Table:
     """Return the parameters of hilly terrain."""
     numbers = {"spacing": f"{SPACING:g}", "bumps": f"{BUMPS:g}"}
+    return _of_terrain("hills", HILLS, numbers)
+
+
+def ditches(_: str) -> Table:
+    """Return the parameters of ditches."""
+    return _of_terrain("ditches", DITCHES, {"step": f"{STEP:g}"})
+
+
+def _of_terrain(kind: str, defaults: Mapping[str, Any], numbers: Mapping[str, str]) -> Table:
+    """Return the parameters of a kind of terrain."""
     rows: list[tuple[str, ...]] = []
-    for name, (unit, meaning) in WORDS["hills"].items():
-        rows.append((name, literal(HILLS[name]), unit, Template(meaning).substitute(numbers)))
+    for name, (unit, meaning) in WORDS[kind].items():
+        rows.append((name, literal(defaults[name]), unit, Template(meaning).substitute(numbers)))
     return with_code(Table(HEAD, rows))
 
 
@@ -169,6 +179,7 @@ TABLES: dict[str, Callable[[str], Table | str]] = {
     "costs": costs,
     "vector": vector,
     "hills": hills,
+    "ditches": ditches,
     "objectives": objectives,
 }
 """Functions of the name of a page by the name of a mark."""

@@ -30,11 +30,12 @@ from hoof_env.ground.terrain import Terrain
 from hoof_env.tasks.body import Body
 from hoof_env.tasks.episode import ACTIONS, Episode, episode_layout, task_type
 from hoof_env.tasks.observation import CONTEXT, check_groups, groups_of
-from hoof_env.tasks.parameters import check_drift, check_parameters, make_terrain, resolved, substeps_of
+from hoof_env.tasks.parameters import check_parameters, resolved, substeps_of
 from hoof_env.tasks.registry import Task
 from hoof_env.tasks.reward import check_weights
 from hoof_env.tasks.schedules import check_schedule
 from hoof_env.tasks.settings import ResolvedSettings, Settings
+from hoof_env.tasks.terrains import check_drift, make_terrain
 from hoof_env.tasks.user_parts import check_constants, constants_of, declared_by
 
 MAX_EPISODE_SECONDS = 1e6

@@ -238,7 +238,8 @@ class Settings:
         About(
             "",
             (
-                'None for level ground, {"kind": "slope", "angle": rad}, {"kind": "hills", ...} as in '
+                'None for level ground, {"kind": "slope", "angle": rad}, {"kind": "hills", ...} or '
+                '{"kind": "ditches", ...} as in '
                 "[HorseLegTerrain](HorseLegTerrain.md#terrain), a `Terrain`, or what its `to_dict` returns; "
                 "a suspended trunk and a rail keep their height, and a boom limits it, so ground "
                 "that drifts from y = 0 is refused"

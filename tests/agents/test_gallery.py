@@ -58,7 +58,7 @@ def test_the_committed_file_has_what_the_curves_say():
     assert {env_id for env_id in committed if "learnt" in committed[env_id]} == trained
 
 
-@pytest.mark.parametrize("name", ["HorseLegRail", "HorseLegSpeed", "HorseLegTerrain"])
+@pytest.mark.parametrize("name", ["HorseLegRail", "HorseLegSpeed", "HorseLegTerrain", "HorseRough"])
 def test_the_committed_return_of_random_actions_has_the_present_reward(name):
     committed = json.loads((gallery.POLICIES / RETURNS).read_text(encoding="utf-8"))
     env_id = f"hoof_env/{name}-v0"

@@ -14,7 +14,7 @@ from hoof_env.episodes.pushes import check_pushes
 from hoof_env.errors import FixedSettingError, ParameterError
 from hoof_env.simd import threads
 from hoof_env.tasks.disturbances import ROUGH_PUSH, ROUGH_SLOPE, ROUGHNESS, rough_ground
-from hoof_env.tasks.parameters import make_terrain
+from hoof_env.tasks.terrains import make_terrain
 
 LEG, RAIL, FIXED = (f"hoof_env/HorseLeg{name}-v0" for name in ("", "Rail", "Fixed"))
 

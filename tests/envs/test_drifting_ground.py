@@ -6,7 +6,7 @@ import pytest
 
 from hoof_env.errors import ParameterError
 from hoof_env.ground.terrain import Terrain
-from hoof_env.tasks.parameters import DRIFT, STRETCH, farthest_mean, make_terrain
+from hoof_env.tasks.terrains import DRIFT, STRETCH, farthest_mean, make_terrain
 
 HELD = {"suspended": "hoof_env/HorseLeg-v0", "rail": "hoof_env/HorseLegRail-v0"}
 HIP = gym.make(HELD["rail"]).unwrapped.geometry.hip_height
@@ -62,3 +62,27 @@ def test_hills_do_not_drift():
     for seed in range(20):
         terrain = make_terrain({"kind": "hills", "seed": seed, "rise": 0.15})
         assert abs(np.mean(terrain.height)) < 0.03
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_ditches_are_as_deep_wide_and_far_apart_as_asked(seed):
+    depth, width, gap = 0.2, 0.4, (0.5, 1.5)
+    asked = {"kind": "ditches", "seed": seed, "depth": depth, "width": width, "gap": gap}
+    terrain = make_terrain(asked)
+    assert set(terrain.height) == {0.0, -depth}
+    assert terrain == make_terrain(asked)
+    assert terrain != make_terrain(asked | {"seed": seed + 10})
+    is_deep = np.array(terrain.height) < 0
+    begin, end = (np.flatnonzero(np.diff(is_deep.astype(int)) == step) for step in (1, -1))
+    last = min(len(begin), len(end)) - 1
+    # From the last level knot to the next one
+    widths = terrain.x[end[:last] + 1] - terrain.x[begin[:last]]
+    np.testing.assert_allclose(widths, width, atol=1e-9)
+    gaps = terrain.x[begin[1 : last + 1]] - terrain.x[end[:last] + 1]
+    assert gap[0] - 0.03 < gaps.min() < gap[0] + 0.05
+    assert gap[1] - 0.05 < gaps.max() < gap[1] + 0.03
+    assert np.mean(gaps) == pytest.approx(np.mean(gap), abs=0.1)
+
+
+def test_a_ditch_of_no_depth_is_level():
+    assert not any(make_terrain({"kind": "ditches", "depth": 0.0}).height)
