@@ -77,6 +77,9 @@ DEAR_EPISODES = 61_440
 """Least episodes of a search under dear charges. With the usual ones a search ended at a gait that hardly
 differs from its first: it stops after gaining little beside what a first gait has over the zero action."""
 
+DEAR_STEPS = 600_000
+"""Environment steps of a training that begins as a gait."""
+
 QUIET_NOISE = -2.0
 QUIET_RATE = 3e-4
 """Logarithm of the first noise's standard deviation, and the first learning rate, of a training that begins
@@ -226,7 +229,7 @@ def learn_from_gait(folder: Path, seed: int, speed: float) -> None:
     gait = gait_path(folder, DEAR_GAIT, speed)
     imitation = Imitation(gait, make_rows(ID, ROWS, **env_kwargs), seed)
     quiet = {"learning_rate": f"lin_{QUIET_RATE:g}", "policy_kwargs": {"log_std_init": QUIET_NOISE}}
-    learn(out, seed, env_kwargs, imitation, params=quiet)
+    learn(out, seed, env_kwargs, imitation, steps=DEAR_STEPS, params=quiet)
 
 
 def trained_folders(folder: Path, pattern: str) -> list[Path]:
