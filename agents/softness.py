@@ -10,7 +10,7 @@ CMA-ES finds the best constant gait, which is scripted, and the best gait with a
 speeds at once, from commands that change.
 
 Whether a training finds the soft gait is a matter of luck there. So gaits are searched and agents trained
-once more under charges of the ground's force that are thrice as dear, at each of `DEAR_SPEEDS`. The agents
+once more under charges of the ground's force that are twice as dear, at each of `DEAR_SPEEDS`. The agents
 begin as the best gait with a clock under those charges: their networks imitate it, and then train with little
 noise. Trainings and searches go on where they stopped.
 """
@@ -65,17 +65,17 @@ SEEN = ("crank", "gait", "trunk", "hoof", "target")
 STEPS = 1_000_000
 """Environment steps of a training."""
 
-DEAR: Mapping[str, float] = {"peak": 0.9, "loading": 30.0, "slip": 30.0}
-"""Dear charges of the ground's force: thrice the weights of `HorseLegHop-v0`. Slip is one of them, for gaits
-that slide have small peaks."""
+DEAR: Mapping[str, float] = {"peak": 0.6, "loading": 20.0, "slip": 20.0, "failure": 10.0}
+"""Dear charges: twice the weights of `HorseLegHop-v0`. Slip is among them, for gaits that slide have small
+peaks, and a fall, for otherwise searches end at gaits that fall at once and pay for no stance."""
 
 DEAR_SPEEDS = (2.25, 3.0)
 """Commanded speeds of policies under dear charges [m/s]; at the slowest of `SPEEDS` the best gait with a
 clock slides."""
 
-DEAR_EPISODES = 61_440
-"""Least episodes of a search under dear charges. With the usual ones a search ended at a gait that hardly
-differs from its first: it stops after gaining little beside what a first gait has over the zero action."""
+DEAR_STEP = 0.02
+"""First standard deviation of a search under dear charges: with the usual one, five times as large, searches
+lost the gait from which they began, and ended at worse ones."""
 
 DEAR_STEPS = 600_000
 """Environment steps of a training that begins as a gait."""
@@ -163,8 +163,7 @@ def search(
     family: Literal["constant", "phase"],
     env_kwargs: Mapping[str, Any],
     start: Path,
-    restarts: int = 2,
-    episodes: int | None = None,
+    step: float = open_loop.Args.step,
 ) -> None:
     """Search for the best gait of a family in an environment, from random points and from a gait that is
     known, and write its file. Arguments and errors are as in `open_loop.optimise`."""
@@ -174,9 +173,9 @@ def search(
             env_kwargs=(json.dumps(env_kwargs),),
             family=family,
             harmonics=1 if family == "phase" else None,
-            restarts=restarts,
-            episodes=episodes,
+            restarts=2,
             start=start,
+            step=step,
             out=out,
         )
     )
@@ -216,9 +215,7 @@ def learn(
 def search_dear(folder: Path, speed: float) -> None:
     """Search for the best gait with a clock under dear charges, from the one under the usual ones."""
     usual = gait_path(folder, "phase", speed)
-    search(
-        gait_path(folder, DEAR_GAIT, speed), "phase", dear(speed), usual, restarts=3, episodes=DEAR_EPISODES
-    )
+    search(gait_path(folder, DEAR_GAIT, speed), "phase", dear(speed), usual, DEAR_STEP)
 
 
 def learn_from_gait(folder: Path, seed: int, speed: float) -> None:
@@ -505,11 +502,11 @@ beyond the commanded speed is charged as strongly as travel up to it is paid.
   {stalled}.
 * **Agents** are {seeds} trainings of `ppo_flat`, {steps:,} steps each. One agent goes at all speeds: in its
   training a new speed was commanded every {shortest:g} to {longest:g} s, {slowest:g} to {fastest:g} m/s.
-* **Dear** policies are of charges of stance peak, loading and slip that are thrice as dear, and of one speed
-  each, gaits and agents alike. The gait was searched from the best one under the usual charges. The
-  {dear_seeds} agents of a speed, of {dear_commits}, begin as that gait: their networks first imitate it,
-  without a clock to see, and then train for {dear_steps:,} steps each, with less noise and smaller steps than
-  others ({quiet}). Returns are under the dear charges.
+* **Dear** policies are of charges of stance peak, loading, slip and falls that are twice as dear, and of one
+  speed each, gaits and agents alike. The gait was searched from the best one under the usual charges, with
+  small steps. The {dear_seeds} agents of a speed, of {dear_commits}, begin as that gait: their networks first
+  imitate it, without a clock to see, and then train for {dear_steps:,} steps each, with less noise and
+  smaller steps than others ({quiet}). Returns are under the dear charges.
 * **Agents that balance** are the {balancing} of
   [`HorseLegBalanceSpeed-v0`](../environments/HorseLegBalanceSpeed.md) of [seeing.md](seeing.md): another
   task, in which gaits without feedback fall over before they have a speed, and are no bar. They are beside
