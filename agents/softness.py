@@ -487,7 +487,18 @@ def draw(data: Mapping[str, Any], path: Path) -> None:
         figure.savefig(path, dpi=110)
 
 
-TRIED = ""
+TRIED = """
+## What was tried before
+
+Trainings from scratch under the usual charges at 2.25 m/s alone, one or two of each kind: they chose the
+settings above, and their figures are not kept. One speed instead of all, and a discount of 0.995 with it,
+ended in gaits that land hard, or that hardly travel. Charges of peak and loading that are thrice as dear from
+the first step ended in agents that hardly travel. Less noise at first (`log_std_init` of -1 or -2), and 64
+environments with three times the steps, found soft gaits in some trainings and hard or sliding ones in
+others. Such a training is made by `python -m agents.train --env-id agents.softness:softness/HopSpeed-v0
+--algo ppo_flat --env-kwargs target_speed=[2.25,2.25] --params gamma=0.995`, with other arguments of the
+environment and other settings.
+"""
 
 PAGE = """# Is softness learnt?
 

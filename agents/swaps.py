@@ -138,7 +138,7 @@ def table(data: Mapping[str, Any], pair: tuple[str, str]) -> str:
 
 
 def reading(data: Mapping[str, Any], pair: tuple[str, str]) -> str:
-    """Write what the second setting does to the stance peaks of gaits that are given, and what of it is left
+    """Write what the second setting does to the forces of agents that do not know it, and what of it is left
     once agents have learnt on it."""
 
     def mean(mine: str, other: str, name: str) -> float:
@@ -151,13 +151,13 @@ def reading(data: Mapping[str, Any], pair: tuple[str, str]) -> str:
         before = mean(first, first, name)
         given, learnt = (mean(mine, second, name) / before for mine in (first, second))
         texts.append(
-            f"{title} change by a factor of {given:.2f} with the gait as it was, and of {learnt:.2f}"
-            " with a gait that was learnt there"
+            f"{title} change by a factor of {given:.2f} with the agents as they were, and of {learnt:.2f}"
+            " with agents that were trained there"
         )
-    lost = mean(second, second, "return") - mean(first, second, "return")
+    stayed, learnt_there = (mean(mine, second, "return") for mine in (first, second))
     return (
-        f"From {NAMES[first]} to {NAMES[second]} {'; '.join(texts)}. Agents of the second setting return"
-        f" {lost:+.0f} more on it than agents of the first."
+        f"From {NAMES[first]} to {NAMES[second]} {'; '.join(texts)}. On {NAMES[second]} agents that were"
+        f" trained there return {learnt_there:.0f}, the others {stayed:.0f}."
     )
 
 

@@ -47,7 +47,7 @@ def test_a_table_has_agents_of_both_settings_on_both():
 
 def test_a_reading_tells_the_effect_of_the_ground_from_that_of_learning():
     text = swaps.reading(figures_of_a_pair(), PAIR)
-    assert "stance peaks change by a factor of 2.00 with the gait as it was, and of 1.50" in text
+    assert "stance peaks change by a factor of 2.00 with the agents as they were, and of 1.50" in text
 
 
 def test_a_page_of_nothing_is_refused_by_name(tmp_path):
