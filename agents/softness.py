@@ -444,9 +444,9 @@ def relation_table(data: Mapping[str, Any]) -> str:
     )
 
 
-def verdict(data: Mapping[str, Any], learnt: str = "agents", gait: str = "phase") -> str:
-    """Write whether agents are softer than a gait."""
-    soft = [[word for word, _ in relations(data, gait, name, learnt)] for name in HARDNESS]
+def verdict(data: Mapping[str, Any]) -> str:
+    """Write whether agents are softer than the best gait with a clock."""
+    soft = [[word for word, _ in relations(data, "phase", name)] for name in HARDNESS]
     count_of = {word: sum(each.count(word) for each in soft) for word in ("lower", "higher", "not apart")}
     if not any(map(any, soft)):
         return "No agent and gait go at the same speed, so that nothing is compared."
@@ -459,9 +459,24 @@ def verdict(data: Mapping[str, Any], learnt: str = "agents", gait: str = "phase"
     )
 
 
-def known_better(data: Mapping[str, Any], gait: str = "phase") -> str:
+def softer(data: Mapping[str, Any], learnt: str, gait: str) -> str:
+    """Write how agents compare with a gait in stance peak and loading at each speed where both go."""
+    found = [relations(data, gait, name, learnt) for name in HARDNESS]
+    return " ".join(
+        f"At {speed} m/s "
+        + " and ".join(
+            f"{SOFT[name]} is {word} ({ratio:.2f} times)"
+            for name, (word, ratio) in zip(HARDNESS, pair, strict=True)
+        )
+        + "."
+        for speed, pair in zip(data["speeds"], zip(*found, strict=True), strict=True)
+        if all(word for word, _ in pair)
+    )
+
+
+def known_better(data: Mapping[str, Any]) -> str:
     """Write what searches for a gait with a clock returned by where they began."""
-    searches = [one for entry in data["speeds"].values() for one in entry.get(gait, {}).get("searches", ())]
+    searches = [one for entry in data["speeds"].values() for one in entry["phase"]["searches"]]
     returns = [
         sorted(one["return"] for one in searches if (one["origin"] == "random") == is_random)
         for is_random in (True, False)
@@ -521,9 +536,9 @@ settings.
 PAGE = """# Is softness learnt?
 
 Policies of a leg that carries itself at equal speed. Written by `python -m agents.softness` from
-[softness.json](softness.json); the agents are of {agent_commits}, the searches of {gait_commits}, the agents
-that balance of {balance_commits}. The task is [`HorseLegHop-v0`](../environments/HorseLegHop.md), but travel
-beyond the commanded speed is charged as strongly as travel up to it is paid.
+[softness.json](softness.json); the agents are of {agent_commits}, the searches of {gait_commits},
+the agents that balance of {balance_commits}. The task is [`HorseLegHop-v0`](../environments/HorseLegHop.md),
+but travel beyond the commanded speed is charged as strongly as travel up to it is paid.
 
 * **Gaits** see nothing. CMA-ES searched for the best constant gait, four numbers that are held, and the best
   gait with a clock at each speed, from random points and from the gaits of `HorseLegHop-v0`, until the last
@@ -535,8 +550,9 @@ beyond the commanded speed is charged as strongly as travel up to it is paid.
   speed each, gaits and agents alike. The gait was searched from the best one under the usual charges, with
   small steps. The {dear_seeds} agents of a speed, of {dear_commits}, begin as that gait: their networks first
   imitate it, without a clock to see, and then train for {dear_steps:,} steps each, with less noise, smaller
-  steps and more environments than others ({quiet}). Returns are under the dear charges. Agents lose some of
-  the gait's speed, so that they are also beside a gait of a slower command ({slower}).
+  steps and more environments than others ({quiet}).
+  Returns are under the dear charges. Agents lose some of the gait's speed, so that they are also beside a
+  gait of a slower command ({slower}).
 * **Agents that balance** are the {balancing} of
   [`HorseLegBalanceSpeed-v0`](../environments/HorseLegBalanceSpeed.md) of [seeing.md](seeing.md): another
   task, in which gaits without feedback fall over before they have a speed, and are no bar. They are beside
@@ -606,9 +622,9 @@ def write(out: Path, data: Mapping[str, Any]) -> Path:
         relations=relation_table(data),
         verdict=verdict(data),
         known_better=known_better(data),
-        dear_verdict=verdict(data, DEAR_AGENTS, DEAR_GAIT),
-        slower_verdict=verdict(data, DEAR_AGENTS, SLOW_GAIT),
-        dearer_verdict=verdict(data, DEAR_AGENTS),
+        dear_verdict=softer(data, DEAR_AGENTS, DEAR_GAIT),
+        slower_verdict=softer(data, DEAR_AGENTS, SLOW_GAIT),
+        dearer_verdict=softer(data, DEAR_AGENTS, "phase"),
         tried=TRIED,
     )
     runs.write_text(out / PAGE_FILE, text)

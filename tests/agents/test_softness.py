@@ -69,6 +69,9 @@ def test_policies_of_another_speed_are_not_compared():
     assert softness.relations(data, "constant", "stance_peak_n")[0][0] == ""
     assert softness.relations(data, "phase", "stance_peak_n") == [("higher", pytest.approx(2.0))]
     assert "higher in 2" in softness.verdict(data)
+    sentence = softness.softer(data, "agents", "phase")
+    assert sentence == "At 1.5 m/s stance peak is higher (2.00 times) and loading is higher (2.00 times)."
+    assert softness.softer(data, "agents", "constant") == ""
     text = softness.known_better(data)
     assert "returned 4 to 4, searches from random points, where a learner begins, too, -3" in text
 

@@ -51,7 +51,7 @@ def test_a_reading_tells_the_effect_of_the_ground_from_that_of_learning():
 
 
 def test_a_page_of_nothing_is_refused_by_name(tmp_path):
-    with pytest.raises(DataFileError, match="none.*trained on usual"):
+    with pytest.raises(DataFileError, match=r"none.*trained on usual"):
         swaps.measure(swaps.Args(folder=tmp_path / "none", out=tmp_path))
 
 
