@@ -113,6 +113,9 @@ class Args:
     start: Path | None = None
     """file of a gait, where the second and third searches begin; otherwise the stored constant gait of the
     id, or the zero action of a horse"""
+    step: float = STEP / 3
+    """first standard deviation of a search from a gait that is known, where the box of every number is 2
+    wide; a good gait in a narrow valley is lost by a large one"""
     out: Path | None = None
     """file; otherwise runs/open_loop/ENV-FAMILY.json"""
 
@@ -265,6 +268,7 @@ class Search:
         least: episodes before it may end.
         most: episodes that end it.
         tick: called with a number of episodes and the lowest cost in them.
+        step: first standard deviation of a search from a point.
         looks: episodes spent and mean return of the distribution's mean, over the same starts at each look.
         interrupted: True once Ctrl-C has ended it.
         stalled: True once its last quarter has gained too little.
@@ -275,6 +279,7 @@ class Search:
     least: int
     most: int
     tick: Callable[[int, float], Any]
+    step: float = STEP / 3
 
     def __post_init__(self) -> None:
         self._generator = np.random.default_rng([self.seed, 6])
@@ -296,7 +301,7 @@ class Search:
             start = self._screened()
         else:
             # A start that was found before needs a search around it only
-            step = STEP / 3
+            step = self.step
         floor = self.objective.zero(self._looked)
         strategy = make_strategy(
             start, step, POPULATION, int(self._generator.integers(1, 2**31)), **TOLERANCES
@@ -380,6 +385,8 @@ def optimise(args: Args) -> dict[str, Any]:
         "test_episodes": args.test_episodes,
         "easier": parse_pairs("--easier", args.easier),
         "start": known_gait(args),
+        # Left out where it is usual, so that searches of earlier commits go on
+        **({} if args.step == Args.step else {"step": args.step}),
     }
     restarts = earlier(path, about)
     check_folder(path.parent)
@@ -400,6 +407,7 @@ def check(args: Args) -> int:
     """Check the arguments and return the least episodes of a search."""
     require("agents.open_loop", "cma", "tqdm")
     check_number("restarts", args.restarts, low=1, high=1000)
+    check_number("step", args.step, low=0.0, high=1.0, exclusive_low=True)
     check_number("test_episodes", args.test_episodes, low=2, high=1e6)
     if args.harmonics is not None:
         check_number("harmonics", args.harmonics, low=1, high=8)
@@ -453,7 +461,7 @@ def search_once(objective: Objective, seed: int, about: dict[str, Any], bar: Any
             origin += ", through easier settings"
             spent_before = easier.spent
     bounds = about["least_episodes_of_a_search"], about["most_episodes_of_a_search"]
-    search = Search(objective, seed, *bounds, tick)
+    search = Search(objective, seed, *bounds, tick, about.get("step", Args.step))
     x, cost = search.run(start)
     parameters = {key: value.tolist() for key, value in family.decode(x).items()}
     return {

@@ -68,11 +68,12 @@ def test_policies_of_another_speed_are_not_compared():
     assert [one["speed_m_s"] for one in near["agents"]] == [1.5, 1.6]
     assert softness.relations(data, "constant", "stance_peak_n")[0][0] == ""
     assert softness.relations(data, "phase", "stance_peak_n") == [("higher", pytest.approx(2.0))]
-    text = softness.verdict(data)
-    assert "higher in 2" in text
-    assert (
-        "such searches returned 4 to 4, searches from random points, where a learner begins, too, -3" in text
-    )
+    assert "higher in 2" in softness.verdict(data)
+    sentence = softness.softer(data, "agents", "phase")
+    assert sentence == "At 1.5 m/s stance peak is higher (2.00 times) and loading is higher (2.00 times)."
+    assert softness.softer(data, "agents", "constant") == ""
+    text = softness.known_better(data)
+    assert "returned 4 to 4, searches from random points, where a learner begins, too, -3" in text
 
 
 def test_a_page_of_nothing_is_refused_by_name(tmp_path):
