@@ -33,6 +33,7 @@ from agents.gait_rig import Rig
 from agents.horse_gaits import speed_of
 from agents.judges import Bars, read_judges
 from agents.kept import check_numbers, read_kept
+from agents.limb_names import within_quarter
 from agents.rules import rejection_reason
 from hoof_env.errors import brief
 from hoof_env.tasks.horse import HIP_HEIGHT
@@ -388,7 +389,7 @@ def search_all(path: Path, seeds: int, first: Effort = FIRST, each: Effort = EAC
         if searcher is None or searcher.seed != seed:
             searcher = Searcher(seed, first, each)
         if near is None:
-            stored = horse_gaits()[f"kinematic-{kind}"].to_array()[None]
+            stored = within_quarter(horse_gaits()[f"kinematic-{kind}"].to_array()[None])
             known = paced(stored, froude, froude_of(kinematic_speeds()[f"kinematic-{kind}"], HIP_HEIGHT))
         elif kind == FREE:
             known = gaits_of(found.at(froude, seed, [*KINDS]))

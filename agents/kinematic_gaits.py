@@ -11,7 +11,8 @@ propulsion, impulses and loading of horses.
 
 A search begins with the reference gait of its speed, with a stride of 1.3 to 2.3 hip heights and several
 leads of the fore pair. The best lead of each stride is improved, and then the best of these. Searches that
-are in the file are not made again.
+are in the file are not made again. A found gait is stored with its fore legs named as they land on a horse
+(`agents.limb_names`).
 """
 
 from __future__ import annotations
@@ -31,6 +32,7 @@ from agents.gait_costs import CRITERIA, FALL
 from agents.gait_finder import STARTS, Finder
 from agents.kept import check_shape, read_kept
 from agents.kept_searches import Records
+from agents.limb_names import named, within_quarter
 from agents.start_phases import phase_of
 from hoof_env._output import check_folder
 from hoof_env.errors import ParameterError, check_choice, check_number, count
@@ -86,7 +88,8 @@ def begun_gait(path: Path, kind: str) -> Floats:
         return {name: np.array(one["gait"]) for name, one in content.items()}
 
     known = read_kept(path, "gaits as agents.kinematic_gaits --shipped has them", taken)
-    return known[check_choice("gait", f"kinematic-{kind}", known)]
+    begun: Floats = within_quarter(known[check_choice("gait", f"kinematic-{kind}", known)][None])[0]
+    return begun
 
 
 def searches_of(kind: str, froude: float, args: Args) -> list[str]:
@@ -150,9 +153,11 @@ def main(argv: list[str] | None = None) -> None:
         found = find(kind, froude, args, records)
         # A gait is filed under the speed that it reaches
         speed = round(found["reached"], 3)
-        phase = phase_of(np.array(found["gait"]), speed)
+        # Films and diagrams show names, which the search does not see
+        gait = named(kind, np.array(found["gait"]), speed)
+        phase = phase_of(gait, speed)
         start = {} if phase is None else {"phase": phase}
-        shipped[f"kinematic-{kind}"] = {"speed": speed, **start, "gait": found["gait"]}
+        shipped[f"kinematic-{kind}"] = {"speed": speed, **start, "gait": gait.tolist()}
     runs.write_text(args.shipped, json.dumps(shipped, indent=1) + "\n")
     print(f"written: {args.out}, {args.shipped}")
 

@@ -74,7 +74,8 @@ footfall](canter.md) there is.
 ![Which hooves bear load over two strides](horse_gaits/footfall.png)
 
 Bands are published ranges of stance peaks, dashed lines published peaks of horizontal forces (of the walk a
-foal's).
+foal's). In the plane left and right are names, which a search does not see: fore legs are called as they land
+on a horse (`agents.limb_names`), so the order of landings is chosen and only the lag was found.
 
 ## What the films show that is not a horse's
 

@@ -23,13 +23,12 @@ from agents import runs
 from agents.command import parse, run
 from agents.judge_pictures import ranges_of, shape_of
 from agents.judges import nearest_of, read_judges
+from agents.limb_names import LANDS
 from hoof_env._output import markdown_table
 from hoof_env.constants import GRAVITY
 from hoof_env.lab.compare import Comparison, compare
-from hoof_env.lab.forces import THRESHOLD
 from hoof_env.lab.picture import draw, warnings_of
 from hoof_env.lab.read import read_record
-from hoof_env.lab.stances import whole_stances
 from hoof_env.records import export_episode
 from hoof_env.tasks.horse import HIP_HEIGHT, MASS
 from hoof_env.tasks.horse_gaits import PAIRS, kinematic_speeds
@@ -63,8 +62,8 @@ so well do numbers of several sources fit together.
 {table}
 
 RMSE and errors are B less A in body weights; brackets have A's own figure. Touchdown is laid on touchdown,
-left limbs stand for both. The model is planar, so left and right are names: its left fore limb is here the
-one that lands after the left hind limb as on a horse, and `--map-b` below gives it that name.
+left limbs stand for both: the model is planar, and its left and right limbs have the same forces half a
+stride apart.
 
 {pictures}
 
@@ -122,17 +121,15 @@ def published(kind: str, speed: float) -> tuple[Floats, dict[str, Floats], float
     if kind == "walk":
         duty = float(judges["walk"]["duty"]["horse"])
         stride = float(judges["walk"]["stride_over_hip"]["horse"])
-        lag = float(judges["walk"]["lag"]["horse"])
     else:
         duty = float(nearest_of(judges["duty"], froude)["horse"][0])
         stride = float(nearest_of(judges["stride_over_hip"], froude)["horse"][0])
-        lag = float(judges["trot"]["lag"]["horse"])
     period = stride * HIP_HEIGHT / speed
     time = np.arange(round(STRIDES * period * RATE)) / RATE
     forces = {}
     share = 0.0
     for pair in PAIRS:
-        phase = (time / period - 0.1 - (lag if pair == "fore" else 0.0)) % 1.0
+        phase = (time / period - 0.1 - (LANDS[kind] if pair == "fore" else 0.0)) % 1.0
         stance = np.linspace(0, duty, 201)
         columns = [fore_aft(kind, pair, froude, 201), vertical(kind, pair, 201)]
         forces[pair] = np.stack([np.interp(phase, stance, one, right=0.0) for one in columns], 1)
@@ -162,39 +159,16 @@ def leave_out_beginning(path: Path) -> None:
     runs.write_text(path, "\n".join([head, *kept]) + "\n")
 
 
-def renamed(gait: Path, kind: str) -> dict[str, str]:
-    """Return the fore limbs of the model's record by other names, so that the left one is that which lands
-    after the left hind limb as on a horse, empty if it is. In the plane left and right are names."""
-    record = read_record(gait, mass=MASS)
-    landings = {
-        limb: np.array([first for first, _ in whole_stances(force[:, 1], THRESHOLD, record.rate)])
-        for limb, force in record.limbs.items()
-    }
-    hind = landings["left_hind"]
-    strides = {limb: at / np.mean(np.diff(hind)) for limb, at in landings.items()}
-    lag = float(read_judges()[kind]["lag"]["horse"])
-
-    def off(limb: str) -> float:
-        """Return how far the lag of a fore limb is from a horse's [strides]."""
-        turns = np.exp(2j * np.pi * (strides[limb][:, None] - strides["left_hind"] - lag))
-        return abs(float(np.angle(turns.mean())) / (2 * np.pi))
-
-    crossed = {"left_fore": "right_fore", "right_fore": "left_fore"}
-    return crossed if off("right_fore") < off("left_fore") else {}
-
-
-def compared(kind: str, folder: Path) -> tuple[Comparison, float, dict[str, str]]:
-    """Write and compare both records of a gait; return the comparison, the share of the weight that the
-    horse's forces bear, and the model's limbs that have other names there."""
+def compared(kind: str, folder: Path) -> tuple[Comparison, float]:
+    """Write and compare both records of a gait; return the comparison and the share of the weight that the
+    horse's forces bear."""
     name = f"kinematic-{kind}"
     time, forces, share = published(kind, kinematic_speeds()[name])
     horse, gait = folder / f"published-{kind}.csv", folder / f"{name}.csv"
     write_published(horse, time, forces)
     export_episode(gait, name, ENV_ID, seconds=SECONDS)
     leave_out_beginning(gait)
-    limbs = renamed(gait, kind)
-    found = compare(read_record(horse, mass=MASS), read_record(gait, limbs, mass=MASS), units="BW")
-    return found, share, limbs
+    return compare(read_record(horse, mass=MASS), read_record(gait, mass=MASS), units="BW"), share
 
 
 def rows_of(kind: str, found: Comparison) -> list[list[str]]:
@@ -255,10 +229,9 @@ def write(args: Args) -> None:
     folder = args.out / NAME
     folder.mkdir(parents=True, exist_ok=True)
     args.records.mkdir(parents=True, exist_ok=True)
-    of_gaits, shares, rows, named = {}, [], [], {}
+    of_gaits, shares, rows = {}, [], []
     for kind in ("walk", "trot"):
-        found, share, limbs = compared(kind, args.records)
-        named[kind] = "".join(f" {name}={limb}" for name, limb in limbs.items())
+        found, share = compared(kind, args.records)
         of_gaits[kind] = found
         shares.append(f"{share:.2f} ({kind})")
         rows += rows_of(kind, found)
@@ -282,8 +255,7 @@ def write(args: Args) -> None:
         folder=args.records,
         warm=WARM,
         commands="\n".join(
-            f"hoof-env compare {a} {b}{' --map-b' * bool(named[kind])}{named[kind]} --mass-a {MASS:g}"
-            f" --mass-b {MASS:g} --units BW --out {kind}.png"
+            f"hoof-env compare {a} {b} --mass-a {MASS:g} --mass-b {MASS:g} --units BW --out {kind}.png"
             for kind, (a, b) in names.items()
         ),
     )
