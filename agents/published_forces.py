@@ -62,8 +62,8 @@ so well do numbers of several sources fit together.
 {table}
 
 RMSE and errors are B less A in body weights; brackets have A's own figure. Touchdown is laid on touchdown,
-left limbs stand for both: the model is planar, and its left and right limbs have the same forces half a
-stride apart.
+left limbs stand for both. In the plane left and right are names, and the model's limbs are named as they land
+on a horse ([why](../decisions.md#the-horse)).
 
 {pictures}
 

@@ -6,7 +6,7 @@ import pytest
 from agents import gait_box
 from agents.gait_rig import Rig
 from agents.limb_names import LANDS, named, within_quarter
-from hoof_env.tasks.horse_gaits import LEGS, horse_gaits, kinematic_speeds
+from hoof_env.tasks.horse_gaits import LEGS, horse_gaits, kinematic_speeds, reference_gaits
 
 
 def other(gait):
@@ -58,6 +58,18 @@ def test_other_names_swap_the_fore_legs_and_leave_forces_as_they_are(kind, playe
         assert theirs[1] == pytest.approx(ours[0], rel=0.02)
     for figure in ("force", "transport", "duty_fore", "duty_hind", "reached", "lag"):
         assert played[kind][figure][1] == pytest.approx(played[kind][figure][0], rel=0.02, abs=0.005)
+
+
+def test_gaits_of_searches_have_names_that_no_horse_has(played):
+    """As docs/horse.md and docs/decisions.md say: a diagonal sequence, and a pace."""
+    assert landings(played["walk"], 1)["left_fore"] == pytest.approx(0.71, abs=0.01)
+    assert landings(played["trot"], 1)["left_fore"] == pytest.approx(0.04, abs=0.01)
+    rig = Rig(8, num_threads=1)
+    stored = [reference_gaits(np.array([1.8]))[0], horse_gaits()["walk"].to_array()]
+    assert rig.play(np.array(stored), 1.8, 0, 4)["touch_left_fore"] == pytest.approx(0.6, abs=0.05)
+    faster = [horse_gaits()[name].to_array() for name in ("fast", "trot-like")]
+    touched = rig.play(np.array(faster), 3.6, 0, 4)["touch_left_fore"]
+    assert (touched + 0.5) % 1 == pytest.approx(0.5, abs=0.05)
 
 
 @pytest.mark.parametrize("kind", LANDS)
