@@ -178,6 +178,7 @@ def test_every_frozen_page_says_of_which_commit_it_is():
             "jax.md",
             "seeing.md",
             "softness.md",
+            "swaps.md",
             "horse_gaits.md",
             "horse_forces.md",
             "gait_change.md",
