@@ -264,7 +264,8 @@ def told(rows: Sequence[Row]) -> str:
     where = f"between speeds that touch {CHANGE[0]:g} to {CHANGE[1]:g}"
     text = [
         f"Of {len(trained)} pairs of an agent and a speed {reasons.count('')} count; {fell} fall too often,"
-        f" {slow} miss the speed, {slipping} slip too far and {landing} do not land once a turn",
+        f" {slow} miss the speed, {slipping} slip too far and {landing} do not land once a turn, some of"
+        " them for two reasons",
         f"The lag of an agent jumps somewhere in {', '.join(jumping)}",
         f"It jumps once, down and {where}, where horses change, in {', '.join(as_horses)}"
         + (": a null result" if is_null else ""),
@@ -274,7 +275,11 @@ def told(rows: Sequence[Row]) -> str:
     for one in spared:
         steps = steps_of(rows, "walk", one)
         by.append(f"{np.mean(steps):+.2f} ({min(steps):+.2f} to {max(steps):+.2f}) by {names[one]}")
-    text.append(f"From {a:g} to {b:g} the lag of agents from walks changes by {', '.join(by)}")
+    (untrained,) = steps_of(rows, "walk", NONE)
+    text.append(
+        f"From {a:g} to {b:g} the lag of agents from walks, whether they count or not, changes by"
+        f" {', '.join(by)}; that of the gaits around which they act changes by {untrained:+.2f}"
+    )
     apart_by = [f"{between_starts(rows, one):.2f} by {names[one]}" for one in spared]
     text.append(
         f"On the average over speeds agents from walks and from trots are {between_starts(rows, NONE):.2f}"

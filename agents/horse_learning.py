@@ -557,9 +557,9 @@ def learnt_text(learners: Mapping[str, Figures]) -> str:
         gain = [one["return over zero"][0] for one in ones]
         falls = [100 * one["failed"] for one in ones]
         told.append(
-            f"{name}, {sum(each >= 0 for each in gain)} of {len(ones)} are not below the zero action and fall"
-            f" in {min(falls):.0f} to {max(falls):.0f} % of the episodes, {np.mean(falls):.0f} % on the"
-            f" average (zero action {100 * of_case['zero']['failed']:.0f} %)"
+            f"{name}, {sum(each >= 0 for each in gain)} of {len(ones)} return no less than the zero action"
+            f" and fall in {min(falls):.0f} to {max(falls):.0f} % of the episodes, {np.mean(falls):.0f} %"
+            f" on the average (zero action {100 * of_case['zero']['failed']:.0f} %)"
         )
     return f"Of stock PPO's seeds, {'; '.join(told)}. " if told else ""
 

@@ -14,8 +14,10 @@ from agents.gait_map import MIXTURE, Map, gaits_of
 from agents.horse_gaits import speed_of
 from agents.kept import EVIDENCE
 from hoof_env.dynamics.engine import TrunkEngine
+from hoof_env.errors import ParameterError, brief
 from hoof_env.tasks.horse import Horse
 from hoof_env.tasks.leg_starts import Start
+from hoof_env.tasks.settings import Settings
 
 Floats = NDArray[np.float64]
 
@@ -47,6 +49,15 @@ class SearchedHorse(Horse):
     """
 
     kind: ClassVar[str]
+
+    def __init__(self, settings: Settings) -> None:
+        super().__init__(settings)
+        if self.size != 1.0:
+            raise ParameterError(f"size: expected 1 for a horse around searched gaits, got {self.size:g}")
+        if self.gait is not None:
+            raise ParameterError(
+                f"gait: expected None for a horse around searched gaits, got {brief(settings.gait)}"
+            )
 
     def reference(self, targets: Floats, given: Any = None) -> Floats:
         """Return the numbers of the gaits from which actions make offsets at commanded speeds [m/s], shape

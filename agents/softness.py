@@ -527,7 +527,8 @@ ended in gaits that land hard, or that hardly travel. Charges of peak and loadin
 the first step ended in agents that hardly travel. Less noise at first (`log_std_init` of -1 or -2), and 64
 environments with three times the steps, found soft gaits in some trainings and hard or sliding ones in
 others. Agents that began as a gait with the 16 environments of `ppo_flat` got worse again after a third of
-their steps; that was seen in trainings at 2.25 m/s of the seeds above, which are no fresh ones. A training
+their steps. The number of environments was chosen after that, with the seeds above: they are no fresh sample.
+A training
 from scratch is made by `python -m agents.train --env-id agents.softness:softness/HopSpeed-v0 --algo ppo_flat
 --env-kwargs target_speed=[2.25,2.25] --params gamma=0.995`, with other arguments of the environment and other
 settings.
@@ -541,9 +542,9 @@ the agents that balance of {balance_commits}. The task is [`HorseLegHop-v0`](../
 but travel beyond the commanded speed is charged as strongly as travel up to it is paid.
 
 * **Gaits** see nothing. CMA-ES searched for the best constant gait, four numbers that are held, and the best
-  gait with a clock at each speed, from random points and from the gaits of `HorseLegHop-v0`, until the last
-  quarter of a search gained less than a hundredth: {episodes} episodes for each gait,
-  {stalled}.
+  gait with a clock, of one harmonic, at each speed, from random points and from the gaits of
+  `HorseLegHop-v0`, until the last quarter of a search gained less than a hundredth: {episodes} episodes for
+  each gait, {stalled}.
 * **Agents** are {seeds} trainings of `ppo_flat`, {steps:,} steps each. One agent goes at all speeds: in its
   training a new speed was commanded every {shortest:g} to {longest:g} s, {slowest:g} to {fastest:g} m/s.
 * **Dear** policies are of charges of stance peak, loading, slip and falls that are twice as dear, and of one

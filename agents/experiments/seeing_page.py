@@ -318,7 +318,8 @@ Policies on [`HorseLegBalance-v0`](../environments/HorseLegBalance.md) and
 [`HorseLegBalanceSpeed-v0`](../environments/HorseLegBalanceSpeed.md). Written by
 `python -m agents.experiments --plan seeing` from [seeing.json](seeing.json). Numbers are means over
 trainings, in brackets the lowest and the highest; a single number is of one policy. Trained by the code of
-{commits}. All play the same episodes, of which agents of several trainings play the first {starts}.
+{commits}; where a commit is `-dirty`, pages that an earlier publication had written differed, and no code.
+All play the same episodes, of which agents of several trainings play the first {starts}.
 The plan, `agents/plans/seeing.yml`, has more: where a table has fewer seeds, or lacks a row, they were not
 trained, and the same command goes on.
 
@@ -358,9 +359,11 @@ Neither the agent nor the gait falls under these pushes: on a boom hopping is st
 seeing gains 0.17 of what the agent gains over the zero action, below the bar of a quarter.
 
 Ditches across level ground were tried as a task, too, in place of `HorseLegTerrain-v0`:
-`HorseLegHop-v0` with `terrain={{"kind": "ditches"}}`, as deep as a hoof is high, and
+`HorseLegHop-v0` with `terrain={{"kind": "ditches"}}`, which are 0.08 m deep, and
 `reward_weights={{"failure": 10}}`. Entries of one's own showed the level of the ground at O and up to 1.6 m
-ahead. Agents are trainings of `ppo_flat` of a million steps, each played in 100 episodes:
+ahead. Agents are trainings of `ppo_flat` of a million steps, each played in 100 episodes. These figures were
+taken once, with an id that is not kept; no command makes this table again, but `python -m agents.train` and
+`python -m agents.open_loop` with these arguments make all of it that sees no ground:
 
 | policy | return | falls % |
 |---|---|---|

@@ -25,8 +25,9 @@ from hoof_env.episodes.randomization import Randomization
 from hoof_env.episodes.rows import Rows
 from hoof_env.episodes.scene import Slots
 from hoof_env.episodes.strength import Strength
-from hoof_env.errors import check_choice, check_number, flag
+from hoof_env.errors import ParameterError, brief, check_choice, check_number, flag
 from hoof_env.ground.terrain import Terrain
+from hoof_env.simd.user_functions import function_name
 from hoof_env.tasks.body import Body
 from hoof_env.tasks.episode import ACTIONS, Episode, episode_layout, task_type
 from hoof_env.tasks.observation import CONTEXT, check_groups, groups_of
@@ -214,6 +215,11 @@ def make_plan(
 
         check_settings(s)
     body = task.body(s)
+    if not hasattr(body, "kernels"):
+        raise ParameterError(
+            f"{task.id}: body: expected a function of settings that returns a Body, got {brief(body)} from"
+            f" {function_name(task.body)}"
+        )
     check_drift(terrain, s.terrain, s.trunk, body.height)
     weights = check_weights(s.reward_weights, task.terms)
     constants = check_constants(s.constants, constants_of(task.terms, task.entries))

@@ -175,11 +175,12 @@ def refuse_misfit(path: Path, there: dict[str, Any], here: dict[str, Any]) -> No
             unlike.append("another version of an id is another task")
         if "env_id" not in there:
             unlike.append("the file names no id; give the one of its training")
+        advice = ""
         if any(words.startswith(SCALES) for words in unlike):
             commit = there.get("versions", {}).get("commit")
             code = f"commit {commit}" if commit else "the commit"
-            unlike.append(f"train it again, or play it in {code} of its training")
-        raise DataFileError(f"policy {path}: trained for {'; '.join(unlike)}")
+            advice = f". Train it again, or check out {code} of its training"
+        raise DataFileError(f"policy {path}: trained for {'; '.join(unlike)}{advice}")
 
 
 def misfits(there: dict[str, Any], here: dict[str, Any]) -> list[str]:

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hoof_env.errors import ParameterError, brief, check_choice, check_number
-from hoof_env.ground.terrain import Terrain
+from hoof_env.ground.terrain import MAX_KNOTS, Terrain
 from hoof_env.tasks.parameters import check_range
 
 Floats = NDArray[np.float64]
@@ -63,6 +63,12 @@ def check_drift(terrain: Terrain, description: Any, trunk: str, hip_height: floa
         return
     where, mean = farthest_mean(terrain, STRETCH)
     if abs(mean) > (most := DRIFT * hip_height):
+        if isinstance(description, Mapping) and description.get("kind") == "ditches":
+            raise ParameterError(
+                "terrain: expected shallower or narrower ditches, or longer gaps, whose mean height over"
+                f" {STRETCH:g} m stays within {most:.3g} m of 0 under a {trunk} trunk,"
+                f" {DRIFT_REASONS[trunk]}; got {mean:.3g} m around x = {where:.4g} m"
+            )
         raise ParameterError(
             f"terrain: expected ground whose mean height over {STRETCH:g} m stays within {most:.3g} m of 0"
             f" {remedy}; got a mean of {mean:.3g} m around x = {where:.4g} m"
@@ -97,7 +103,7 @@ def farthest_mean(terrain: Terrain, stretch: float) -> tuple[float, float]:
 
 
 KINDS = ("ditches", "hills", "slope")
-LENGTHS = (10.0, 1e5)  # shortest and longest hills and ditches [m]
+SHORTEST = 10.0  # hills and ditches [m]
 SPACING = 0.1  # between knots of hills [m]
 
 HILLS: dict[str, Any] = {
@@ -183,7 +189,7 @@ class _Hills(NamedTuple):
 def _hills(values: dict[str, Any]) -> Terrain:
     """Make hills from values for all keys of `HILLS`."""
     bounds = {
-        "length": LENGTHS,
+        "length": (SHORTEST, (MAX_KNOTS - 1) * SPACING),
         "rise": (0.0, 10.0),
         "slope": (1e-3, 1.0),
         "patch": (0.2, 1e3),
@@ -246,7 +252,11 @@ def _seed(values: Mapping[str, Any]) -> int:
 
 def _ditches(values: Mapping[str, Any]) -> Terrain:
     """Make ditches from values for all keys of `DITCHES`."""
-    bounds = {"length": LENGTHS, "depth": (0.0, 10.0), "width": (2 * STEP, 100.0)}
+    bounds = {
+        "length": (SHORTEST, (MAX_KNOTS - 1) * STEP),
+        "depth": (0.0, 10.0),
+        "width": (2 * STEP, 100.0),
+    }
     length, depth, width = (
         check_number(f"terrain[{name!r}]", values[name], low=low, high=high)
         for name, (low, high) in bounds.items()
@@ -263,9 +273,12 @@ def _dig(seed: int, length: float, depth: float, width: float, shortest: float, 
     across = round(width / STEP)
     row = np.zeros(knots)
     k = 0
-    while k < knots:
-        # The knot at which a ditch begins is still level, and so is the one at its end
+    while True:
         k += max(round(generator.uniform(shortest, longest) / STEP), 1)
+        # The last knot is level, and the ground beyond
+        if k + across >= knots:
+            break
+        # The knots at which a ditch begins and ends are level
         row[k + 1 : k + across] = -depth
         k += across
     return Terrain(tuple(row.tolist()), start=0.0, spacing=STEP)

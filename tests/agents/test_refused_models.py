@@ -121,7 +121,7 @@ RUNS = [
     (record(actions="offsets"), "actions offsets, expected rates"),
     (
         record(observation_scales={"forward speed": "tanh(x / 9)", "toe load": "tanh(x / 3 weights)"}),
-        r"observation_scales, forward speed: 'tanh\(x / 9\)', expected 'tanh\(x / 5\)'; train it again, or",
+        r"observation_scales, forward speed: 'tanh\(x / 9\)', expected 'tanh\(x / 5\)'. Train it again, or",
     ),
     (record(observation_names=["pitch"]), "observation_names with pitch and without .*forward speed"),
     (record(observation_scales=["tanh(x / 5)"]), r"run\.json: expected"),

@@ -20,7 +20,10 @@ def figures_of_a_pair():
     return {
         "weight_n": 50.0,
         "played": {
-            mine: {other: [seed_of(stance_peak_n=peak)] for other, peak in on.items()}
+            mine: {
+                other: [seed_of(stance_peak_n=peak, failed=failed) for failed in (0.0, 0.05, 1.0)]
+                for other, peak in on.items()
+            }
             for mine, on in peaks.items()
         },
     }
@@ -41,13 +44,20 @@ def test_agents_are_played_on_the_settings_of_their_pairs():
 def test_a_table_has_agents_of_both_settings_on_both():
     lines = swaps.table(figures_of_a_pair(), PAIR).splitlines()
     assert len(lines) == 2 + 4
-    assert "| restitution 0 | restitution 1 | 1 |" in lines[3]
+    assert "| restitution 0 | restitution 1 | 3 |" in lines[3]
     assert "4.00" in lines[3]  # weights
 
 
 def test_a_reading_tells_the_effect_of_the_ground_from_that_of_learning():
     text = swaps.reading(figures_of_a_pair(), PAIR)
-    assert "stance peaks change by a factor of 2.00 with the agents as they were, and of 1.50" in text
+    assert "of 3 agents as they were 2 stay up, with 2.00 times the stance peaks" in text
+    assert "of 3 agents trained there 2 stay up, with 1.50 times the stance peaks" in text
+
+
+def test_forces_of_agents_that_fall_are_not_compared():
+    figures = figures_of_a_pair()
+    figures["played"][PAIR[1]][PAIR[1]] = [seed_of(failed=0.0), seed_of(failed=1.0)]
+    assert "of 2 agents trained there 1 stay up. On" in swaps.reading(figures, PAIR)
 
 
 def test_a_page_of_nothing_is_refused_by_name(tmp_path):

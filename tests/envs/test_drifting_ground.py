@@ -84,5 +84,12 @@ def test_ditches_are_as_deep_wide_and_far_apart_as_asked(seed):
     assert np.mean(gaps) == pytest.approx(np.mean(gap), abs=0.1)
 
 
+@pytest.mark.parametrize("seed", range(60))
+def test_beyond_ditches_the_ground_is_level(seed):
+    terrain = make_terrain({"kind": "ditches", "seed": seed, "length": 40.0})
+    assert terrain.height[0] == terrain.height[-1] == 0.0
+    assert terrain.height_at(np.array([-5.0, 45.0])).tolist() == [0.0, 0.0]
+
+
 def test_a_ditch_of_no_depth_is_level():
     assert not any(make_terrain({"kind": "ditches", "depth": 0.0}).height)

@@ -128,7 +128,8 @@ SETTINGS = {
         ({"terrain": {"kind": "ditches", "depth": -1}}, r"terrain\['depth'\]: expected .*got -1"),
         ({"terrain": {"kind": "ditches", "width": 0.05}}, r"terrain\['width'\]: expected .*got 0.05"),
         ({"terrain": {"kind": "ditches", "gap": [2, 1]}}, r"terrain\['gap'\]\[1\]: expected .*got 1"),
-        ({"terrain": {"kind": "ditches", "depth": 1.0}}, "terrain: expected ground whose mean height"),
+        ({"terrain": {"kind": "ditches", "depth": 1.0}}, "terrain: expected shallower .*mean height"),
+        ({"terrain": {"kind": "ditches", "length": 1e5}}, r"terrain\['length'\]: expected .*got 100000"),
         ({"terrain": {"kind": "slope", "angle": 2}}, "angle.*: expected.*got 2"),
         ({"terrain": {"bumps": 1}}, "terrain.*"),
         (
