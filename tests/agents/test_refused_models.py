@@ -230,7 +230,7 @@ EXPORTS = [
         tagged(observation_scales='{"height": "tanh(x / 9)"}'),
         ENV_ID,
         KWARGS,
-        r"observation_scales, height: 'tanh\(x / 9\)', expected 'tanh\(\(x - hip .*; train it again, or",
+        r"observation_scales, height: 'tanh\(x / 9\)', expected 'tanh\(\(x - hip .*\. Train it again, or",
     ),
     (tagged(observation_scales="[1]"), ENV_ID, KWARGS, rf"{NO_ONNX}.*observation_scales: expected a JSON"),
     (None, RAIL, {}, "env_id hoof_env/HorseLeg-v0, expected hoof_env/HorseLegRail-v0"),
