@@ -268,7 +268,8 @@ PAGE = """# A leg that carries itself: learners and gaits
 
 Policies on [`HorseLegHop-v0`](../environments/HorseLegHop.md) in the same {starts} episodes. Written by
 `python -m agents.experiments --plan hop` from [hop.json](hop.json). Numbers are means over trainings, in
-brackets the lowest and the highest; a single number is of one policy. Trained by the code of {commits}.
+brackets the lowest and the highest; a single number is of one policy. Trained by the code of
+{commits}; where a commit is `-dirty`, pages that an earlier publication had written differed, and no code.
 
 {table}
 
