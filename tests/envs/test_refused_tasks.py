@@ -44,7 +44,7 @@ REGISTRATIONS = [
     ),
     (lambda: {"env_id": "hoof_env/HorseLeg-v0"}, "of a namespace .*got 'hoof_env/HorseLeg-v0'"),
     (lambda: {"env_id": 3}, "env_id: expected .*got 3"),
-    (lambda: {"base": "pony"}, r"task: expected .*fixed, hop, horse, .*leg, .*, terrain.*, got 'pony'"),
+    (lambda: {"base": "pony"}, r"task: expected .*fixed, .*hop, horse, .*leg, .*, terrain.*, got 'pony'"),
     (lambda: {"terms": [term(constant), term(constant)]}, "expected names that differ, got mine twice"),
     (
         lambda: {"entries": [entry(len), entry(len)]},

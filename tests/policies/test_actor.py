@@ -215,6 +215,7 @@ ASKS = {
     "hoof_env/policies/saved.py": "hands on what a model of Stable-Baselines3 returns",
     "hoof_env/policies/onnx_file.py": "tries a new file with drawn observations",
     "agents/export.py": "compares two policies over drawn observations",
+    "agents/gait_rig.py": "plays many horses side by side by a policy without memory",
     "agents/levels.py": "hands on what a policy returns, some of it replaced by random actions",
     "agents/ship.py": "hands on what a policy returns, with noise",
     "benchmarks/jax_gaits.py": "plays the first steps of an episode by many gaits side by side",
