@@ -527,8 +527,8 @@ ended in gaits that land hard, or that hardly travel. Charges of peak and loadin
 the first step ended in agents that hardly travel. Less noise at first (`log_std_init` of -1 or -2), and 64
 environments with three times the steps, found soft gaits in some trainings and hard or sliding ones in
 others. Agents that began as a gait with the 16 environments of `ppo_flat` got worse again after a third of
-their steps. The number of environments was chosen after that, with the seeds above: they are no fresh sample.
-A training
+their steps. The number of environments was chosen after that, with the seeds and episodes above: they are no
+fresh sample. A training
 from scratch is made by `python -m agents.train --env-id agents.softness:softness/HopSpeed-v0 --algo ppo_flat
 --env-kwargs target_speed=[2.25,2.25] --params gamma=0.995`, with other arguments of the environment and other
 settings.
