@@ -361,9 +361,11 @@ seeing gains 0.17 of what the agent gains over the zero action, below the bar of
 Ditches across level ground were tried as a task, too, in place of `HorseLegTerrain-v0`:
 `HorseLegHop-v0` with `terrain={{"kind": "ditches"}}`, which are 0.08 m deep, and
 `reward_weights={{"failure": 10}}`. Entries of one's own showed the level of the ground at O and up to 1.6 m
-ahead. Agents are trainings of `ppo_flat` of a million steps, each played in 100 episodes. These figures were
-taken once, with an id that is not kept; no command makes this table again, but `python -m agents.train` and
-`python -m agents.open_loop` with these arguments make all of it that sees no ground:
+ahead. Agents are trainings of `ppo_flat` of a million steps, each played in 100 episodes. Agents
+that see no ground are made again by `python -m agents.train
+--env-id hoof_env/HorseLegHop-v0 --algo ppo_flat --steps 1000000 --seed 0` and other seeds,
+with these arguments as `--env-kwargs`, and gaits by `python -m agents.open_loop`. The id that showed the
+ground is gone, and no command makes the last row again:
 
 | policy | return | falls % |
 |---|---|---|
