@@ -38,8 +38,8 @@ BODY: tuple[Part, ...] = (
 EAR: Part = ((1.36, 0.86), (1.38, 1.06), 0.05, 0.015)
 TAIL: Part = ((-0.93, 0.22), (-1.15, -0.42), 0.05, 0.025)
 HORSE_HIP_M = 1.4
-FAR = (1, 3)
-"""Right legs of a horse, which are drawn behind its trunk."""
+FAR = (0, 2)
+"""Left legs of a horse, which are drawn behind its trunk: it heads right, and shows its right side."""
 
 
 class LegOutline:

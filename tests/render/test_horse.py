@@ -14,6 +14,7 @@ from hoof_env.constants import GRAVITY
 from hoof_env.envs.policies import make_policy
 from hoof_env.film import frames
 from hoof_env.record.instant import instants
+from hoof_env.render.outline import EAR, FAR, TAIL
 from hoof_env.render.renderer import Renderer
 from hoof_env.tasks.horse_gaits import LEGS
 
@@ -67,6 +68,12 @@ def test_the_panel_counts_the_stances_that_the_forces_show(played):
         assert sum(end - start for start, end in bars) == pytest.approx(loaded.sum() * 1e-3, abs=0.01)
         grf = np.hypot(record[f"{leg}_force_x"], record[f"{leg}_force_y"])
         assert renderer._panel.each[k].highest == pytest.approx(grf.max())
+
+
+def test_one_sees_the_right_side_of_a_horse_that_heads_right():
+    """Its left legs are behind its trunk."""
+    assert EAR[0][0] > 0 > TAIL[0][0]
+    assert [LEGS[i] for i in FAR] == [leg for leg in LEGS if leg.startswith("left")]
 
 
 def test_films_show_a_horse_that_goes(played):
